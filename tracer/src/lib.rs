@@ -1,0 +1,4 @@
+//! The ray tracer of rayfarm: a scene in, pixels out.
+
+pub mod mesh;
+pub mod scene;
