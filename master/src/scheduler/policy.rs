@@ -1,0 +1,70 @@
+//! How a frame is cut into segments.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// How a frame is cut into segments. Written `static:ROWS`, `smart:ROWS` or `adaptive` on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum SegmentPolicy {
+    /// Segments of so many rows, in order. At the end, idle workers repeat what others still hold.
+    Static(u32),
+    /// As `Static`, with the last n_workers / 2 segments halved.
+    Smart(u32),
+    /// Segments of equal predicted time, from the last frame's cost per row and each worker's measured speed.
+    #[default]
+    Adaptive,
+}
+
+/// Why a text names no policy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text:?} is no segment policy: expected static:ROWS, smart:ROWS (ROWS at least 1) or adaptive")]
+pub struct PolicyError {
+    text: String,
+}
+
+impl FromStr for SegmentPolicy {
+    type Err = PolicyError;
+
+    fn from_str(text: &str) -> Result<Self, PolicyError> {
+        let refused = || PolicyError { text: text.to_owned() };
+        let rows = |digits: &str| digits.parse().ok().filter(|&rows: &u32| rows > 0).ok_or_else(refused);
+        match text.split_once(':') {
+            None if text == "adaptive" => Ok(Self::Adaptive),
+            Some(("static", digits)) => rows(digits).map(Self::Static),
+            Some(("smart", digits)) => rows(digits).map(Self::Smart),
+            _ => Err(refused()),
+        }
+    }
+}
+
+impl fmt::Display for SegmentPolicy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Static(rows) => write!(f, "static:{rows}"),
+            Self::Smart(rows) => write!(f, "smart:{rows}"),
+            Self::Adaptive => f.write_str("adaptive"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_policy_reads_back_as_it_is_written() {
+        for policy in [SegmentPolicy::Static(1), SegmentPolicy::Smart(24), SegmentPolicy::Adaptive] {
+            assert_eq!(policy.to_string().parse(), Ok(policy));
+        }
+    }
+
+    #[test]
+    fn what_is_no_policy_is_refused_by_name() {
+        for text in
+            ["", "static", "static:", "static:0", "smart:-1", "adaptive:8", "Static:8", "static:4294967296"]
+        {
+            let error = text.parse::<SegmentPolicy>().unwrap_err().to_string();
+            assert!(error.contains(&format!("{text:?}")) && error.contains("static:ROWS"), "{error}");
+        }
+    }
+}
