@@ -1,4 +1,5 @@
 //! The ray tracer of rayfarm: a scene in, pixels out.
 
+pub mod image;
 pub mod mesh;
 pub mod scene;

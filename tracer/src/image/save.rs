@@ -1,0 +1,170 @@
+//! Writing pictures. A file appears whole or not at all: the bytes go to a temporary name in the same folder, which
+//! is renamed when it is complete and removed when it is not.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use ::image::codecs::png::PngEncoder;
+use ::image::{ExtendedColorType, ImageEncoder};
+
+use super::{ImageError, RgbImage};
+
+/// The extensions that [`save`] knows, for messages.
+pub const KNOWN_EXTENSIONS: &str = ".png, .ppm";
+
+#[derive(Clone, Copy)]
+enum Format {
+    Png,
+    Ppm,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, ImageError> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("ppm") => Ok(Self::Ppm),
+            _ => Err(ImageError::UnknownExtension { path: path.to_owned() }),
+        }
+    }
+}
+
+/// Writes a picture as PNG or PPM, by the extension of `path`, replacing what was there.
+///
+/// # Errors
+/// An unknown extension, a buffer that does not fit the size, a folder that cannot be written to, a full disk. A file
+/// that was there before is then still there, and no half-written one beside it.
+pub fn save(path: &Path, image: &RgbImage) -> Result<(), ImageError> {
+    let format = Format::of(path)?;
+    image.check()?;
+    let failed = |source| ImageError::Write { path: path.to_owned(), source };
+    let (temporary, file) = Temporary::create_beside(path).map_err(failed)?;
+    let mut out = BufWriter::new(file);
+    match format {
+        Format::Png => write_png(&mut out, image)
+            .map_err(|source| ImageError::Encode { path: path.to_owned(), source })?,
+        Format::Ppm => write_ppm(&mut out, image).map_err(failed)?,
+    }
+    // Closed before it is renamed: Windows does not rename open files.
+    drop(out.into_inner().map_err(|e| failed(e.into_error()))?);
+    temporary.rename_to(path).map_err(failed)
+}
+
+fn write_png(out: &mut impl Write, image: &RgbImage) -> Result<(), ::image::ImageError> {
+    PngEncoder::new(out).write_image(&image.pixels, image.width, image.height, ExtendedColorType::Rgb8)
+}
+
+fn write_ppm(out: &mut impl Write, image: &RgbImage) -> io::Result<()> {
+    write!(out, "P6\n{} {}\n255\n", image.width, image.height)?;
+    out.write_all(&image.pixels)
+}
+
+/// A file that is removed unless it is renamed.
+struct Temporary {
+    path: Option<PathBuf>,
+}
+
+impl Temporary {
+    fn create_beside(target: &Path) -> io::Result<(Self, File)> {
+        // The process and a counter make the name unique, so that no two savings share a temporary file.
+        static COUNTER: AtomicU32 = AtomicU32::new(0);
+        let mut name = OsString::from(".");
+        name.push(target.file_name().ok_or(io::ErrorKind::InvalidInput)?);
+        let serial = COUNTER.fetch_add(1, Ordering::Relaxed);
+        name.push(format!(".{}-{serial}.partial", std::process::id()));
+        let path = target.with_file_name(name);
+        let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
+        Ok((Self { path: Some(path) }, file))
+    }
+
+    fn rename_to(mut self, target: &Path) -> io::Result<()> {
+        if let Some(path) = &self.path {
+            fs::rename(path, target)?;
+        }
+        self.path = None;
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some(path) = &self.path {
+            // Nothing is left to be done when this fails as well: the cause has been reported already.
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::load;
+    use super::*;
+
+    fn gradient() -> RgbImage {
+        let mut image = RgbImage::new(7, 5);
+        for (i, byte) in image.pixels.iter_mut().enumerate() {
+            *byte = (i * 37 % 256) as u8;
+        }
+        image
+    }
+
+    fn names_in(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn pictures_come_back_as_they_were_and_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "b.ppm", "c.PNG"] {
+            let path = folder.path().join(name);
+            save(&path, &gradient()).unwrap();
+            save(&path, &gradient()).unwrap();
+            assert_eq!(load(&path).unwrap(), gradient());
+        }
+        assert_eq!(names_in(folder.path()), ["a.png", "b.ppm", "c.PNG"]);
+    }
+
+    #[test]
+    fn an_unknown_extension_is_refused_with_the_known_ones() {
+        for name in ["picture.gif", "picture"] {
+            let message = save(Path::new(name), &gradient()).unwrap_err().to_string();
+            assert!(message.contains(name) && message.contains(".png, .ppm"), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_failure_leaves_nothing_behind_and_the_old_file_in_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("nowhere/a.png");
+        let message = save(&missing, &gradient()).unwrap_err().to_string();
+        assert!(message.contains("nowhere") && message.contains("folder exists"), "{message}");
+
+        // A folder stands where the file should go, so the last step, the renaming, fails.
+        let taken = folder.path().join("taken.ppm");
+        fs::create_dir(&taken).unwrap();
+        fs::write(taken.join("inside"), "x").unwrap();
+        assert!(save(&taken, &gradient()).is_err());
+        assert_eq!(names_in(folder.path()), ["taken.ppm"]);
+
+        let good = folder.path().join("good.png");
+        save(&good, &gradient()).unwrap();
+        let empty = RgbImage::new(0, 0);
+        assert!(save(&good, &empty).is_err(), "PNG has no empty pictures");
+        assert_eq!(load(&good).unwrap(), gradient());
+        assert_eq!(names_in(folder.path()), ["good.png", "taken.ppm"]);
+    }
+
+    #[test]
+    fn a_buffer_of_another_size_is_refused() {
+        let mut image = gradient();
+        image.pixels.pop();
+        let message = save(Path::new("x.png"), &image).unwrap_err().to_string();
+        assert!(message.contains("105 bytes") && message.contains("104"), "{message}");
+    }
+}
