@@ -4,10 +4,18 @@
 //! kilobytes whatever it shows. Positions and transforms are `f64`: a scene may stand 10^7 extents from the origin,
 //! and digits are dropped only after the camera's position has been subtracted. Colours are linear RGB.
 
+pub mod rotation;
+mod validate;
+
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::MeshId;
+
+pub use validate::{
+    MAX_COORDINATE, MAX_DEPTH, MAX_EXPONENT, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES,
+    MAX_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TRIANGLES, ValidateError,
+};
 
 /// A whole scene: what the scene file says, resolved and validated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
