@@ -1,1 +1,33 @@
-//! Skeleton.
+//! The wire of rayfarm: what a master and its workers say to each other, over any byte stream.
+//!
+//! Nothing here renders or opens a socket: scenes, frames and pixels are bytes that pass through uninterpreted, and
+//! every function takes any `AsyncRead + AsyncWrite`, so a session over an in-memory pipe is a session.
+//!
+//! From the wire upwards:
+//!
+//! 1. [`handshake`]: a preamble of magic, version and role, then who the worker is. Done by hand, before any codec, so
+//!    that two versions can always tell each other apart.
+//! 2. [`envelope`]: eight bytes (length, type, flags, stream) in front of every message. What they announce is
+//!    checked against [`limits`] before anything is allocated.
+//! 3. [`message`]: [`ToWorker`] and [`ToMaster`]. Small ones are bincode ([`codec`]); frames, asset chunks and pixels
+//!    have hand-laid heads and their bytes are never copied on the way out.
+//! 4. [`session`]: one task that writes (control before bulk), one that reads, bounded queues between them and the user.
+
+pub mod codec;
+pub mod envelope;
+mod error;
+pub mod handshake;
+mod ids;
+pub mod limits;
+pub mod message;
+pub mod pixels;
+pub mod session;
+mod text;
+
+pub use error::{ProtocolError, Role};
+pub use ids::{AssetId, FrameId, Lease};
+pub use message::{FrameAnnounce, Hello, ToMaster, ToWorker, Welcome};
+pub use pixels::{Cost, Encoding, PixelsHeader};
+
+/// Version of everything behind the preamble. It grows with every change that an older peer would misread.
+pub const PROTOCOL_VERSION: u16 = 1;

@@ -1,0 +1,63 @@
+//! Every bound on what a peer can make this side hold, and for how long.
+
+use std::time::Duration;
+
+/// Body of a control message, and of anything sent before the handshake is done.
+pub const MAX_CONTROL_BYTES: usize = 4 << 10;
+
+/// A worker's name, its SIMD level, its software version: each.
+pub const MAX_NAME_BYTES: usize = 255;
+
+/// The reason in a refusal, a failure or a goodbye. Longer ones are cut before they are sent.
+pub const MAX_REASON_BYTES: usize = 2 << 10;
+
+/// The opaque view of one frame.
+pub const MAX_VIEW_BYTES: usize = 4 << 10;
+
+/// Width and height of a frame, in pixels.
+pub const MAX_FRAME_SIDE: u32 = 32_768;
+
+/// Bytes of one asset (2 GiB). A worker's own cache bound is usually far smaller and decides first.
+pub const MAX_ASSET_BYTES: u64 = 2 << 30;
+
+/// Bytes of an asset in one envelope. Small enough that a control message waits at most some 2 ms behind it on gigabit.
+pub const MAX_CHUNK_BYTES: usize = 256 << 10;
+
+/// Pixel bytes of one segment (32 MiB: a whole 3840 x 2160 frame fits). See [`max_lease_rows`].
+pub const MAX_PIXELS_BYTES: usize = 32 << 20;
+
+/// The longest value that [`crate::codec`] decodes (64 MiB): a scene body of some 800,000 single triangles.
+pub const MAX_DECODE_BYTES: usize = 64 << 20;
+
+/// Control messages that wait for the writer of a session.
+pub const CONTROL_QUEUE: usize = 256;
+
+/// Bulk messages that wait for the writer of a session.
+pub const BULK_QUEUE: usize = 8;
+
+/// Messages that were received and wait for the user of a session.
+pub const INBOX_QUEUE: usize = 256;
+
+/// Body bytes of those messages; the reader stops reading while they are more.
+pub const INBOX_BYTES: usize = 2 * (MAX_PIXELS_BYTES + MAX_CONTROL_BYTES);
+
+/// From the first byte of the preamble to the end of the handshake.
+pub const HANDSHAKE_DEADLINE: Duration = Duration::from_secs(5);
+
+/// How long the reader goes on after the writer has failed: the peer's last word may still be on its way in.
+pub const LAST_WORD_GRACE: Duration = Duration::from_millis(500);
+
+/// The slowest peer that is waited for in the middle of an envelope.
+const SLOWEST_BYTES_PER_SECOND: u64 = 256 << 10;
+
+/// How long an envelope with a body of `body_bytes` may take once it has begun, in either direction.
+/// Between envelopes a peer may be silent for ever.
+pub fn envelope_deadline(body_bytes: usize) -> Duration {
+    Duration::from_secs(10) + Duration::from_millis(body_bytes as u64 * 1000 / SLOWEST_BYTES_PER_SECOND)
+}
+
+/// The most rows of a frame that one lease may cover, so that their raw pixels fit into one envelope; at least 1.
+pub fn max_lease_rows(width: u32) -> u32 {
+    let row_bytes = (width.max(1) as usize).saturating_mul(3);
+    u32::try_from(MAX_PIXELS_BYTES / row_bytes).unwrap_or(u32::MAX).max(1)
+}

@@ -1,0 +1,194 @@
+//! What a master says.
+
+use bytes::{Buf, BufMut, Bytes};
+
+use super::body::{decode_control, decode_reason, encode_control, encode_reason, nothing, split_head};
+use super::{FrameAnnounce, Message};
+use crate::envelope::{Envelope, Kind};
+use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
+use crate::{AssetId, FrameId, Lease, ProtocolError};
+
+/// What a master says to a worker.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ToWorker {
+    /// Leases of this frame may follow.
+    Frame(FrameAnnounce),
+    /// Render these rows, and send them.
+    Segment(Lease),
+    /// Nothing before this frame is wanted any more.
+    Cancel {
+        /// The first frame that still is.
+        before: FrameId,
+    },
+    /// An asset that the worker asked for follows, in chunks from the first byte to the last.
+    AssetBegin {
+        /// Its name.
+        id: AssetId,
+        /// All its bytes, at most [`MAX_ASSET_BYTES`].
+        size: u64,
+    },
+    /// A part of it.
+    AssetChunk {
+        /// Its name.
+        id: AssetId,
+        /// Where in the asset these bytes begin.
+        offset: u64,
+        /// 1 to [`MAX_CHUNK_BYTES`] of them.
+        bytes: Bytes,
+    },
+    /// The master does not have the asset that the worker asked for.
+    AssetUnknown {
+        /// Its name.
+        id: AssetId,
+    },
+    /// Asks for a pong with the same number, at once.
+    Ping {
+        /// The number.
+        nonce: u64,
+    },
+    /// Finish the leases you hold; no more will come.
+    Drain,
+    /// The last message.
+    Goodbye {
+        /// Why.
+        reason: String,
+    },
+}
+
+const FRAME_HEAD_BYTES: usize = 48;
+const CHUNK_HEAD_BYTES: usize = 40;
+
+impl Message for ToWorker {
+    const EXPECTED: &'static str = "a message from a master to a worker";
+
+    fn carries(kind: Kind) -> bool {
+        match kind {
+            Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping | Kind::Drain | Kind::Goodbye => true,
+            Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => true,
+            Kind::Hello | Kind::Welcome | Kind::Refused => false,
+            Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => false,
+        }
+    }
+
+    fn to_envelope(&self) -> Result<Envelope, ProtocolError> {
+        match self {
+            Self::Frame(announce) => encode_frame(announce),
+            Self::Segment(lease) => encode_control(Kind::Segment, &checked_lease(*lease)?),
+            Self::Cancel { before } => encode_control(Kind::Cancel, before),
+            Self::AssetBegin { id, size } => encode_control(Kind::AssetBegin, &(id, checked_size(*size)?)),
+            Self::AssetChunk { id, offset, bytes } => encode_chunk(*id, *offset, bytes),
+            Self::AssetUnknown { id } => encode_control(Kind::AssetUnknown, id),
+            Self::Ping { nonce } => encode_control(Kind::Ping, nonce),
+            Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
+            Self::Goodbye { reason } => encode_reason(Kind::Goodbye, &[], reason),
+        }
+    }
+
+    fn from_body(kind: Kind, body: Bytes) -> Result<Self, ProtocolError> {
+        Ok(match kind {
+            Kind::Frame => Self::Frame(decode_frame(body)?),
+            Kind::Segment => Self::Segment(checked_lease(decode_control(kind, &body)?)?),
+            Kind::Cancel => Self::Cancel { before: decode_control(kind, &body)? },
+            Kind::AssetBegin => {
+                let (id, size) = decode_control(kind, &body)?;
+                Self::AssetBegin { id, size: checked_size(size)? }
+            }
+            Kind::AssetChunk => decode_chunk(body)?,
+            Kind::AssetUnknown => Self::AssetUnknown { id: decode_control(kind, &body)? },
+            Kind::Ping => Self::Ping { nonce: decode_control(kind, &body)? },
+            Kind::Drain => nothing(kind, &body).map(|()| Self::Drain)?,
+            Kind::Goodbye => Self::Goodbye { reason: decode_reason(&body) },
+            Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
+            Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => return Err(unexpected(kind)),
+        })
+    }
+}
+
+fn unexpected(kind: Kind) -> ProtocolError {
+    ProtocolError::Unexpected { kind, expected: ToWorker::EXPECTED }
+}
+
+fn checked_lease(lease: Lease) -> Result<Lease, ProtocolError> {
+    match lease.rows() {
+        Some(rows) if rows.end <= MAX_FRAME_SIDE => Ok(lease),
+        _ => Err(ProtocolError::malformed(Kind::Segment, format!("{lease} is no run of rows of a frame"))),
+    }
+}
+
+fn checked_size(size: u64) -> Result<u64, ProtocolError> {
+    if size <= MAX_ASSET_BYTES {
+        return Ok(size);
+    }
+    let why = format!("an asset of {size} bytes, at most {MAX_ASSET_BYTES} are allowed");
+    Err(ProtocolError::malformed(Kind::AssetBegin, why))
+}
+
+fn encode_frame(announce: &FrameAnnounce) -> Result<Envelope, ProtocolError> {
+    let announce = checked_frame(announce)?;
+    let mut head = [0; FRAME_HEAD_BYTES];
+    let mut rest = head.as_mut_slice();
+    rest.put_u64_le(announce.frame.0);
+    rest.put_slice(&announce.scene.0);
+    rest.put_u32_le(announce.width);
+    rest.put_u32_le(announce.height);
+    Envelope::new(Kind::Frame, &head, announce.view.clone())
+}
+
+fn decode_frame(mut body: Bytes) -> Result<FrameAnnounce, ProtocolError> {
+    let head = split_head::<FRAME_HEAD_BYTES>(Kind::Frame, &mut body)?;
+    let mut rest = head.as_slice();
+    let frame = FrameId(rest.get_u64_le());
+    let scene = take_id(&mut rest);
+    let (width, height) = (rest.get_u32_le(), rest.get_u32_le());
+    let announce = FrameAnnounce { frame, scene, width, height, view: body };
+    checked_frame(&announce)?;
+    Ok(announce)
+}
+
+fn checked_frame(announce: &FrameAnnounce) -> Result<&FrameAnnounce, ProtocolError> {
+    let FrameAnnounce { width, height, view, .. } = announce;
+    if !(1..=MAX_FRAME_SIDE).contains(width) || !(1..=MAX_FRAME_SIDE).contains(height) {
+        let why = format!("a frame of {width} x {height} pixels; sides are 1 to {MAX_FRAME_SIDE}");
+        return Err(ProtocolError::malformed(Kind::Frame, why));
+    }
+    if view.len() > MAX_VIEW_BYTES {
+        let why = format!("a view of {} bytes, at most {MAX_VIEW_BYTES} are allowed", view.len());
+        return Err(ProtocolError::malformed(Kind::Frame, why));
+    }
+    Ok(announce)
+}
+
+fn encode_chunk(id: AssetId, offset: u64, bytes: &Bytes) -> Result<Envelope, ProtocolError> {
+    check_chunk(offset, bytes)?;
+    let mut head = [0; CHUNK_HEAD_BYTES];
+    let mut rest = head.as_mut_slice();
+    rest.put_slice(&id.0);
+    rest.put_u64_le(offset);
+    Envelope::new(Kind::AssetChunk, &head, bytes.clone())
+}
+
+fn decode_chunk(mut body: Bytes) -> Result<ToWorker, ProtocolError> {
+    let head = split_head::<CHUNK_HEAD_BYTES>(Kind::AssetChunk, &mut body)?;
+    let mut rest = head.as_slice();
+    let id = take_id(&mut rest);
+    let offset = rest.get_u64_le();
+    check_chunk(offset, &body)?;
+    Ok(ToWorker::AssetChunk { id, offset, bytes: body })
+}
+
+fn check_chunk(offset: u64, bytes: &Bytes) -> Result<(), ProtocolError> {
+    if !(1..=MAX_CHUNK_BYTES).contains(&bytes.len()) {
+        let why = format!("a chunk of {} bytes; 1 to {MAX_CHUNK_BYTES} are allowed", bytes.len());
+        return Err(ProtocolError::malformed(Kind::AssetChunk, why));
+    }
+    match offset.checked_add(bytes.len() as u64) {
+        Some(end) if end <= MAX_ASSET_BYTES => Ok(()),
+        _ => Err(ProtocolError::malformed(Kind::AssetChunk, "it lies beyond the end of any asset")),
+    }
+}
+
+fn take_id(rest: &mut &[u8]) -> AssetId {
+    let mut id = [0; 32];
+    rest.copy_to_slice(&mut id);
+    AssetId(id)
+}

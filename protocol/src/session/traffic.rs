@@ -1,0 +1,42 @@
+//! What went over the wire, counted.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use crate::envelope::{Envelope, HEADER_BYTES, Header, Kind};
+
+/// Bytes of a session's envelopes, headers included; the handshake is not counted. Readable at any time.
+#[derive(Debug, Default)]
+pub struct Traffic {
+    sent: AtomicU64,
+    received: AtomicU64,
+    scene_sent: AtomicU64,
+}
+
+impl Traffic {
+    /// Bytes written.
+    pub fn sent_bytes(&self) -> u64 {
+        self.sent.load(Relaxed)
+    }
+
+    /// Bytes read.
+    pub fn received_bytes(&self) -> u64 {
+        self.received.load(Relaxed)
+    }
+
+    /// Bytes written that describe what to draw: frame announcements and assets.
+    pub fn scene_sent_bytes(&self) -> u64 {
+        self.scene_sent.load(Relaxed)
+    }
+
+    pub(super) fn count_sent(&self, envelope: &Envelope) {
+        let bytes = envelope.wire_bytes() as u64;
+        self.sent.fetch_add(bytes, Relaxed);
+        if matches!(envelope.kind(), Kind::Frame | Kind::AssetBegin | Kind::AssetChunk) {
+            self.scene_sent.fetch_add(bytes, Relaxed);
+        }
+    }
+
+    pub(super) fn count_received(&self, header: Header) {
+        self.received.fetch_add((HEADER_BYTES + header.body_bytes) as u64, Relaxed);
+    }
+}
