@@ -1,5 +1,49 @@
-//! The ray tracer of rayfarm: a scene in, pixels out.
+//! The ray tracer of rayfarm: a scene in, pixels out. No sockets, no async, no window; useful by itself.
+//!
+//! The pipeline, in the order of the data:
+//!
+//! ```ignore
+//! use std::sync::Arc;
+//! use rayfarm_tracer::{CompiledScene, PreparedFrame, image, render_rows, scene};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("scene.toml");
+//! # std::fs::write(&path, "
+//! #     render = { width = 32, height = 24 }
+//! #     camera = { position = [0, 0, 4], look_at = [0, 0, 0] }
+//! #     material = { red = { diffuse = [0.8, 0.1, 0.1] } }
+//! #     sphere = [{ center = [0, 0, 0], radius = 1, material = 'red' }]
+//! # ")?;
+//! let loaded = scene::load(&path)?;                                      // file -> plain data and meshes
+//! let view = scene::FrameView::of(&loaded.scene);                        // camera, size, samples
+//! let scene = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes)?);
+//! let frame = PreparedFrame::new(scene, &view)?;                         // everything in eye space
+//! let mut picture = image::RgbImage::new(view.width, view.height);
+//! render_rows(&frame, 0..view.height, &mut picture.pixels, &|| false)?;  // any rows, in any order
+//! image::save(&folder.path().join("picture.png"), &picture)?;
+//! # Ok(())
+//! # }
+//! ```
 
+pub mod bvh;
+mod camera;
+mod compile;
+mod frame;
 pub mod image;
+mod light;
 pub mod mesh;
+mod plane;
+pub mod reference;
+mod render;
 pub mod scene;
+mod shade;
+mod sphere;
+pub mod srgb;
+mod trace;
+mod triangle;
+
+pub use camera::Basis;
+pub use compile::{CompileError, CompiledScene};
+pub use frame::{MAX_SAMPLES, MAX_SIDE, PreparedFrame};
+pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows};

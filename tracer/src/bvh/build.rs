@@ -1,0 +1,210 @@
+//! Builds trees with `obvhs` (PLOC with reinsertion: Meister and Bittner 2018 and 2017), and lays them out depth first.
+
+use std::time::Duration;
+
+use glam::Vec3;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use obvhs::{Boundable, BvhBuildParams};
+
+use super::{Child, MAX_DEPTH, Node};
+
+/// A tree, and the order that it wants its primitives in.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    /// Nodes, the root first, children after their parents.
+    pub nodes: Vec<Node>,
+    /// For each position in the leaves, the primitive that belongs there.
+    pub order: Vec<u32>,
+    /// Most nodes on the way from the root to a leaf.
+    pub depth: u32,
+}
+
+/// Leaves of the median build.
+const MEDIAN_LEAF: usize = 4;
+
+/// Builds a tree over boxes (least and greatest corner; finite, within 1e15). No boxes: a root with nothing in it.
+///
+/// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (many boxes in one place),
+/// the tree is built by the median instead, whose depth is logarithmic whatever the boxes are.
+pub fn build(boxes: Vec<(Vec3, Vec3)>) -> Tree {
+    let primitives: Vec<Primitive> = boxes.into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
+    if primitives.is_empty() {
+        return Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 };
+    }
+    let source = build_bvh2(&primitives, BvhBuildParams::medium_build(), &mut Duration::default());
+    lay_out(&source).unwrap_or_else(|| median(&primitives))
+}
+
+struct Primitive {
+    lo: Vec3,
+    hi: Vec3,
+}
+
+impl Boundable for Primitive {
+    fn aabb(&self) -> Aabb {
+        Aabb { min: self.lo.into(), max: self.hi.into() }
+    }
+}
+
+impl Tree {
+    fn new(capacity: usize) -> Self {
+        Self { nodes: Vec::with_capacity(capacity), order: Vec::with_capacity(capacity), depth: 1 }
+    }
+
+    /// Adds a leaf's primitives and names them.
+    fn leaf(&mut self, primitives: impl IntoIterator<Item = u32>) -> Child {
+        let first = self.order.len() as u32;
+        self.order.extend(primitives);
+        Child::Leaf { first, count: self.order.len() as u32 - first }
+    }
+}
+
+/// Copies a tree of `obvhs` in depth-first order. `None` if it is deeper than [`MAX_DEPTH`].
+fn lay_out(source: &Bvh2) -> Option<Tree> {
+    let mut tree = Tree::new(source.nodes.len() / 2 + 1);
+    let bounds = |index: u32| {
+        let node = &source.nodes[index as usize];
+        (node.min, node.max)
+    };
+    if source.nodes[0].is_leaf() {
+        let leaf = tree.leaf(leaf_of(source, 0));
+        let mut root = Node::EMPTY;
+        root.set(0, bounds(0), leaf);
+        tree.nodes.push(root);
+        return Some(tree);
+    }
+    // (node of the source, where to write its index: parent and side, depth)
+    let mut pending = vec![(0_u32, None::<(u32, usize)>, 1_u32)];
+    while let Some((index, parent, depth)) = pending.pop() {
+        if depth as usize > MAX_DEPTH {
+            return None;
+        }
+        tree.depth = tree.depth.max(depth);
+        let own = tree.nodes.len() as u32;
+        if let Some((parent, side)) = parent {
+            tree.nodes[parent as usize].first[side] = own;
+        }
+        tree.nodes.push(Node::EMPTY);
+        let left = source.nodes[index as usize].first_index;
+        for (side, child) in [(0, left), (1, left + 1)] {
+            let is_leaf = source.nodes[child as usize].is_leaf();
+            let link = if is_leaf { tree.leaf(leaf_of(source, child)) } else { Child::Inner(0) };
+            tree.nodes[own as usize].set(side, bounds(child), link);
+        }
+        // The right side is pushed first, so that the left one follows its parent in memory.
+        for (side, child) in [(1, left + 1), (0, left)] {
+            if !source.nodes[child as usize].is_leaf() {
+                pending.push((child, Some((own, side)), depth + 1));
+            }
+        }
+    }
+    Some(tree)
+}
+
+fn leaf_of(source: &Bvh2, index: u32) -> impl Iterator<Item = u32> {
+    let node = &source.nodes[index as usize];
+    let first = node.first_index as usize;
+    source.primitive_indices[first..first + node.prim_count as usize].iter().copied()
+}
+
+/// Halves the primitives by the median of their centres along the widest axis, until few are left.
+fn median(primitives: &[Primitive]) -> Tree {
+    let mut tree = Tree::new(primitives.len());
+    let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();
+    tree.nodes.push(Node::EMPTY);
+    if indices.len() <= MEDIAN_LEAF {
+        let bounds = bounds_of(primitives, &indices);
+        let leaf = tree.leaf(indices);
+        tree.nodes[0].set(0, bounds, leaf);
+    } else {
+        split(primitives, &mut indices, &mut tree, 0, 1);
+    }
+    tree
+}
+
+fn split(primitives: &[Primitive], indices: &mut [u32], tree: &mut Tree, own: usize, depth: u32) {
+    tree.depth = tree.depth.max(depth);
+    let center = |i: u32| primitives[i as usize].lo + primitives[i as usize].hi;
+    let (lo, hi) = indices
+        .iter()
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &i| (lo.min(center(i)), hi.max(center(i))));
+    let axis = (hi - lo).max_position();
+    let middle = indices.len() / 2;
+    let key = |&i: &u32| (center(i)[axis], i);
+    indices.select_nth_unstable_by(middle, |a, b| {
+        let ((ka, ia), (kb, ib)) = (key(a), key(b));
+        ka.total_cmp(&kb).then(ia.cmp(&ib))
+    });
+    let (left, right) = indices.split_at_mut(middle);
+    for (side, half) in [left, right].into_iter().enumerate() {
+        let bounds = bounds_of(primitives, half);
+        if half.len() <= MEDIAN_LEAF {
+            let leaf = tree.leaf(half.iter().copied());
+            tree.nodes[own].set(side, bounds, leaf);
+        } else {
+            let node = tree.nodes.len();
+            tree.nodes.push(Node::EMPTY);
+            tree.nodes[own].set(side, bounds, Child::Inner(node as u32));
+            split(primitives, half, tree, node, depth + 1);
+        }
+    }
+}
+
+fn bounds_of(primitives: &[Primitive], indices: &[u32]) -> (Vec3, Vec3) {
+    indices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &i| {
+        (lo.min(primitives[i as usize].lo), hi.max(primitives[i as usize].hi))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::validate;
+    use super::*;
+
+    fn grid(n: usize) -> Vec<(Vec3, Vec3)> {
+        (0..n)
+            .map(|i| {
+                let corner = Vec3::new((i % 17) as f32, (i / 17 % 13) as f32, (i / 221) as f32);
+                (corner, corner + 0.9)
+            })
+            .collect()
+    }
+
+    fn check(boxes: Vec<(Vec3, Vec3)>) -> Tree {
+        let count = boxes.len() as u32;
+        let tree = build(boxes);
+        assert_eq!(validate(&tree.nodes, count).unwrap(), tree.depth);
+        let mut order = tree.order.clone();
+        order.sort_unstable();
+        assert_eq!(order, (0..count).collect::<Vec<_>>());
+        tree
+    }
+
+    #[test]
+    fn every_primitive_stands_in_one_leaf() {
+        for count in [1, 2, 3, 5, 100, 5000] {
+            check(grid(count));
+        }
+    }
+
+    #[test]
+    fn twenty_thousand_boxes_in_one_place_stay_shallow() {
+        let tree = check(vec![(Vec3::ZERO, Vec3::ONE); 20_000]);
+        assert!(tree.depth as usize <= MAX_DEPTH, "depth {}", tree.depth);
+    }
+
+    #[test]
+    fn the_median_build_is_logarithmic_and_valid() {
+        let primitives: Vec<Primitive> =
+            grid(3000).into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
+        let tree = median(&primitives);
+        assert_eq!(validate(&tree.nodes, 3000).unwrap(), tree.depth);
+        assert!(tree.depth <= 12, "depth {}", tree.depth);
+    }
+
+    #[test]
+    fn no_boxes_make_an_empty_root() {
+        assert_eq!(build(Vec::new()).nodes, [Node::EMPTY]);
+    }
+}

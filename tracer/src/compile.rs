@@ -1,0 +1,284 @@
+//! Scene + meshes -> [`CompiledScene`]: what does not change while the camera moves.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::bvh;
+use crate::mesh::{CompiledMesh, MeshId};
+use crate::scene::{Model, NormalMode, Scene};
+
+/// Why a scene cannot be traced.
+#[derive(Debug, thiserror::Error)]
+pub enum CompileError {
+    /// A mesh that the scene names was not given.
+    #[error("model {model} names mesh {id}, which is not at hand")]
+    MissingMesh {
+        /// Index of the model.
+        model: usize,
+        /// The mesh.
+        id: MeshId,
+    },
+    /// A model and its mesh do not fit.
+    #[error("model {model} does not fit its mesh: {what}")]
+    Mismatch {
+        /// Index of the model.
+        model: usize,
+        /// How.
+        what: String,
+    },
+    /// The frame asked for cannot be rendered.
+    #[error("cannot render this frame: {0}")]
+    Frame(String),
+}
+
+/// A scene with its meshes, and the shape of the tree over its instances. Immutable; share it between threads.
+#[derive(Debug)]
+pub struct CompiledScene {
+    scene: Scene,
+    /// One per model.
+    meshes: Vec<Arc<CompiledMesh>>,
+    /// Over all finite items; its boxes are those of no frame in particular.
+    tree: bvh::Tree,
+    bounds: Option<(DVec3, DVec3)>,
+}
+
+/// Everything with bounds is an *item* of the scene's own tree: models first, then spheres, then triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Item {
+    Model(usize),
+    Sphere(usize),
+    Triangle(usize),
+}
+
+/// Which item indices are which.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Items {
+    models: usize,
+    spheres: usize,
+    triangles: usize,
+}
+
+impl Items {
+    pub(crate) fn of(scene: &Scene) -> Self {
+        Self { models: scene.models.len(), spheres: scene.spheres.len(), triangles: scene.triangles.len() }
+    }
+
+    pub(crate) fn range(&self) -> Range<u32> {
+        0..(self.models + self.spheres + self.triangles) as u32
+    }
+
+    /// Index of the first plane: planes have no bounds, and are numbered behind all items.
+    pub(crate) fn first_plane(&self) -> u32 {
+        self.range().end
+    }
+
+    pub(crate) fn get(&self, index: u32) -> Item {
+        let index = index as usize;
+        if index < self.models {
+            Item::Model(index)
+        } else if index < self.models + self.spheres {
+            Item::Sphere(index - self.models)
+        } else {
+            Item::Triangle(index - self.models - self.spheres)
+        }
+    }
+}
+
+impl CompiledScene {
+    /// Puts a scene and its meshes together. `meshes` may hold more than the scene names.
+    ///
+    /// # Errors
+    /// A mesh is missing, or has more material slots than the model assigns, or no normals where smooth ones are asked for.
+    pub fn new(
+        scene: Scene,
+        meshes: impl IntoIterator<Item = Arc<CompiledMesh>>,
+    ) -> Result<Self, CompileError> {
+        let by_id: BTreeMap<MeshId, Arc<CompiledMesh>> =
+            meshes.into_iter().map(|mesh| (mesh.id(), mesh)).collect();
+        let meshes: Vec<Arc<CompiledMesh>> = scene
+            .models
+            .iter()
+            .enumerate()
+            .map(|(model, description)| fitting_mesh(&by_id, model, description))
+            .collect::<Result<_, _>>()?;
+        let items = Items::of(&scene);
+        let boxes: Vec<(DVec3, DVec3)> =
+            items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
+        let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let tree = bvh::build(relative_boxes(&boxes, bounds));
+        Ok(Self { scene, meshes, tree, bounds })
+    }
+
+    /// What was compiled.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Triangles over all instances, and those of the scene file.
+    pub fn triangle_count(&self) -> u64 {
+        let in_models: u64 = self.meshes.iter().map(|mesh| mesh.triangle_count() as u64).sum();
+        in_models + self.scene.triangles.len() as u64
+    }
+
+    /// World bounds of everything finite.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.bounds
+    }
+
+    /// One mesh per model.
+    pub(crate) fn meshes(&self) -> &[Arc<CompiledMesh>] {
+        &self.meshes
+    }
+
+    pub(crate) fn tree(&self) -> &bvh::Tree {
+        &self.tree
+    }
+}
+
+fn fitting_mesh(
+    meshes: &BTreeMap<MeshId, Arc<CompiledMesh>>,
+    model: usize,
+    description: &Model,
+) -> Result<Arc<CompiledMesh>, CompileError> {
+    let mesh =
+        meshes.get(&description.mesh).ok_or(CompileError::MissingMesh { model, id: description.mesh })?;
+    let mismatch = |what: String| Err(CompileError::Mismatch { model, what });
+    if description.materials.len() != mesh.material_count() {
+        return mismatch(format!(
+            "{} materials for {} slots",
+            description.materials.len(),
+            mesh.material_count()
+        ));
+    }
+    if description.normals == NormalMode::Smooth && !mesh.has_normals() {
+        return mismatch(
+            "it asks for smooth normals, the mesh was compiled without; compile it again, or ask for flat ones"
+                .into(),
+        );
+    }
+    Ok(Arc::clone(mesh))
+}
+
+/// Scale, then rotation about x, y and z in turn, then `spin` degrees about y: the linear part of a model's placement.
+pub(crate) fn orientation(model: &Model, spin: f64) -> DMat3 {
+    let rotate = model.rotate;
+    rotation_y(spin)
+        * rotation_z(rotate.z)
+        * rotation_y(rotate.y)
+        * rotation_x(rotate.x)
+        * DMat3::from_diagonal(model.scale)
+}
+
+/// Sine and cosine of an angle in degrees, exact at multiples of 90, equal on every platform.
+fn sine_cosine(degrees: f64) -> (f64, f64) {
+    let turn = libm::fmod(degrees, 360.0);
+    if turn % 90.0 == 0.0 {
+        return match (turn / 90.0) as i32 {
+            1 | -3 => (1.0, 0.0),
+            2 | -2 => (0.0, -1.0),
+            3 | -1 => (-1.0, 0.0),
+            _ => (0.0, 1.0),
+        };
+    }
+    let radians = turn.to_radians();
+    (libm::sin(radians), libm::cos(radians))
+}
+
+fn rotation_x(degrees: f64) -> DMat3 {
+    let (s, c) = sine_cosine(degrees);
+    DMat3::from_cols(DVec3::X, DVec3::new(0.0, c, s), DVec3::new(0.0, -s, c))
+}
+
+fn rotation_y(degrees: f64) -> DMat3 {
+    let (s, c) = sine_cosine(degrees);
+    DMat3::from_cols(DVec3::new(c, 0.0, -s), DVec3::Y, DVec3::new(s, 0.0, c))
+}
+
+fn rotation_z(degrees: f64) -> DMat3 {
+    let (s, c) = sine_cosine(degrees);
+    DMat3::from_cols(DVec3::new(c, s, 0.0), DVec3::new(-s, c, 0.0), DVec3::Z)
+}
+
+/// Bounds of a box after a linear map and a translation.
+pub(crate) fn transformed_bounds(
+    (lo, hi): (DVec3, DVec3),
+    linear: DMat3,
+    translation: DVec3,
+) -> (DVec3, DVec3) {
+    let center = linear * (lo * 0.5 + hi * 0.5) + translation;
+    let half = (hi - lo) * 0.5;
+    let reach = linear.x_axis.abs() * half.x + linear.y_axis.abs() * half.y + linear.z_axis.abs() * half.z;
+    (center - reach, center + reach)
+}
+
+fn world_bounds(scene: &Scene, meshes: &[Arc<CompiledMesh>], item: Item) -> (DVec3, DVec3) {
+    match item {
+        Item::Model(i) => {
+            let model = &scene.models[i];
+            transformed_bounds(meshes[i].bounds(), orientation(model, 0.0), model.translate)
+        }
+        Item::Sphere(i) => {
+            let sphere = &scene.spheres[i];
+            (sphere.center - sphere.radius, sphere.center + sphere.radius)
+        }
+        Item::Triangle(i) => {
+            let [a, b, c] = scene.triangles[i].vertices;
+            (a.min(b).min(c), a.max(b).max(c))
+        }
+    }
+}
+
+/// Boxes about the scene's centre, in its half extents: what a builder in `f32` can bear, wherever the scene stands.
+fn relative_boxes(boxes: &[(DVec3, DVec3)], bounds: Option<(DVec3, DVec3)>) -> Vec<(Vec3, Vec3)> {
+    let Some((lo, hi)) = bounds else { return Vec::new() };
+    let center = lo * 0.5 + hi * 0.5;
+    let half_extent = (hi - center).max_element();
+    let unit = if half_extent > 0.0 && half_extent.is_finite() { half_extent } else { 1.0 };
+    let place = |corner: DVec3| ((corner - center) / unit).as_vec3();
+    boxes.iter().map(|&(lo, hi)| (place(lo), place(hi))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotations_follow_the_right_hand_and_the_order_x_y_z() {
+        let model = |rotate| Model {
+            mesh: MeshId([0; 32]),
+            materials: vec![],
+            normals: NormalMode::Flat,
+            translate: DVec3::ZERO,
+            rotate,
+            scale: DVec3::ONE,
+        };
+        assert_eq!(orientation(&model(DVec3::new(90.0, 0.0, 0.0)), 0.0) * DVec3::Y, DVec3::Z);
+        assert_eq!(orientation(&model(DVec3::new(0.0, 90.0, 0.0)), 0.0) * DVec3::Z, DVec3::X);
+        assert_eq!(orientation(&model(DVec3::new(0.0, 0.0, 90.0)), 0.0) * DVec3::X, DVec3::Y);
+        // y -> z by x, z -> x by y, x -> y by z.
+        assert_eq!(orientation(&model(DVec3::splat(90.0)), 0.0) * DVec3::Y, DVec3::Y);
+        assert_eq!(orientation(&model(DVec3::new(90.0, 0.0, 0.0)), 90.0) * DVec3::Y, DVec3::X);
+    }
+
+    #[test]
+    fn whole_turns_change_no_bit() {
+        assert_eq!(rotation_x(360.0), DMat3::IDENTITY);
+        assert_eq!(rotation_z(-720.0), DMat3::IDENTITY);
+        assert_eq!(rotation_y(390.0), rotation_y(30.0));
+    }
+
+    #[test]
+    fn a_transformed_box_holds_all_its_corners() {
+        let linear = rotation_x(20.0) * rotation_y(40.0) * DMat3::from_diagonal(DVec3::new(1.0, -2.0, 3.0));
+        let (lo, hi) = (DVec3::new(-1.0, 0.0, 2.0), DVec3::new(2.0, 5.0, 3.0));
+        let (tlo, thi) = transformed_bounds((lo, hi), linear, DVec3::ONE);
+        for corner in 0..8 {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+            let moved = linear * DVec3::new(pick(0), pick(1), pick(2)) + DVec3::ONE;
+            assert!((moved - tlo).min_element() > -1e-12 && (thi - moved).min_element() > -1e-12);
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! One frame, ready to trace: everything in *eye space*.
+//!
+//! Eye space has the camera in its origin, keeps the world's axes, and is scaled by a power of two so that the scene
+//! spans about one unit. A scene far from the world's origin therefore loses no digits, and a scene scaled by 2^k
+//! gives the same numbers, bit for bit.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::bvh::{Child, Node};
+use crate::camera::PinholeRays;
+use crate::compile::{CompileError, CompiledScene, Item, Items, orientation, transformed_bounds};
+use crate::light::EyeLight;
+use crate::mesh::CompiledMesh;
+use crate::plane::EyePlane;
+use crate::scene::{Camera, FrameView, Model, NormalMode, Scene};
+use crate::sphere::EyeSphere;
+
+/// Longest side of a frame in pixels.
+pub const MAX_SIDE: u32 = 16384;
+
+/// Most samples per pixel.
+pub const MAX_SAMPLES: u32 = 256;
+
+/// Widening of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
+const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
+
+/// One frame of a scene. Share it between render threads.
+#[derive(Debug)]
+pub struct PreparedFrame {
+    scene: Arc<CompiledScene>,
+    view: FrameView,
+    pub(crate) rays: PinholeRays,
+    pub(crate) items: Items,
+    pub(crate) instances: Vec<Instance>,
+    pub(crate) spheres: Vec<EyeSphere>,
+    pub(crate) triangles: Vec<EyeTriangle>,
+    pub(crate) planes: Vec<EyePlane>,
+    pub(crate) lights: Vec<EyeLight>,
+    pub(crate) nodes: Vec<Node>,
+}
+
+/// A mesh, placed: eye = `linear` * mesh + `translation`.
+#[derive(Debug)]
+pub(crate) struct Instance {
+    pub mesh: Arc<CompiledMesh>,
+    pub linear: DMat3,
+    pub translation: DVec3,
+    /// Takes eye space back to mesh space.
+    pub inverse: DMat3,
+    /// Takes normals from mesh space to eye space, up to their length.
+    pub normals: DMat3,
+    pub smooth: bool,
+}
+
+/// A triangle of the scene file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EyeTriangle {
+    pub corners: [DVec3; 3],
+    pub rounded: [Vec3; 3],
+}
+
+impl PreparedFrame {
+    /// Places a compiled scene before a camera. The cost grows with the number of instances, not of triangles.
+    ///
+    /// # Errors
+    /// A view that cannot be rendered: its size, samples or camera are out of range.
+    pub fn new(scene: Arc<CompiledScene>, view: &FrameView) -> Result<Self, CompileError> {
+        check(view)?;
+        let source = scene.scene();
+        let unit = unit_of(&scene, &view.camera);
+        let to_eye = |world: DVec3| (world - view.camera.position) / unit;
+        let instances = source
+            .models
+            .iter()
+            .zip(scene.meshes())
+            .map(|(model, mesh)| Instance::new(model, mesh, view.spin, to_eye, unit))
+            .collect();
+        let mut frame = Self {
+            view: *view,
+            rays: PinholeRays::new(view),
+            items: Items::of(source),
+            instances,
+            spheres: spheres(source, &to_eye, unit),
+            triangles: triangles(source, &to_eye),
+            planes: planes(source, &to_eye),
+            lights: source.lights.iter().map(|light| EyeLight::new(light, to_eye, unit)).collect(),
+            nodes: Vec::new(),
+            scene,
+        };
+        frame.nodes = frame.refitted();
+        Ok(frame)
+    }
+
+    /// What is rendered.
+    pub fn view(&self) -> &FrameView {
+        &self.view
+    }
+
+    /// Pixels per row.
+    pub fn width(&self) -> u32 {
+        self.view.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.view.height
+    }
+
+    /// The scene as plain data.
+    pub fn scene(&self) -> &Scene {
+        self.scene.scene()
+    }
+
+    /// Index of the item at a position in the leaves of the scene's tree.
+    pub(crate) fn item_at(&self, position: u32) -> u32 {
+        self.scene.tree().order[position as usize]
+    }
+
+    /// The compiled tree with the boxes of this frame, children before parents.
+    fn refitted(&self) -> Vec<Node> {
+        let mut nodes = self.scene.tree().nodes.clone();
+        for index in (0..nodes.len()).rev() {
+            for side in 0..2 {
+                let bounds = match nodes[index].child(side) {
+                    Child::Empty => continue,
+                    Child::Inner(child) => nodes[child as usize].bounds(),
+                    Child::Leaf { first, count } => (first..first + count)
+                        .map(|position| self.item_bounds(self.items.get(self.item_at(position))))
+                        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), (a, b)| {
+                            (lo.min(a), hi.max(b))
+                        }),
+                };
+                nodes[index].set_bounds(side, bounds);
+            }
+        }
+        nodes
+    }
+
+    /// Bounds of an item in eye space, padded.
+    fn item_bounds(&self, item: Item) -> (Vec3, Vec3) {
+        let (lo, hi) = match item {
+            Item::Model(i) => {
+                let instance = &self.instances[i];
+                let (lo, hi) = instance.mesh.root_bounds();
+                transformed_bounds((lo.as_dvec3(), hi.as_dvec3()), instance.linear, instance.translation)
+            }
+            Item::Sphere(i) => {
+                let EyeSphere { center, radius } = self.spheres[i];
+                (center - radius, center + radius)
+            }
+            Item::Triangle(i) => {
+                let [a, b, c] = self.triangles[i].corners;
+                (a.min(b).min(c), a.max(b).max(c))
+            }
+        };
+        ((lo - BOX_PADDING).as_vec3(), (hi + BOX_PADDING).as_vec3())
+    }
+}
+
+impl Instance {
+    fn new(
+        model: &Model,
+        mesh: &Arc<CompiledMesh>,
+        spin: f64,
+        to_eye: impl Fn(DVec3) -> DVec3,
+        unit: f64,
+    ) -> Self {
+        let orientation = orientation(model, spin);
+        // Powers of two only: exact.
+        let linear = orientation * (libm::exp2(f64::from(mesh.exponent())) / unit);
+        let inverse = linear.inverse();
+        Self {
+            mesh: Arc::clone(mesh),
+            linear,
+            translation: to_eye(model.translate) + orientation * mesh.center() / unit,
+            inverse,
+            normals: inverse.transpose(),
+            smooth: model.normals == NormalMode::Smooth,
+        }
+    }
+}
+
+fn check(view: &FrameView) -> Result<(), CompileError> {
+    let refuse = |what: String| Err(CompileError::Frame(what));
+    let FrameView { camera, width, height, samples, spin } = view;
+    if !(1..=MAX_SIDE).contains(width) || !(1..=MAX_SIDE).contains(height) {
+        return refuse(format!("its size is {width}x{height}; each side must be 1 to {MAX_SIDE} pixels"));
+    }
+    if !(1..=MAX_SAMPLES).contains(samples) || samples.isqrt().pow(2) != *samples {
+        return refuse(format!(
+            "it asks for {samples} samples; they must be a square number of at most {MAX_SAMPLES}"
+        ));
+    }
+    let vectors = [camera.position, camera.look_at, camera.up];
+    if vectors.iter().any(|vector| !vector.is_finite()) || camera.position == camera.look_at {
+        return refuse("its camera has no position, direction or up".into());
+    }
+    if !(camera.fov > 0.0 && camera.fov < 180.0 && camera.zoom > 0.0 && camera.zoom.is_finite()) {
+        return refuse(format!(
+            "its field of view is {} degrees at zoom {}; it must lie between 0 and 180, the zoom above 0",
+            camera.fov, camera.zoom
+        ));
+    }
+    if !spin.is_finite() {
+        return refuse("its spin is not a number".into());
+    }
+    Ok(())
+}
+
+/// World units per eye unit: the power of two next to the distance from the camera to the far end of what is finite.
+/// Scaling the world by a power of two scales it exactly as much.
+fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
+    let reach = match scene.bounds() {
+        Some((lo, hi)) => (lo - camera.position).abs().max((hi - camera.position).abs()).max_element(),
+        None => (camera.look_at - camera.position).length(),
+    };
+    if !(reach > 0.0 && reach.is_finite()) {
+        return 1.0;
+    }
+    let (_, exponent) = libm::frexp(reach);
+    libm::exp2(f64::from(exponent))
+}
+
+fn spheres(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<EyeSphere> {
+    let place = |sphere: &crate::scene::Sphere| EyeSphere {
+        center: to_eye(sphere.center),
+        radius: sphere.radius / unit,
+    };
+    scene.spheres.iter().map(place).collect()
+}
+
+fn triangles(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3) -> Vec<EyeTriangle> {
+    let place = |triangle: &crate::scene::Triangle| {
+        let corners = triangle.vertices.map(to_eye);
+        EyeTriangle { corners, rounded: corners.map(|corner| corner.as_vec3()) }
+    };
+    scene.triangles.iter().map(place).collect()
+}
+
+fn planes(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3) -> Vec<EyePlane> {
+    let place = |plane: &crate::scene::Plane| EyePlane {
+        normal: plane.normal.normalize_or_zero(),
+        offset: plane.normal.normalize_or_zero().dot(to_eye(plane.point)),
+    };
+    scene.planes.iter().map(place).collect()
+}

@@ -1,0 +1,150 @@
+//! The bytes of a compiled mesh: a header, then sections of plain numbers, each starting on a cache line.
+//!
+//! Little endian, versioned, no pointers. The whole file is checked once, in one pass, before anything trusts it:
+//! it may come from a peer or from disk.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use super::{FORMAT_VERSION, MAGIC, MeshError};
+
+/// Alignment of sections, in bytes: one cache line, and what a [`crate::bvh::Node`] wants.
+pub(super) const ALIGN: usize = 64;
+
+/// One cache line of bytes.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([u8; ALIGN]);
+
+/// Bytes whose start is aligned to a cache line.
+pub(super) struct AlignedBytes {
+    lines: Vec<Line>,
+    len: usize,
+}
+
+impl AlignedBytes {
+    pub(super) fn zeroed(len: usize) -> Self {
+        Self { lines: vec![Line([0; ALIGN]); len.div_ceil(ALIGN)], len }
+    }
+
+    pub(super) fn copy_of(bytes: &[u8]) -> Self {
+        let mut copy = Self::zeroed(bytes.len());
+        copy.as_mut_slice().copy_from_slice(bytes);
+        copy
+    }
+
+    pub(super) fn as_slice(&self) -> &[u8] {
+        &bytemuck::cast_slice(&self.lines)[..self.len]
+    }
+
+    pub(super) fn as_mut_slice(&mut self) -> &mut [u8] {
+        &mut bytemuck::cast_slice_mut(&mut self.lines)[..self.len]
+    }
+}
+
+/// Fixed part of a compiled mesh, 128 bytes.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Header {
+    pub magic: [u8; 6],
+    pub version: u16,
+    pub exponent: i32,
+    pub depth: u32,
+    pub center: [f64; 3],
+    pub bounds: [[f64; 3]; 2],
+    pub node_count: u32,
+    pub triangle_count: u32,
+    pub normal_count: u32,
+    pub material_count: u32,
+    pub material_bytes: u32,
+    pub reserved: [u32; 5],
+}
+
+const _: () = assert!(size_of::<Header>() == 128);
+
+impl Header {
+    pub(super) fn new(center: DVec3, exponent: i32, bounds: (DVec3, DVec3)) -> Self {
+        Self {
+            magic: MAGIC,
+            version: FORMAT_VERSION,
+            exponent,
+            center: center.to_array(),
+            bounds: [bounds.0.to_array(), bounds.1.to_array()],
+            ..Header::zeroed()
+        }
+    }
+
+    /// Reads and checks what can be checked without the sections.
+    pub(super) fn read(bytes: &[u8]) -> Result<Self, MeshError> {
+        if !bytes.starts_with(&MAGIC) {
+            return Err(MeshError::Format("it does not start with RFMESH".into()));
+        }
+        let Some(fixed) = bytes.get(..size_of::<Header>()) else {
+            return Err(MeshError::Format(format!("{} bytes are too few for a header", bytes.len())));
+        };
+        let header: Header = bytemuck::pod_read_unaligned(fixed);
+        if header.version != FORMAT_VERSION {
+            return Err(MeshError::Format(format!(
+                "it has format version {}, this program reads version {FORMAT_VERSION}",
+                header.version
+            )));
+        }
+        if !(-220..=220).contains(&header.exponent) {
+            return Err(MeshError::Format(format!("its scale 2^{} is out of range", header.exponent)));
+        }
+        let numbers = header.center.iter().chain(header.bounds.iter().flatten());
+        if numbers.into_iter().any(|number| !number.is_finite()) {
+            return Err(MeshError::Format("its centre or bounds are not finite".into()));
+        }
+        let needed = header.sections().end as u64;
+        if bytes.len() as u64 != needed {
+            return Err(MeshError::Format(format!(
+                "its header announces {needed} bytes, there are {}",
+                bytes.len()
+            )));
+        }
+        Ok(header)
+    }
+
+    /// Byte offsets of the sections. `u32` counts of at most 64-byte elements cannot overflow 64-bit sizes.
+    pub(super) fn sections(&self) -> Sections {
+        let mut end = size_of::<Header>();
+        let mut place = |count: u32, element: usize| {
+            let start = end.next_multiple_of(ALIGN);
+            end = start.saturating_add((count as usize).saturating_mul(element));
+            start
+        };
+        let has_normals = if self.normal_count > 0 { self.triangle_count } else { 0 };
+        Sections {
+            nodes: place(self.node_count, 64),
+            corners: place(self.triangle_count, 36),
+            sources: place(self.triangle_count, 4),
+            slots: place(self.triangle_count, 2),
+            indices: place(has_normals, 12),
+            normals: place(self.normal_count, 12),
+            materials: place(self.material_bytes, 1),
+            end,
+        }
+    }
+}
+
+/// Byte offsets of the sections of a compiled mesh.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sections {
+    /// `Node` per inner node, in depth-first order.
+    pub nodes: usize,
+    /// Three `Vec3` per triangle, in the order of the tree's leaves.
+    pub corners: usize,
+    /// `u32` per triangle: its position in the source.
+    pub sources: usize,
+    /// `u16` per triangle: its material slot.
+    pub slots: usize,
+    /// Three `u32` per triangle, into `normals`; empty without normals.
+    pub indices: usize,
+    /// `Vec3` per vertex.
+    pub normals: usize,
+    /// Material slots: see [`super::compiled`].
+    pub materials: usize,
+    /// Length of the whole.
+    pub end: usize,
+}

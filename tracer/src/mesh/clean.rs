@@ -1,0 +1,176 @@
+//! What a mesh loses and gains before its tree is built.
+//!
+//! Builders of trees and tests of triangles have inputs that they cannot bear: vertices that are not finite, triangles
+//! without an area, thousands of copies of one triangle (no split separates them, so the tree degenerates to a list).
+//! They go here, and are counted. What stays is moved to its own centre and scaled by a power of two, so that
+//! coordinates lie within [-1, 1] and `f32` spends its digits on the shape, wherever the model stands and however
+//! large it is. Both steps are exact up to one rounding to `f32` a coordinate.
+
+use std::collections::HashSet;
+
+use glam::{DVec3, Vec3};
+
+use super::{MAX_COORDINATE, MAX_MATERIALS, MAX_TRIANGLES, Mesh, MeshError, MeshReport};
+
+/// A mesh that is fit to be traced.
+pub(super) struct CleanMesh {
+    /// Corners in mesh space, within [-1, 1].
+    pub corners: Vec<[Vec3; 3]>,
+    /// Corners as indices into `normals`; the source's positions.
+    pub indices: Vec<[u32; 3]>,
+    /// Position of each kept triangle in the source.
+    pub sources: Vec<u32>,
+    /// Material slot of each kept triangle.
+    pub slots: Vec<u16>,
+    /// Unit normal per source position; empty unless asked for.
+    pub normals: Vec<Vec3>,
+    /// model = center + mesh * 2^exponent.
+    pub center: DVec3,
+    /// See `center`.
+    pub exponent: i32,
+    /// Bounds of the kept triangles in the model's space.
+    pub bounds: (DVec3, DVec3),
+}
+
+pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshReport), MeshError> {
+    check_shape(mesh)?;
+    let mut report = MeshReport::default();
+    let finite: Vec<u32> = (0..mesh.triangles.len() as u32)
+        .filter(|&i| mesh.triangles[i as usize].iter().all(|&v| is_usable(mesh.positions[v as usize])))
+        .collect();
+    report.dropped_not_finite = mesh.triangles.len() - finite.len();
+
+    let bounds = bounds_of(mesh, &finite);
+    let (center, exponent) = placement(bounds);
+    let unscale = libm::exp2(-f64::from(exponent));
+    let to_mesh = |v: u32| ((mesh.positions[v as usize] - center) * unscale).as_vec3();
+
+    let mut kept = CleanMesh {
+        corners: Vec::with_capacity(finite.len()),
+        indices: Vec::with_capacity(finite.len()),
+        sources: Vec::with_capacity(finite.len()),
+        slots: Vec::with_capacity(finite.len()),
+        normals: Vec::new(),
+        center,
+        exponent,
+        bounds,
+    };
+    let mut seen = HashSet::with_capacity(finite.len());
+    for source in finite {
+        let indices = mesh.triangles[source as usize];
+        let corners = indices.map(to_mesh);
+        if is_degenerate(&corners) {
+            report.dropped_degenerate += 1;
+        } else if !seen.insert(identity(&corners)) {
+            report.dropped_duplicate += 1;
+        } else {
+            kept.corners.push(corners);
+            kept.indices.push(indices);
+            kept.sources.push(source);
+            kept.slots.push(mesh.triangle_materials[source as usize]);
+        }
+    }
+    if kept.corners.is_empty() {
+        return Err(MeshError::Empty { dropped: report.dropped() });
+    }
+    if with_normals {
+        kept.normals =
+            if mesh.normals.is_empty() { averaged_normals(mesh, &kept) } else { given_normals(mesh) };
+    }
+    Ok((kept, report))
+}
+
+/// Lengths and indices that the rest relies on.
+fn check_shape(mesh: &Mesh) -> Result<(), MeshError> {
+    let triangles = mesh.triangles.len();
+    if triangles > MAX_TRIANGLES {
+        return Err(MeshError::TooMany { what: "triangles", count: triangles, limit: MAX_TRIANGLES });
+    }
+    if mesh.materials.len() > MAX_MATERIALS {
+        return Err(MeshError::TooMany {
+            what: "materials",
+            count: mesh.materials.len(),
+            limit: MAX_MATERIALS,
+        });
+    }
+    if mesh.triangle_materials.len() != triangles {
+        return Err(MeshError::Inconsistent(format!(
+            "{triangles} triangles but {} material slots for them",
+            mesh.triangle_materials.len()
+        )));
+    }
+    if !mesh.normals.is_empty() && mesh.normals.len() != mesh.positions.len() {
+        return Err(MeshError::Inconsistent(format!(
+            "{} positions but {} normals",
+            mesh.positions.len(),
+            mesh.normals.len()
+        )));
+    }
+    if let Some(index) = mesh.triangles.iter().flatten().find(|&&v| v as usize >= mesh.positions.len()) {
+        return Err(MeshError::Inconsistent(format!(
+            "a triangle names vertex {index}, but there are {} (counted from 0)",
+            mesh.positions.len()
+        )));
+    }
+    if let Some(slot) = mesh.triangle_materials.iter().find(|&&slot| slot as usize >= mesh.materials.len()) {
+        return Err(MeshError::Inconsistent(format!(
+            "a triangle names material slot {slot}, but there are {}",
+            mesh.materials.len()
+        )));
+    }
+    Ok(())
+}
+
+fn is_usable(position: DVec3) -> bool {
+    position.is_finite() && position.abs().max_element() <= MAX_COORDINATE
+}
+
+fn bounds_of(mesh: &Mesh, triangles: &[u32]) -> (DVec3, DVec3) {
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    triangles.iter().flat_map(|&i| mesh.triangles[i as usize]).fold(empty, |(lo, hi), v| {
+        let position = mesh.positions[v as usize];
+        (lo.min(position), hi.max(position))
+    })
+}
+
+/// Centre, and the exponent of the power of two that brings the half extent into (1/2, 1].
+fn placement((lo, hi): (DVec3, DVec3)) -> (DVec3, i32) {
+    if !lo.is_finite() || !hi.is_finite() {
+        return (DVec3::ZERO, 0);
+    }
+    let center = lo * 0.5 + hi * 0.5;
+    let half_extent = (hi - center).max(center - lo).max_element();
+    let (_, exponent) = libm::frexp(half_extent);
+    (center, if half_extent > 0.0 { exponent } else { 0 })
+}
+
+/// No area in exact arithmetic: products of `f32` differences are exact in `f64`, up to the final subtraction.
+fn is_degenerate(corners: &[Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    (b - a).cross(c - a) == DVec3::ZERO
+}
+
+/// Equal for triangles with the same corners in the same or the opposite winding.
+fn identity(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
+    // Adding zero turns -0.0 into 0.0.
+    let mut bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
+    bits.sort_unstable();
+    bits
+}
+
+fn given_normals(mesh: &Mesh) -> Vec<Vec3> {
+    mesh.normals.iter().map(|normal| normal.as_dvec3().normalize_or_zero().as_vec3()).collect()
+}
+
+/// Normals averaged over the faces that share a position, weighted by area.
+fn averaged_normals(mesh: &Mesh, kept: &CleanMesh) -> Vec<Vec3> {
+    let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
+    for (indices, corners) in kept.indices.iter().zip(&kept.corners) {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let weighted = (b - a).cross(c - a);
+        for &vertex in indices {
+            sums[vertex as usize] += weighted;
+        }
+    }
+    sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
+}

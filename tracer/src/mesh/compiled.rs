@@ -1,0 +1,306 @@
+//! A mesh ready to trace: triangles in the order of the tree's leaves, and the tree, in one blob.
+
+use glam::{DVec3, Vec3};
+
+use super::blob::{AlignedBytes, Header, Sections};
+use super::clean::{CleanMesh, clean};
+use super::{Mesh, MeshError, MeshId, NamedMaterial};
+use crate::bvh::{self, Node};
+use crate::scene::Material;
+
+/// What a compiled mesh should carry.
+#[derive(Clone, Copy, Debug)]
+pub struct CompileOptions {
+    /// Vertex normals for smooth shading: the file's, or averaged. A mesh that is only ever drawn flat needs none.
+    pub normals: bool,
+}
+
+/// What cleaning dropped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MeshReport {
+    /// Triangles without an area.
+    pub dropped_degenerate: usize,
+    /// Copies of a triangle that comes earlier.
+    pub dropped_duplicate: usize,
+    /// Triangles with a corner that is not finite, or farther out than [`super::MAX_COORDINATE`].
+    pub dropped_not_finite: usize,
+}
+
+impl MeshReport {
+    /// All of them.
+    pub fn dropped(&self) -> usize {
+        self.dropped_degenerate + self.dropped_duplicate + self.dropped_not_finite
+    }
+}
+
+/// A mesh ready to trace. Its space is its own: model = `center` + mesh * 2^`exponent`, coordinates within [-1, 1].
+pub struct CompiledMesh {
+    bytes: AlignedBytes,
+    header: Header,
+    sections: Sections,
+    materials: Vec<NamedMaterial>,
+    id: MeshId,
+}
+
+impl std::fmt::Debug for CompiledMesh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CompiledMesh").field("id", &self.id).field("header", &self.header).finish()
+    }
+}
+
+impl CompiledMesh {
+    /// Cleans, centres and builds, with vertex normals.
+    ///
+    /// # Errors
+    /// A mesh that is inconsistent, too large, or has nothing left after cleaning.
+    pub fn compile(mesh: &Mesh) -> Result<(Self, MeshReport), MeshError> {
+        Self::compile_with(mesh, CompileOptions { normals: true })
+    }
+
+    /// Cleans, centres and builds.
+    ///
+    /// # Errors
+    /// As [`CompiledMesh::compile`].
+    pub fn compile_with(mesh: &Mesh, options: CompileOptions) -> Result<(Self, MeshReport), MeshError> {
+        let (clean, report) = clean(mesh, options.normals)?;
+        let tree = bvh::build(clean.corners.iter().map(bounds_of_corners).collect());
+        let materials = encode_materials(&mesh.materials);
+
+        let mut header = Header::new(clean.center, clean.exponent, clean.bounds);
+        header.depth = tree.depth;
+        header.node_count = tree.nodes.len() as u32;
+        header.triangle_count = clean.corners.len() as u32;
+        header.normal_count = clean.normals.len() as u32;
+        header.material_count = mesh.materials.len() as u32;
+        header.material_bytes = materials.len() as u32;
+        let bytes = lay_out(&header, &clean, &tree, &materials);
+        // What was just written passes the same gate as what comes from elsewhere.
+        Ok((Self::from_aligned(bytes)?, report))
+    }
+
+    /// Takes the bytes of a compiled mesh from a file or a peer, and checks all that tracing relies on, in O(n).
+    ///
+    /// # Errors
+    /// Bytes that are no compiled mesh of this version, or whose tree or indices point astray.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, MeshError> {
+        // Before anything is copied: the header must fit the length.
+        Header::read(bytes)?;
+        Self::from_aligned(AlignedBytes::copy_of(bytes))
+    }
+
+    fn from_aligned(bytes: AlignedBytes) -> Result<Self, MeshError> {
+        let header = Header::read(bytes.as_slice())?;
+        let sections = header.sections();
+        let id = MeshId(*blake3::hash(bytes.as_slice()).as_bytes());
+        let start = sections.materials;
+        let materials =
+            decode_materials(&bytes.as_slice()[start..start + header.material_bytes as usize], &header)?;
+        let mesh = Self { bytes, header, sections, materials, id };
+        mesh.check()?;
+        Ok(mesh)
+    }
+
+    fn check(&self) -> Result<(), MeshError> {
+        let broken = |what: String| Err(MeshError::Format(what));
+        if self.header.triangle_count == 0 || self.triangle_count() > super::MAX_TRIANGLES {
+            return broken(format!("it announces {} triangles", self.header.triangle_count));
+        }
+        let depth = bvh::validate(self.nodes(), self.header.triangle_count)
+            .map_err(|error| MeshError::Format(error.to_string()))?;
+        if depth != self.header.depth {
+            return broken(format!("its tree is {depth} deep, its header says {}", self.header.depth));
+        }
+        if self.all_corners().iter().flatten().any(|corner| !(corner.abs().max_element() <= 1.0)) {
+            return broken("a corner lies outside [-1, 1]".into());
+        }
+        if let Some(slot) = self.slots().iter().find(|&&slot| slot as usize >= self.materials.len()) {
+            return broken(format!("a triangle names material slot {slot} of {}", self.materials.len()));
+        }
+        let normals = self.normals();
+        if self.indices().iter().flatten().any(|&index| index as usize >= normals.len()) {
+            return broken("a triangle names a normal that is not there".into());
+        }
+        if normals.iter().any(|normal| !(normal.abs().max_element() <= 1.0)) {
+            return broken("a normal is longer than 1".into());
+        }
+        Ok(())
+    }
+
+    /// The bytes, as they are stored and sent.
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.as_slice()
+    }
+
+    /// BLAKE3 of the bytes.
+    pub fn id(&self) -> MeshId {
+        self.id
+    }
+
+    /// Triangles after cleaning.
+    pub fn triangle_count(&self) -> usize {
+        self.header.triangle_count as usize
+    }
+
+    /// Material slots.
+    pub fn material_count(&self) -> usize {
+        self.materials.len()
+    }
+
+    /// Material slots, as the file described them.
+    pub fn materials(&self) -> Vec<NamedMaterial> {
+        self.materials.clone()
+    }
+
+    /// Bounds in the model's own space.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let [lo, hi] = self.header.bounds.map(DVec3::from_array);
+        (lo, hi)
+    }
+
+    /// Whether smooth shading has vertex normals to interpolate.
+    pub fn has_normals(&self) -> bool {
+        self.header.normal_count > 0
+    }
+
+    /// model = `center` + mesh * 2^`exponent`.
+    pub fn center(&self) -> DVec3 {
+        DVec3::from_array(self.header.center)
+    }
+
+    /// See [`CompiledMesh::center`].
+    pub fn exponent(&self) -> i32 {
+        self.header.exponent
+    }
+
+    /// Bounds of the tree's root in mesh space.
+    pub fn root_bounds(&self) -> (Vec3, Vec3) {
+        self.nodes().first().map_or((Vec3::ZERO, Vec3::ZERO), Node::bounds)
+    }
+
+    /// The tree; leaves count triangles in the order of [`CompiledMesh::corners`].
+    pub fn nodes(&self) -> &[Node] {
+        self.section(self.sections.nodes, self.header.node_count)
+    }
+
+    /// Corners of triangle `i` in mesh space.
+    pub fn corners(&self, i: u32) -> [Vec3; 3] {
+        self.all_corners()[i as usize]
+    }
+
+    /// Corners of all triangles in mesh space, in the order of the tree's leaves.
+    pub fn all_corners(&self) -> &[[Vec3; 3]] {
+        self.section(self.sections.corners, self.header.triangle_count)
+    }
+
+    /// Position of triangle `i` in the source file: ties between equal distances are decided by it.
+    pub fn source(&self, i: u32) -> u32 {
+        self.section::<u32>(self.sections.sources, self.header.triangle_count)[i as usize]
+    }
+
+    /// Material slot of triangle `i`.
+    pub fn slot(&self, i: u32) -> u16 {
+        self.slots()[i as usize]
+    }
+
+    /// Unit normals at the corners of triangle `i`, where the mesh carries them.
+    pub fn corner_normals(&self, i: u32) -> Option<[Vec3; 3]> {
+        let indices = self.indices().get(i as usize)?;
+        Some(indices.map(|index| self.normals()[index as usize]))
+    }
+
+    fn slots(&self) -> &[u16] {
+        self.section(self.sections.slots, self.header.triangle_count)
+    }
+
+    fn indices(&self) -> &[[u32; 3]] {
+        let count = if self.has_normals() { self.header.triangle_count } else { 0 };
+        self.section(self.sections.indices, count)
+    }
+
+    fn normals(&self) -> &[Vec3] {
+        self.section(self.sections.normals, self.header.normal_count)
+    }
+
+    /// The section that starts at `start`. `Header::read` made sure that all sections lie inside, and they start on
+    /// cache lines, so the cast cannot fail.
+    fn section<T: bytemuck::AnyBitPattern>(&self, start: usize, count: u32) -> &[T] {
+        bytemuck::cast_slice(&self.bytes.as_slice()[start..start + count as usize * size_of::<T>()])
+    }
+}
+
+fn bounds_of_corners([a, b, c]: &[Vec3; 3]) -> (Vec3, Vec3) {
+    (a.min(*b).min(*c), a.max(*b).max(*c))
+}
+
+/// Writes the sections, triangles in the order of the leaves.
+fn lay_out(header: &Header, clean: &CleanMesh, tree: &bvh::Tree, materials: &[u8]) -> AlignedBytes {
+    let sections = header.sections();
+    let mut bytes = AlignedBytes::zeroed(sections.end);
+    let out = bytes.as_mut_slice();
+    out[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(header));
+    let order = &tree.order;
+    put(out, sections.nodes, &tree.nodes);
+    put(out, sections.corners, &in_order(order, &clean.corners));
+    put(out, sections.sources, &in_order(order, &clean.sources));
+    put(out, sections.slots, &in_order(order, &clean.slots));
+    if !clean.normals.is_empty() {
+        put(out, sections.indices, &in_order(order, &clean.indices));
+        put(out, sections.normals, &clean.normals);
+    }
+    out[sections.materials..sections.materials + materials.len()].copy_from_slice(materials);
+    bytes
+}
+
+fn in_order<T: Copy>(order: &[u32], items: &[T]) -> Vec<T> {
+    order.iter().map(|&i| items[i as usize]).collect()
+}
+
+fn put<T: bytemuck::NoUninit>(out: &mut [u8], start: usize, items: &[T]) {
+    let bytes: &[u8] = bytemuck::cast_slice(items);
+    out[start..start + bytes.len()].copy_from_slice(bytes);
+}
+
+/// Longest name of a material slot, in bytes; longer ones are cut.
+const MAX_NAME: usize = 255;
+
+/// Per slot: diffuse, specular, exponent (seven `f32`), the length of the name in bytes (`u8`), the name.
+fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for NamedMaterial { name, material } in materials {
+        let numbers = material.diffuse.to_array().into_iter().chain(material.specular.to_array());
+        for number in numbers.chain([material.exponent]) {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
+        let name = &name[..name.floor_char_boundary(MAX_NAME)];
+        bytes.push(name.len() as u8);
+        bytes.extend_from_slice(name.as_bytes());
+    }
+    bytes
+}
+
+fn decode_materials(mut bytes: &[u8], header: &Header) -> Result<Vec<NamedMaterial>, MeshError> {
+    let cut = || MeshError::Format("its material slots are cut short".into());
+    if header.material_count as usize > super::MAX_MATERIALS {
+        return Err(MeshError::Format(format!("it announces {} materials", header.material_count)));
+    }
+    let mut materials = Vec::new();
+    for _ in 0..header.material_count {
+        let (numbers, rest) = bytes.split_at_checked(7 * 4).ok_or_else(cut)?;
+        let (length, rest) = rest.split_first().ok_or_else(cut)?;
+        let (name, rest) = rest.split_at_checked(*length as usize).ok_or_else(cut)?;
+        bytes = rest;
+        let numbers: [f32; 7] = bytemuck::pod_read_unaligned(numbers);
+        if numbers.iter().any(|number| !(0.0..=1e9).contains(number)) {
+            return Err(MeshError::Format("a material has a number that is not in 0..1e9".into()));
+        }
+        let [dr, dg, db, sr, sg, sb, exponent] = numbers;
+        materials.push(NamedMaterial {
+            name: String::from_utf8_lossy(name).into_owned(),
+            material: Material { diffuse: Vec3::new(dr, dg, db), specular: Vec3::new(sr, sg, sb), exponent },
+        });
+    }
+    if !bytes.is_empty() {
+        return Err(MeshError::Format(format!("{} bytes follow its material slots", bytes.len())));
+    }
+    Ok(materials)
+}

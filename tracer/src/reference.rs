@@ -1,0 +1,276 @@
+//! The oracle: the shading equations in `f64`, every ray against every primitive, no tree, no SIMD, no shortcuts.
+//!
+//! It shares with the fast path only the scene, the cleaned triangles and [`crate::light`]'s absence: whatever it
+//! computes, it computes from the equations of the model of light, to be read against them.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::image::RgbImage;
+use crate::mesh::{CompiledMesh, MeshId};
+use crate::scene::{Attenuation, Background, FrameView, Light, LightKind, Material, NormalMode, Scene};
+use crate::srgb;
+
+/// Nothing nearer than this share of the scene's size is in a shadow ray's way: it is where the ray starts.
+const NEAR: f64 = 1e-11;
+
+/// A scene, flattened to world space relative to the camera.
+pub struct Oracle {
+    scene: Scene,
+    view: FrameView,
+    primitives: Vec<Primitive>,
+    size: f64,
+}
+
+struct Primitive {
+    shape: Shape,
+    material: u32,
+}
+
+enum Shape {
+    Triangle { corners: [DVec3; 3], normals: Option<[DVec3; 3]> },
+    Sphere { center: DVec3, radius: f64 },
+    Plane { point: DVec3, normal: DVec3 },
+}
+
+struct Hit {
+    t: f64,
+    primitive: usize,
+    normal: DVec3,
+    shading_normal: DVec3,
+}
+
+impl Oracle {
+    /// Flattens a scene. Meshes that it names must be among `meshes`; a model whose mesh is missing is not drawn.
+    pub fn new(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameView) -> Self {
+        let eye = view.camera.position;
+        let mut primitives = Vec::new();
+        for model in &scene.models {
+            let find = |id: MeshId| meshes.iter().find(|mesh| mesh.id() == id);
+            let Some(mesh) = find(model.mesh) else { continue };
+            let turn = rotation([0.0, view.spin, 0.0]) * rotation(model.rotate.to_array());
+            let linear = turn * DMat3::from_diagonal(model.scale);
+            let scale = libm::exp2(f64::from(mesh.exponent()));
+            let place = |p: Vec3| linear * (p.as_dvec3() * scale + mesh.center()) + (model.translate - eye);
+            let turn_normal = |n: Vec3| linear.inverse().transpose() * n.as_dvec3();
+            for i in 0..mesh.triangle_count() as u32 {
+                let smooth = model.normals == NormalMode::Smooth;
+                let normals = mesh.corner_normals(i).filter(|_| smooth).map(|n| n.map(turn_normal));
+                let shape = Shape::Triangle { corners: mesh.corners(i).map(place), normals };
+                primitives.push(Primitive { shape, material: model.materials[mesh.slot(i) as usize] });
+            }
+        }
+        for sphere in &scene.spheres {
+            let shape = Shape::Sphere { center: sphere.center - eye, radius: sphere.radius };
+            primitives.push(Primitive { shape, material: sphere.material });
+        }
+        for triangle in &scene.triangles {
+            let shape = Shape::Triangle { corners: triangle.vertices.map(|v| v - eye), normals: None };
+            primitives.push(Primitive { shape, material: triangle.material });
+        }
+        for plane in &scene.planes {
+            let shape = Shape::Plane { point: plane.point - eye, normal: plane.normal.normalize() };
+            primitives.push(Primitive { shape, material: plane.material });
+        }
+        let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
+        Self { scene: scene.clone(), view: *view, primitives, size }
+    }
+
+    /// Linear RGB of a pixel: the mean over its samples.
+    pub fn pixel(&self, x: u32, y: u32) -> DVec3 {
+        let n = self.view.samples.isqrt();
+        let mut sum = DVec3::ZERO;
+        for j in 0..n {
+            for i in 0..n {
+                let sx = f64::from(x) + (f64::from(i) + 0.5) / f64::from(n);
+                let sy = f64::from(y) + (f64::from(j) + 0.5) / f64::from(n);
+                sum += self.radiance(self.direction(sx, sy));
+            }
+        }
+        sum / f64::from(n * n)
+    }
+
+    /// A pixel as it is stored: 8-bit sRGB.
+    pub fn encoded_pixel(&self, x: u32, y: u32) -> [u8; 3] {
+        srgb::encode(self.pixel(x, y).as_vec3())
+    }
+
+    /// The whole picture. The time grows with pixels times primitives: for small ones.
+    pub fn render(&self) -> RgbImage {
+        let (width, height) = (self.view.width, self.view.height);
+        let pixels =
+            (0..height).flat_map(|y| (0..width).flat_map(move |x| self.encoded_pixel(x, y))).collect();
+        RgbImage { width, height, pixels }
+    }
+
+    /// Direction through a point of the picture, in pixels from its top left corner.
+    fn direction(&self, sx: f64, sy: f64) -> DVec3 {
+        let camera = &self.view.camera;
+        let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
+        let forward = (camera.look_at - camera.position).normalize();
+        let right = forward.cross(camera.up).normalize();
+        let up = right.cross(forward);
+        let half_height = libm::tan(camera.fov.to_radians() / 2.0) / camera.zoom;
+        let across = (2.0 * sx / width - 1.0) * half_height * width / height;
+        let along = (1.0 - 2.0 * sy / height) * half_height;
+        (forward + right * across + up * along).normalize()
+    }
+
+    fn radiance(&self, direction: DVec3) -> DVec3 {
+        let Some(hit) = self.closest(direction) else {
+            return match self.scene.background {
+                Background::Color(color) => color.as_dvec3(),
+                Background::Gradient { bottom, top } => {
+                    bottom.as_dvec3().lerp(top.as_dvec3(), (direction.y + 1.0) / 2.0)
+                }
+            };
+        };
+        let material = &self.scene.materials[self.primitives[hit.primitive].material as usize];
+        let point = direction * hit.t;
+        let ng = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
+        let n = if hit.shading_normal.dot(ng) < 0.0 { -hit.shading_normal } else { hit.shading_normal };
+        let mut sum = material.diffuse.as_dvec3() * self.scene.ambient.as_dvec3();
+        for light in &self.scene.lights {
+            sum += self.light_term(light, material, point, n, -direction, hit.primitive);
+        }
+        sum
+    }
+
+    /// S A B I ( c_d N.L + c_s (N.H)^p ) of one light.
+    fn light_term(
+        &self,
+        light: &Light,
+        material: &Material,
+        point: DVec3,
+        n: DVec3,
+        v: DVec3,
+        primitive: usize,
+    ) -> DVec3 {
+        let eye = self.view.camera.position;
+        let (to_light, reach) = match light.kind {
+            LightKind::Point { position } | LightKind::Spot { position, .. } => (position - eye - point, 1.0),
+            LightKind::Directional { direction } => (-direction, f64::INFINITY),
+        };
+        let r = to_light.length();
+        let l = to_light / r;
+        if !(n.dot(l) > 0.0) {
+            return DVec3::ZERO;
+        }
+        let attenuation = match (light.kind, light.attenuation) {
+            (LightKind::Directional { .. }, _) | (_, Attenuation::None) => 1.0,
+            (_, Attenuation::InverseSquare) => 1.0 / (r * r),
+            (_, Attenuation::Polynomial { constant, linear, quadratic }) => {
+                1.0 / (constant + linear * r + quadratic * r * r)
+            }
+        };
+        let strength = attenuation * beam(&light.kind, l);
+        if strength == 0.0 || (light.shadows && self.occluded(point, to_light, reach, primitive)) {
+            return DVec3::ZERO;
+        }
+        let h = (l + v).normalize();
+        let highlight = libm::pow(n.dot(h).max(0.0), f64::from(material.exponent));
+        let reflected = material.diffuse.as_dvec3() * n.dot(l) + material.specular.as_dvec3() * highlight;
+        light.color.as_dvec3() * reflected * strength
+    }
+
+    /// The nearest hit of a ray from the camera; of equal ones the first.
+    fn closest(&self, direction: DVec3) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        for (index, primitive) in self.primitives.iter().enumerate() {
+            let hit = primitive.shape.hit(DVec3::ZERO, direction, 0.0);
+            if let Some((t, normal, shading_normal)) = hit
+                && best.as_ref().is_none_or(|best| t < best.t)
+            {
+                best = Some(Hit { t, primitive: index, normal, shading_normal });
+            }
+        }
+        best
+    }
+
+    fn occluded(&self, point: DVec3, to_light: DVec3, reach: f64, leaving: usize) -> bool {
+        let near = NEAR * (self.size + point.length()) / to_light.length();
+        self.primitives.iter().enumerate().any(|(index, primitive)| {
+            let flat = !matches!(primitive.shape, Shape::Sphere { .. });
+            if index == leaving && flat {
+                return false;
+            }
+            primitive.shape.hit(point, to_light, near).is_some_and(|(t, ..)| t < reach)
+        })
+    }
+}
+
+/// B_j for the unit vector to the light.
+fn beam(kind: &LightKind, l: DVec3) -> f64 {
+    let LightKind::Spot { direction, beam_angle, penumbra, .. } = *kind else { return 1.0 };
+    let outer = libm::cos((beam_angle / 2.0).to_radians());
+    let inner = libm::cos((beam_angle / 2.0 - penumbra).max(0.0).to_radians());
+    let cosine = -l.dot(direction.normalize());
+    if cosine <= outer {
+        0.0
+    } else if cosine >= inner {
+        1.0
+    } else {
+        let s = (cosine - outer) / (inner - outer);
+        s * s * (3.0 - 2.0 * s)
+    }
+}
+
+/// About x, then y, then z, in degrees.
+fn rotation(degrees: [f64; 3]) -> DMat3 {
+    let [(sx, cx), (sy, cy), (sz, cz)] =
+        degrees.map(|d| (libm::sin(d.to_radians()), libm::cos(d.to_radians())));
+    let x = DMat3::from_cols(DVec3::X, DVec3::new(0.0, cx, sx), DVec3::new(0.0, -sx, cx));
+    let y = DMat3::from_cols(DVec3::new(cy, 0.0, -sy), DVec3::Y, DVec3::new(sy, 0.0, cy));
+    let z = DMat3::from_cols(DVec3::new(cz, sz, 0.0), DVec3::new(-sz, cz, 0.0), DVec3::Z);
+    z * y * x
+}
+
+impl Shape {
+    /// Largest coordinate, for what "near" means.
+    fn size(&self) -> f64 {
+        match self {
+            Shape::Triangle { corners, .. } => {
+                corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max)
+            }
+            Shape::Sphere { center, radius } => center.abs().max_element() + radius,
+            Shape::Plane { point, normal } => point.dot(*normal).abs(),
+        }
+    }
+
+    /// Distance, normal and shading normal of the nearest hit with t > `near`.
+    fn hit(&self, origin: DVec3, direction: DVec3, near: f64) -> Option<(f64, DVec3, DVec3)> {
+        match *self {
+            Shape::Triangle { corners: [a, b, c], normals } => {
+                let (ab, ac) = (b - a, c - a);
+                let p = direction.cross(ac);
+                let determinant = ab.dot(p);
+                let from_a = origin - a;
+                let u = from_a.dot(p) / determinant;
+                let q = from_a.cross(ab);
+                let v = direction.dot(q) / determinant;
+                let t = ac.dot(q) / determinant;
+                let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+                let ng = ab.cross(ac).normalize_or_zero();
+                let ns =
+                    normals.and_then(|[na, nb, nc]| (na * (1.0 - u - v) + nb * u + nc * v).try_normalize());
+                (inside && t > near).then(|| (t, ng, ns.unwrap_or(ng)))
+            }
+            Shape::Sphere { center, radius } => {
+                let from_center = origin - center;
+                let unit = direction.normalize();
+                let middle = -from_center.dot(unit);
+                let closest = (from_center + unit * middle).length();
+                let half_chord = (radius * radius - closest * closest).sqrt();
+                let [t0, t1] = [-half_chord, half_chord].map(|half| (middle + half) / direction.length());
+                let t = if t0 > near { t0 } else { t1 };
+                let normal = (origin + direction * t - center).normalize_or_zero();
+                (t > near).then_some((t, normal, normal))
+            }
+            Shape::Plane { point, normal } => {
+                let t = (point - origin).dot(normal) / direction.dot(normal);
+                (t > near && t.is_finite()).then_some((t, normal, normal))
+            }
+        }
+    }
+}
