@@ -14,18 +14,17 @@
 
 use std::net::SocketAddr;
 use std::ops::Deref;
+use std::sync::Arc;
 use std::time::Duration;
 
+use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{FrameView, Scene};
 
 pub use crate::scheduler::policy::SegmentPolicy;
+pub use rayfarm_protocol::FrameId;
 
 /// Where workers connect when nobody says otherwise.
 pub const DEFAULT_PORT: u16 = 7117;
-
-/// The name of a frame; later frames have greater numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct FrameId(pub u64);
 
 /// How a farm is set up.
 #[derive(Clone, Debug, Default)]
@@ -45,7 +44,8 @@ pub struct FarmOptions {
 pub struct FarmScene {
     /// The scene as data.
     pub scene: Scene,
-    // meshes: Vec<Arc<CompiledMesh>> follows as soon as rayfarm-tracer has the type.
+    /// The meshes that it names; others are neither kept nor sent.
+    pub meshes: Vec<Arc<CompiledMesh>>,
 }
 
 /// A running farm. Dropped without [`Farm::shut_down`], it ends its sessions and its local workers all the same,

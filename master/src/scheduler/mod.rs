@@ -1,3 +1,308 @@
 //! Who renders which rows, and what happens when somebody does not.
+//!
+//! Pure: no clock, no socket, no image byte, no randomness. The same events at the same times give the same
+//! actions, so a failure found by a simulation can be replayed from its seed.
 
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+mod action;
+mod assign;
+pub mod check;
+mod cost_map;
+mod event;
+mod frame;
 pub mod policy;
+mod worker;
+
+#[cfg(test)]
+mod scenarios;
+#[cfg(test)]
+mod simulation;
+
+pub use action::Action;
+pub use event::{Event, WorkerId};
+pub use policy::SegmentPolicy;
+pub use rayfarm_protocol::{Cost, FrameId, Lease};
+
+use cost_map::CostMap;
+use frame::Frame;
+use worker::{PING_EVERY, Worker};
+
+/// A scheduler that has workers and has not been woken for this long was asleep itself: the silence was its own.
+const AWAY: Duration = PING_EVERY.saturating_mul(2);
+
+/// Decides what every worker does. Decides on numbers only: pixels go past it.
+///
+/// The contract, with `now` as the time since any fixed moment:
+///
+/// 1. Report whatever happens by [`handle`](Self::handle). Times never go backwards.
+/// 2. After each event, perform the actions of [`poll_action`](Self::poll_action) in order until there are none.
+/// 3. Unless something happens before, report [`Event::Woken`] at the time of [`poll_timeout`](Self::poll_timeout).
+///
+/// In return: a frame that begins completes as soon as one worker that answers stays connected for long enough,
+/// whatever the others do; frames complete in order; an event about a worker or a frame that is gone changes
+/// nothing. What holds after every event is written down, and checked, in [`check`].
+#[derive(Debug)]
+pub struct Scheduler {
+    policy: SegmentPolicy,
+    max_segment_bytes: u64,
+    workers: BTreeMap<WorkerId, Worker>,
+    /// Frames that have begun, oldest first.
+    frames: VecDeque<Frame>,
+    /// The newest request that has not begun.
+    waiting: Option<Request>,
+    costs: CostMap,
+    actions: VecDeque<Action>,
+    next_nonce: u64,
+    /// When an idle worker may find a lease of somebody else worth repeating.
+    recheck_at: Option<Duration>,
+    handled_at: Duration,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Request {
+    frame: FrameId,
+    width: u32,
+    height: u32,
+}
+
+/// A worker's record, for overlays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorkerRecord {
+    /// Which worker.
+    pub worker: WorkerId,
+    /// Segments it has finished.
+    pub segments_done: u64,
+    /// Rows of average cost that it delivers each second; 0 before that is known.
+    pub speed: f64,
+}
+
+/// How far the oldest frame in flight is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Which frame.
+    pub frame: FrameId,
+    /// Its finished rows.
+    pub rows_done: u32,
+    /// Its rows.
+    pub rows: u32,
+}
+
+impl Scheduler {
+    /// A scheduler without workers and frames. No lease asks for more than `max_segment_bytes` bytes of RGB8
+    /// pixels, except that a single row is always one lease.
+    pub fn new(policy: SegmentPolicy, max_segment_bytes: u64) -> Self {
+        Self {
+            policy,
+            max_segment_bytes,
+            workers: BTreeMap::new(),
+            frames: VecDeque::new(),
+            waiting: None,
+            costs: CostMap::default(),
+            actions: VecDeque::new(),
+            next_nonce: 0,
+            recheck_at: None,
+            handled_at: Duration::ZERO,
+        }
+    }
+
+    /// Takes note of an event and decides what follows from it.
+    pub fn handle(&mut self, now: Duration, event: Event) {
+        self.excuse_own_absence(now);
+        match event {
+            Event::FrameRequested { frame, width, height } => self.request(Request { frame, width, height }),
+            Event::WorkerJoined { worker, threads } => {
+                self.lose(worker);
+                self.workers.insert(worker, Worker::new(threads, now));
+            }
+            Event::WorkerLeft { worker } => self.lose(worker),
+            Event::WorkerDrains { worker } => self.drain(worker),
+            Event::SegmentDone { worker, lease, cost } => self.segment_done(now, worker, lease, cost),
+            Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
+            Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
+            Event::Woken => self.check_pulses(now),
+        }
+        self.complete_frames();
+        self.assign(now);
+        self.dismiss_drained();
+        debug_assert_eq!(check::violated(self), None);
+    }
+
+    /// The next thing to do.
+    pub fn poll_action(&mut self) -> Option<Action> {
+        self.actions.pop_front()
+    }
+
+    /// When [`Event::Woken`] is due; `None` while nothing but other events can change anything.
+    pub fn poll_timeout(&self) -> Option<Duration> {
+        let pulses = self.workers.values().flat_map(|worker| {
+            let pulse = worker.ping_at().min(worker.lost_at());
+            [Some(pulse), worker.rested_at(self.handled_at)]
+        });
+        pulses.chain([self.recheck_at]).flatten().min()
+    }
+
+    /// Every worker's record, in the order in which they joined.
+    pub fn workers(&self) -> impl Iterator<Item = WorkerRecord> {
+        self.workers.iter().map(|(&worker, known)| WorkerRecord {
+            worker,
+            segments_done: known.segments_done,
+            speed: known.speed.delivered().unwrap_or(0.0),
+        })
+    }
+
+    /// How far the oldest frame in flight is; `None` when there is nothing to render.
+    pub fn progress(&self) -> Option<Progress> {
+        let frame = self.frames.front()?;
+        Some(Progress { frame: frame.id, rows_done: frame.rows_done, rows: frame.height })
+    }
+
+    /// A request waits for its turn, in place of the one that waited before.
+    fn request(&mut self, request: Request) {
+        if self.newest().is_some_and(|(width, height)| (width, height) != (request.width, request.height)) {
+            self.drop_frames(request.frame);
+        }
+        if let Some(replaced) = self.waiting.replace(request) {
+            self.actions.push_back(Action::FrameDropped { frame: replaced.frame });
+        }
+        if self.frames.is_empty() {
+            self.begin_waiting();
+        }
+    }
+
+    /// Picture size of the newest request that is not finished.
+    fn newest(&self) -> Option<(u32, u32)> {
+        let begun = self.frames.back().map(|frame| (frame.width, frame.height));
+        self.waiting.map(|waiting| (waiting.width, waiting.height)).or(begun)
+    }
+
+    /// Gives up all that was requested before `next`: pictures of a size that nobody shows any more.
+    fn drop_frames(&mut self, next: FrameId) {
+        let begun = std::mem::take(&mut self.frames);
+        for frame in begun {
+            self.actions.push_back(Action::FrameDropped { frame: frame.id });
+        }
+        self.cancel_leases(next);
+    }
+
+    /// Begins the request that waits, if there is one.
+    fn begin_waiting(&mut self) {
+        let Some(Request { frame, width, height }) = self.waiting.take() else { return };
+        let runs = self.policy.runs(height, self.max_rows(width));
+        self.costs.resize(height);
+        self.frames.push_back(Frame::new(frame, width, height, runs));
+        self.actions.push_back(Action::BeginFrame { frame });
+    }
+
+    /// The most rows that one lease may have.
+    fn max_rows(&self, width: u32) -> u32 {
+        let row_bytes = u64::from(width.max(1)) * 3;
+        u32::try_from(self.max_segment_bytes / row_bytes).unwrap_or(u32::MAX).max(1)
+    }
+
+    fn segment_done(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) {
+        let Some((held, work)) = self.workers.get_mut(&id).and_then(|worker| worker.finish(now, lease, cost))
+        else {
+            return;
+        };
+        let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
+        frame.finish(held.lease.segment, cost);
+        if let Some(work) = work {
+            self.costs.learn(lease.first_row..lease.first_row + lease.row_count, work);
+        }
+    }
+
+    /// A worker cannot render: its leases go to others, and it rests before it is tried again.
+    fn worker_failed(&mut self, now: Duration, id: WorkerId, frame: FrameId) {
+        let in_flight = self.frames.iter().any(|known| known.id == frame);
+        let Some(worker) = self.workers.get_mut(&id).filter(|_| in_flight) else { return };
+        worker.fail(now);
+        self.take_leases(id);
+    }
+
+    fn drain(&mut self, id: WorkerId) {
+        if let Some(worker) = self.workers.get_mut(&id) {
+            worker.draining = true;
+        }
+    }
+
+    fn dismiss_drained(&mut self) {
+        let drained = self.workers.iter().filter(|(_, worker)| worker.draining && worker.leases.is_empty());
+        for id in drained.map(|(&id, _)| id).collect::<Vec<_>>() {
+            self.dismiss(id, "it asked to leave and has finished its segments".to_owned());
+        }
+    }
+
+    fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64) {
+        if let Some(worker) = self.workers.get_mut(&id) {
+            worker.pong(now, nonce);
+        }
+    }
+
+    /// Pings those who are due and dismisses those who have been silent for too long.
+    fn check_pulses(&mut self, now: Duration) {
+        let silent = self.workers.iter().filter(|(_, worker)| worker.lost_at() <= now);
+        for id in silent.map(|(&id, _)| id).collect::<Vec<_>>() {
+            let limit_s = worker::SILENCE_LIMIT.as_secs();
+            self.dismiss(id, format!("it has given no sign of life for {limit_s} s"));
+        }
+        for (&worker, known) in self.workers.iter_mut().filter(|(_, known)| known.ping_at() <= now) {
+            known.pinged(now, self.next_nonce);
+            self.actions.push_back(Action::Ping { worker, nonce: self.next_nonce });
+            self.next_nonce += 1;
+        }
+    }
+
+    /// After a pause of its own (a suspended machine, a debugger) it has nobody's silence to complain about.
+    fn excuse_own_absence(&mut self, now: Duration) {
+        if now.saturating_sub(self.handled_at) > AWAY {
+            self.workers.values_mut().for_each(|worker| worker.heard(now));
+        }
+        self.handled_at = now;
+    }
+
+    fn dismiss(&mut self, worker: WorkerId, reason: String) {
+        self.lose(worker);
+        self.actions.push_back(Action::Dismiss { worker, reason });
+    }
+
+    fn lose(&mut self, id: WorkerId) {
+        self.take_leases(id);
+        self.workers.remove(&id);
+    }
+
+    /// Takes all leases from a worker; its rows go to the front of the queue, in order.
+    fn take_leases(&mut self, id: WorkerId) {
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        for (frame, segment) in std::mem::take(&mut worker.leases).into_keys().rev() {
+            if let Some(frame) = self.frames.iter_mut().find(|known| known.id == frame) {
+                frame.give_up(segment, id);
+            }
+        }
+    }
+
+    /// Reports complete frames, oldest first, and lets the next one begin.
+    fn complete_frames(&mut self) {
+        while let Some(frame) = self.frames.pop_front_if(|frame| frame.is_complete()) {
+            self.costs.normalise();
+            self.cancel_leases(FrameId(frame.id.0.saturating_add(1)));
+            let elapsed = self.handled_at.saturating_sub(frame.started_at.unwrap_or(self.handled_at));
+            self.actions.push_back(Action::FrameDone { frame: frame.id, cost: frame.cost, elapsed });
+            if self.frames.is_empty() {
+                self.begin_waiting();
+            }
+        }
+    }
+
+    /// Frees everybody who still renders for a frame before `before`.
+    fn cancel_leases(&mut self, before: FrameId) {
+        for (&worker, known) in &mut self.workers {
+            let held = known.leases.len();
+            known.leases.retain(|&(frame, _), _| frame >= before);
+            if known.leases.len() < held {
+                self.actions.push_back(Action::Cancel { worker, before });
+            }
+        }
+    }
+}

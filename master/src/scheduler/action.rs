@@ -1,0 +1,64 @@
+//! What the scheduler wants done.
+
+use std::time::Duration;
+
+use super::{Cost, FrameId, Lease, WorkerId};
+
+/// What the shell is to do, in the order given.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// A requested frame begins: make room for its pixels. Comes before its first lease.
+    BeginFrame {
+        /// Which.
+        frame: FrameId,
+    },
+    /// A frame is complete: show it. Frames complete in the order of their numbers.
+    FrameDone {
+        /// Which.
+        frame: FrameId,
+        /// What its segments took, summed; every row counts once.
+        cost: Cost,
+        /// From its first lease to its last row.
+        elapsed: Duration,
+    },
+    /// A frame, begun or not, has been superseded: forget it.
+    FrameDropped {
+        /// Which.
+        frame: FrameId,
+    },
+    /// Tell a worker what a frame shows. Comes before the worker's first lease of it.
+    Announce {
+        /// Whom.
+        worker: WorkerId,
+        /// Which frame.
+        frame: FrameId,
+    },
+    /// Give a worker a segment to render.
+    Grant {
+        /// Whom.
+        worker: WorkerId,
+        /// Which rows.
+        lease: Lease,
+    },
+    /// Tell a worker that leases of frames before this one are of no use any more.
+    Cancel {
+        /// Whom.
+        worker: WorkerId,
+        /// The first frame that is still wanted.
+        before: FrameId,
+    },
+    /// Ask a worker for a sign of life.
+    Ping {
+        /// Whom.
+        worker: WorkerId,
+        /// Comes back in the answer.
+        nonce: u64,
+    },
+    /// End a worker's session; the scheduler has forgotten it already.
+    Dismiss {
+        /// Whom.
+        worker: WorkerId,
+        /// Why, for the log and for the worker.
+        reason: String,
+    },
+}

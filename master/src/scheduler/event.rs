@@ -1,0 +1,72 @@
+//! What happens to the scheduler.
+
+use std::fmt;
+
+use super::{Cost, FrameId, Lease};
+
+/// A connected worker. Numbers are given by the shell and never reused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct WorkerId(pub u64);
+
+impl fmt::Display for WorkerId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "worker {}", self.0)
+    }
+}
+
+/// What the shell reports. Events of unknown workers and of frames that are over are ignored, so the shell need
+/// not know what has become of either.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A frame is wanted. Its number is greater than that of every frame before it.
+    FrameRequested {
+        /// Its number.
+        frame: FrameId,
+        /// Pixels per row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// A session is ready for leases.
+    WorkerJoined {
+        /// The new worker.
+        worker: WorkerId,
+        /// Its render threads: a first guess at its speed.
+        threads: u32,
+    },
+    /// A session is over, for whatever reason.
+    WorkerLeft {
+        /// The lost worker.
+        worker: WorkerId,
+    },
+    /// A worker asks for no more leases; it finishes those it has.
+    WorkerDrains {
+        /// The leaving worker.
+        worker: WorkerId,
+    },
+    /// The pixels of a lease were checked and are in the framebuffer.
+    SegmentDone {
+        /// Who rendered them.
+        worker: WorkerId,
+        /// The lease as it was granted.
+        lease: Lease,
+        /// What the worker says they took.
+        cost: Cost,
+    },
+    /// A worker cannot render a frame.
+    WorkerFailed {
+        /// Who cannot.
+        worker: WorkerId,
+        /// Which frame.
+        frame: FrameId,
+    },
+    /// A ping was answered.
+    Pong {
+        /// By whom.
+        worker: WorkerId,
+        /// The ping's number.
+        nonce: u64,
+    },
+    /// The time of [`poll_timeout`](super::Scheduler::poll_timeout) has come.
+    Woken,
+}

@@ -1,0 +1,218 @@
+//! One frame's rows: queued, leased or done.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use super::{Cost, FrameId, Lease, WorkerId};
+
+/// Rows that wait for a worker.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    pub(super) first: u32,
+    pub(super) count: u32,
+    /// Segment number and next attempt, when these rows were leased before and came back whole.
+    came_back: Option<(u32, u32)>,
+    /// Whether the policy `smart` has cut it already.
+    pub(super) halved: bool,
+}
+
+impl Run {
+    pub(super) fn new(first: u32, count: u32) -> Self {
+        Self { first, count, came_back: None, halved: false }
+    }
+}
+
+/// Rows that were leased.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    pub(super) first: u32,
+    pub(super) count: u32,
+    /// The attempt that the next lease of these rows gets.
+    next_attempt: u32,
+    halved: bool,
+    /// Who renders it now; empty once it is done.
+    pub(super) holders: BTreeSet<WorkerId>,
+    pub(super) done: bool,
+}
+
+/// A frame that has begun.
+#[derive(Debug)]
+pub(super) struct Frame {
+    pub(super) id: FrameId,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// When its first lease was granted.
+    pub(super) started_at: Option<Duration>,
+    pub(super) queue: VecDeque<Run>,
+    pub(super) segments: BTreeMap<u32, Segment>,
+    next_segment: u32,
+    pub(super) rows_done: u32,
+    /// What the done segments took.
+    pub(super) cost: Cost,
+}
+
+impl Frame {
+    pub(super) fn new(id: FrameId, width: u32, height: u32, runs: impl IntoIterator<Item = Run>) -> Self {
+        Self {
+            id,
+            width,
+            height,
+            started_at: None,
+            queue: runs.into_iter().collect(),
+            segments: BTreeMap::new(),
+            next_segment: 0,
+            rows_done: 0,
+            cost: Cost::default(),
+        }
+    }
+
+    pub(super) fn is_complete(&self) -> bool {
+        self.rows_done == self.height
+    }
+
+    /// Leases up to `max_rows` rows from the front of the queue.
+    pub(super) fn take(&mut self, worker: WorkerId, max_rows: u32) -> Option<Lease> {
+        let run = self.queue.pop_front()?;
+        let (run, rest) = cut(run, max_rows.max(1));
+        if let Some(rest) = rest {
+            self.queue.push_front(rest);
+        }
+        let (number, attempt) = run.came_back.unwrap_or((self.next_segment, 0));
+        self.next_segment = self.next_segment.max(number + 1);
+        let segment = Segment {
+            first: run.first,
+            count: run.count,
+            next_attempt: attempt,
+            halved: run.halved,
+            holders: BTreeSet::new(),
+            done: false,
+        };
+        self.segments.insert(number, segment);
+        self.copy(number, worker)
+    }
+
+    /// Cuts the run at the front of the queue in two; a single row stays whole.
+    pub(super) fn halve_front(&mut self) {
+        let Some(run) = self.queue.pop_front() else { return };
+        let (mut first, second) = cut(run.clone(), run.count.div_ceil(2));
+        first.halved = true;
+        if let Some(mut second) = second {
+            second.halved = true;
+            self.queue.push_front(second);
+        }
+        self.queue.push_front(first);
+    }
+
+    /// Leases a segment to one more worker.
+    pub(super) fn copy(&mut self, number: u32, worker: WorkerId) -> Option<Lease> {
+        let segment = self.segments.get_mut(&number)?;
+        let attempt = segment.next_attempt;
+        segment.next_attempt += 1;
+        segment.holders.insert(worker);
+        let (first_row, row_count) = (segment.first, segment.count);
+        Some(Lease { frame: self.id, segment: number, attempt, first_row, row_count })
+    }
+
+    /// Marks a segment done; whether it was the first result. Every row's cost is counted once.
+    pub(super) fn finish(&mut self, number: u32, cost: Cost) -> bool {
+        let Some(segment) = self.segments.get_mut(&number).filter(|segment| !segment.done) else {
+            return false;
+        };
+        segment.done = true;
+        segment.holders.clear();
+        self.rows_done += segment.count;
+        let sum = &mut self.cost;
+        sum.trace_ns = sum.trace_ns.saturating_add(cost.trace_ns);
+        sum.primary = sum.primary.saturating_add(cost.primary);
+        sum.shadow = sum.shadow.saturating_add(cost.shadow);
+        sum.secondary = sum.secondary.saturating_add(cost.secondary);
+        true
+    }
+
+    /// Takes a segment from a worker; rows that nobody else renders go back to the front of the queue.
+    pub(super) fn give_up(&mut self, number: u32, worker: WorkerId) {
+        let Some(segment) = self.segments.get_mut(&number) else { return };
+        segment.holders.remove(&worker);
+        if segment.done || !segment.holders.is_empty() {
+            return;
+        }
+        if let Some(Segment { first, count, next_attempt, halved, .. }) = self.segments.remove(&number) {
+            self.queue.push_front(Run { first, count, came_back: Some((number, next_attempt)), halved });
+        }
+    }
+}
+
+/// The first `rows` rows of a run, and what is left of it. Pieces of a segment are new segments.
+fn cut(run: Run, rows: u32) -> (Run, Option<Run>) {
+    if run.count <= rows {
+        return (run, None);
+    }
+    let first = Run { count: rows, came_back: None, ..run };
+    let rest = Run { first: run.first + rows, count: run.count - rows, came_back: None, ..run };
+    (first, Some(rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: WorkerId = WorkerId(1);
+    const B: WorkerId = WorkerId(2);
+
+    fn frame(rows: u32) -> Frame {
+        Frame::new(FrameId(7), 10, rows, [Run::new(0, rows)])
+    }
+
+    #[test]
+    fn rows_that_come_back_keep_their_number_and_go_first() {
+        let mut frame = frame(30);
+        let lost = frame.take(A, 10).unwrap();
+        frame.take(B, 10).unwrap();
+        frame.give_up(lost.segment, A);
+        let again = frame.take(B, 10).unwrap();
+        assert_eq!(again, Lease { attempt: 1, ..lost });
+    }
+
+    #[test]
+    fn pieces_of_rows_that_come_back_are_new_segments() {
+        let mut frame = frame(20);
+        let lost = frame.take(A, 20).unwrap();
+        frame.give_up(lost.segment, A);
+        let pieces = [frame.take(A, 8).unwrap(), frame.take(A, 20).unwrap()];
+        assert_eq!(
+            pieces.map(|p| (p.segment, p.attempt, p.first_row, p.row_count)),
+            [(1, 0, 0, 8), (2, 0, 8, 12)]
+        );
+    }
+
+    #[test]
+    fn a_segment_somebody_else_renders_is_not_queued_again() {
+        let mut frame = frame(8);
+        let lease = frame.take(A, 8).unwrap();
+        let copy = frame.copy(lease.segment, B).unwrap();
+        assert_eq!(copy.attempt, 1);
+        frame.give_up(lease.segment, A);
+        assert!(frame.queue.is_empty());
+        frame.give_up(lease.segment, B);
+        assert_eq!(frame.queue.len(), 1);
+    }
+
+    #[test]
+    fn only_the_first_result_counts() {
+        let mut frame = frame(8);
+        let lease = frame.take(A, 8).unwrap();
+        frame.copy(lease.segment, B).unwrap();
+        let cost = Cost { primary: 80, ..Cost::default() };
+        assert!(frame.finish(lease.segment, cost));
+        assert!(!frame.finish(lease.segment, cost));
+        assert_eq!((frame.rows_done, frame.cost.primary), (8, 80));
+    }
+
+    #[test]
+    fn a_single_row_is_not_halved() {
+        let mut frame = frame(1);
+        frame.halve_front();
+        assert_eq!(frame.queue.len(), 1);
+        assert!(frame.queue[0].halved && frame.queue[0].count == 1);
+    }
+}
