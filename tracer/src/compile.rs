@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::bvh;
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Model, NormalMode, Scene};
+use crate::scene::{Model, NormalMode, Scene, rotation};
 
 /// Why a scene cannot be traced.
 #[derive(Debug, thiserror::Error)]
@@ -162,44 +162,9 @@ fn fitting_mesh(
     Ok(Arc::clone(mesh))
 }
 
-/// Scale, then rotation about x, y and z in turn, then `spin` degrees about y: the linear part of a model's placement.
+/// Scale, then the model's rotation, then `spin` degrees about y: the linear part of a model's placement.
 pub(crate) fn orientation(model: &Model, spin: f64) -> DMat3 {
-    let rotate = model.rotate;
-    rotation_y(spin)
-        * rotation_z(rotate.z)
-        * rotation_y(rotate.y)
-        * rotation_x(rotate.x)
-        * DMat3::from_diagonal(model.scale)
-}
-
-/// Sine and cosine of an angle in degrees, exact at multiples of 90, equal on every platform.
-fn sine_cosine(degrees: f64) -> (f64, f64) {
-    let turn = libm::fmod(degrees, 360.0);
-    if turn % 90.0 == 0.0 {
-        return match (turn / 90.0) as i32 {
-            1 | -3 => (1.0, 0.0),
-            2 | -2 => (0.0, -1.0),
-            3 | -1 => (-1.0, 0.0),
-            _ => (0.0, 1.0),
-        };
-    }
-    let radians = turn.to_radians();
-    (libm::sin(radians), libm::cos(radians))
-}
-
-fn rotation_x(degrees: f64) -> DMat3 {
-    let (s, c) = sine_cosine(degrees);
-    DMat3::from_cols(DVec3::X, DVec3::new(0.0, c, s), DVec3::new(0.0, -s, c))
-}
-
-fn rotation_y(degrees: f64) -> DMat3 {
-    let (s, c) = sine_cosine(degrees);
-    DMat3::from_cols(DVec3::new(c, 0.0, -s), DVec3::Y, DVec3::new(s, 0.0, c))
-}
-
-fn rotation_z(degrees: f64) -> DMat3 {
-    let (s, c) = sine_cosine(degrees);
-    DMat3::from_cols(DVec3::new(c, s, 0.0), DVec3::new(-s, c, 0.0), DVec3::Z)
+    rotation::about_y(spin) * rotation::of_model(model.rotate) * DMat3::from_diagonal(model.scale)
 }
 
 /// Bounds of a box after a linear map and a translation.
@@ -264,15 +229,10 @@ mod tests {
     }
 
     #[test]
-    fn whole_turns_change_no_bit() {
-        assert_eq!(rotation_x(360.0), DMat3::IDENTITY);
-        assert_eq!(rotation_z(-720.0), DMat3::IDENTITY);
-        assert_eq!(rotation_y(390.0), rotation_y(30.0));
-    }
-
-    #[test]
     fn a_transformed_box_holds_all_its_corners() {
-        let linear = rotation_x(20.0) * rotation_y(40.0) * DMat3::from_diagonal(DVec3::new(1.0, -2.0, 3.0));
+        let linear = rotation::about_x(20.0)
+            * rotation::about_y(40.0)
+            * DMat3::from_diagonal(DVec3::new(1.0, -2.0, 3.0));
         let (lo, hi) = (DVec3::new(-1.0, 0.0, 2.0), DVec3::new(2.0, 5.0, 3.0));
         let (tlo, thi) = transformed_bounds((lo, hi), linear, DVec3::ONE);
         for corner in 0..8 {

@@ -6,6 +6,10 @@ use glam::{DVec3, Vec3};
 
 use crate::scene::{Attenuation, Light, LightKind};
 
+/// Where a shadow ray ends, in shares of the way to the light. A surface that holds the light, up to rounding, does not
+/// hide it.
+const JUST_BEFORE: f64 = 1.0 - 1.0 / (1 << 30) as f64;
+
 /// A light of one frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EyeLight {
@@ -39,7 +43,7 @@ pub(crate) struct Incidence {
     pub direction: Vec3,
     /// From the point to the light; a direction of any length for directional lights.
     pub to_light: DVec3,
-    /// t at which `to_light` reaches the light: 1, or infinity for a directional light.
+    /// Where on the way along `to_light` the light begins: just before 1, or infinitely far for a directional light.
     pub t_light: f64,
     /// I_j A_j B_j, linear RGB.
     pub radiance: Vec3,
@@ -90,7 +94,7 @@ impl EyeLight {
         radiance.is_finite().then_some(Incidence {
             direction: direction.as_vec3(),
             to_light,
-            t_light: 1.0,
+            t_light: JUST_BEFORE,
             radiance,
         })
     }

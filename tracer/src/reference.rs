@@ -1,7 +1,7 @@
 //! The oracle: the shading equations in `f64`, every ray against every primitive, no tree, no SIMD, no shortcuts.
 //!
-//! It shares with the fast path only the scene, the cleaned triangles and [`crate::light`]'s absence: whatever it
-//! computes, it computes from the equations of the model of light, to be read against them.
+//! It shares with the fast path only the scene, the cleaned triangles and the sRGB encoding: whatever
+//! else it computes, it computes from the equations of the model of light, to be read against them.
 
 use std::sync::Arc;
 
@@ -14,6 +14,9 @@ use crate::srgb;
 
 /// Nothing nearer than this share of the scene's size is in a shadow ray's way: it is where the ray starts.
 const NEAR: f64 = 1e-11;
+
+/// Nothing at the last 10^-9 of the way to a light is in its way: a surface that holds a light does not hide it.
+const BEFORE_LIGHT: f64 = 1.0 - 1e-9;
 
 /// A scene, flattened to world space relative to the camera.
 pub struct Oracle {
@@ -149,7 +152,9 @@ impl Oracle {
     ) -> DVec3 {
         let eye = self.view.camera.position;
         let (to_light, reach) = match light.kind {
-            LightKind::Point { position } | LightKind::Spot { position, .. } => (position - eye - point, 1.0),
+            LightKind::Point { position } | LightKind::Spot { position, .. } => {
+                (position - eye - point, BEFORE_LIGHT)
+            }
             LightKind::Directional { direction } => (-direction, f64::INFINITY),
         };
         let r = to_light.length();

@@ -9,7 +9,7 @@ mod validate;
 
 pub use build::{Tree, build};
 pub use node::{Child, Node};
-pub use traverse::{RaySlabs, Walk, traverse};
+pub use traverse::{RaySlabs, traverse};
 pub use validate::{TreeError, validate};
 
 /// Deepest tree that traversal accepts: the size of its stack. A balanced tree over 2^28 primitives is 28 deep;

@@ -51,14 +51,17 @@ impl RaySlabs {
     }
 }
 
-/// What the caller says after a leaf: go on with this farthest distance of interest, or stop.
-pub type Walk = ControlFlow<(), f32>;
-
-/// Calls `leaf(first, count)` for each leaf that the ray may touch within [0, `t_max`], nearer ones earlier.
+/// Calls `leaf(first, count)` for each leaf that the ray may touch within [0, `t_max`], nearer ones earlier. It answers
+/// with the farthest distance that is still of interest, or stops the walk.
 ///
 /// `nodes` must have passed [`super::validate`], which bounds the stack.
 #[inline(always)]
-pub fn traverse(nodes: &[Node], ray: &RaySlabs, mut t_max: f32, mut leaf: impl FnMut(u32, u32) -> Walk) {
+pub fn traverse(
+    nodes: &[Node],
+    ray: &RaySlabs,
+    mut t_max: f32,
+    mut leaf: impl FnMut(u32, u32) -> ControlFlow<(), f32>,
+) -> ControlFlow<()> {
     let mut stack = [(0_u32, 0.0_f32); MAX_DEPTH + 1];
     let mut depth = 0;
     let mut node = &nodes[0];
@@ -72,10 +75,7 @@ pub fn traverse(nodes: &[Node], ray: &RaySlabs, mut t_max: f32, mut leaf: impl F
             }
             match node.child(side) {
                 Child::Empty => {}
-                Child::Leaf { first, count } => match leaf(first, count) {
-                    Walk::Continue(limit) => t_max = limit,
-                    Walk::Break(()) => return,
-                },
+                Child::Leaf { first, count } => t_max = leaf(first, count)?,
                 Child::Inner(child) if next.is_none() => next = Some(child),
                 Child::Inner(child) => {
                     stack[depth] = (child, entries[side]);
@@ -83,19 +83,14 @@ pub fn traverse(nodes: &[Node], ray: &RaySlabs, mut t_max: f32, mut leaf: impl F
                 }
             }
         }
-        let index = match next {
-            Some(child) => child,
-            None => loop {
-                if depth == 0 {
-                    return;
-                }
-                depth -= 1;
-                let (child, entry) = stack[depth];
-                if entry <= t_max * SLACK {
-                    break child;
-                }
-            },
-        };
-        node = &nodes[index as usize];
+        while next.is_none() {
+            if depth == 0 {
+                return ControlFlow::Continue(());
+            }
+            depth -= 1;
+            let (child, entry) = stack[depth];
+            next = (entry <= t_max * SLACK).then_some(child);
+        }
+        node = next.map_or(node, |index| &nodes[index as usize]);
     }
 }

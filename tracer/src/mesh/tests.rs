@@ -1,1 +1,160 @@
+//! Cleaning, the round trip through bytes, and bytes that lie.
 
+use glam::{DVec3, Vec3};
+use proptest::prelude::*;
+
+use super::*;
+
+fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
+    let triangle_materials = vec![0; triangles.len()];
+    let materials = vec![NamedMaterial { name: "clay".into(), material: Material::NEUTRAL }];
+    Mesh { positions, triangles, triangle_materials, materials, ..Mesh::default() }
+}
+
+/// A bumpy sheet of n x n squares.
+fn sheet(n: u32) -> Mesh {
+    let at = |x: u32, y: u32| y * (n + 1) + x;
+    let height = |x: u32, y: u32| f64::from((x * 7 + y * 13) % 5) * 0.1;
+    let positions = (0..=n)
+        .flat_map(|y| (0..=n).map(move |x| DVec3::new(f64::from(x), height(x, y), f64::from(y))))
+        .collect();
+    let squares = (0..n).flat_map(|y| (0..n).map(move |x| (x, y)));
+    let triangles = squares
+        .flat_map(|(x, y)| {
+            [[at(x, y), at(x + 1, y), at(x + 1, y + 1)], [at(x, y), at(x + 1, y + 1), at(x, y + 1)]]
+        })
+        .collect();
+    mesh(positions, triangles)
+}
+
+#[test]
+fn what_cannot_be_traced_is_dropped_and_counted() {
+    let positions = vec![
+        DVec3::ZERO,
+        DVec3::X,
+        DVec3::Y,
+        DVec3::new(f64::NAN, 0.0, 0.0),
+        DVec3::new(1e300, 0.0, 0.0),
+        DVec3::X * 2.0,
+    ];
+    let triangles =
+        vec![[0, 1, 2], [2, 0, 1], [0, 2, 1], [0, 1, 5], [1, 1, 2], [0, 1, 3], [0, 1, 4], [0, 5, 2]];
+    let (compiled, report) = CompiledMesh::compile(&mesh(positions, triangles)).unwrap();
+    assert_eq!(report, MeshReport { dropped_degenerate: 2, dropped_duplicate: 2, dropped_not_finite: 2 });
+    assert_eq!(compiled.triangle_count(), 2);
+    assert_eq!(compiled.bounds(), (DVec3::ZERO, DVec3::new(2.0, 1.0, 0.0)));
+}
+
+#[test]
+fn a_mesh_with_nothing_left_is_refused() {
+    let error = CompiledMesh::compile(&mesh(vec![DVec3::ZERO; 3], vec![[0, 1, 2]])).unwrap_err();
+    assert!(error.to_string().contains("no triangle left"), "{error}");
+}
+
+#[test]
+fn inconsistent_arrays_are_refused() {
+    let error = CompiledMesh::compile(&mesh(vec![DVec3::ZERO], vec![[0, 1, 2]])).unwrap_err();
+    assert!(error.to_string().contains("names vertex 1"), "{error}");
+    let mut short = sheet(2);
+    short.triangle_materials.pop();
+    assert!(CompiledMesh::compile(&short).unwrap_err().to_string().contains("material slots"));
+}
+
+#[test]
+fn twenty_thousand_copies_of_one_triangle_become_one() {
+    let (compiled, report) =
+        CompiledMesh::compile(&mesh(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]; 20_000])).unwrap();
+    assert_eq!((compiled.triangle_count(), report.dropped_duplicate), (1, 19_999));
+}
+
+#[test]
+fn bytes_come_back_as_the_same_mesh() {
+    let (compiled, _) = CompiledMesh::compile(&sheet(20)).unwrap();
+    let again = CompiledMesh::from_bytes(compiled.bytes()).unwrap();
+    assert_eq!(again.id(), compiled.id());
+    assert_eq!(again.bytes(), compiled.bytes());
+    assert_eq!(again.materials(), compiled.materials());
+    assert_eq!(again.triangle_count(), 800);
+    assert!(again.corner_normals(799).is_some());
+}
+
+#[test]
+fn normals_are_left_out_where_nobody_asks_for_them() {
+    let (flat, _) = CompiledMesh::compile_with(&sheet(20), CompileOptions { normals: false }).unwrap();
+    let (smooth, _) = CompiledMesh::compile(&sheet(20)).unwrap();
+    assert!(flat.bytes().len() < smooth.bytes().len());
+    assert_eq!((flat.has_normals(), flat.corner_normals(0)), (false, None));
+}
+
+#[test]
+fn averaged_normals_of_a_flat_sheet_stand_upright() {
+    let mut flat = sheet(4);
+    flat.positions.iter_mut().for_each(|position| position.y = 0.0);
+    let (compiled, _) = CompiledMesh::compile(&flat).unwrap();
+    for normal in compiled.corner_normals(3).unwrap() {
+        assert_eq!(normal.abs(), Vec3::Y);
+    }
+}
+
+#[test]
+fn scaling_by_a_power_of_two_changes_only_the_header() {
+    let (small, _) = CompiledMesh::compile(&sheet(6)).unwrap();
+    for exponent in [-40, -3, 17, 40] {
+        let mut scaled = sheet(6);
+        scaled.positions.iter_mut().for_each(|position| *position *= f64::from(exponent).exp2());
+        let (large, _) = CompiledMesh::compile(&scaled).unwrap();
+        assert_eq!(large.all_corners(), small.all_corners());
+        assert_eq!(large.nodes(), small.nodes());
+        assert_eq!(large.exponent(), small.exponent() + exponent);
+    }
+}
+
+#[test]
+fn a_mesh_far_from_its_origin_keeps_its_digits() {
+    let (near, _) = CompiledMesh::compile(&sheet(6)).unwrap();
+    let mut moved = sheet(6);
+    moved.positions.iter_mut().for_each(|position| *position += DVec3::splat(6e6));
+    let (far, _) = CompiledMesh::compile(&moved).unwrap();
+    for (a, b) in far.all_corners().iter().flatten().zip(near.all_corners().iter().flatten()) {
+        assert!((*a - *b).abs().max_element() < 1e-6, "{a} {b}");
+    }
+}
+
+#[test]
+fn other_formats_and_versions_are_told_apart() {
+    let text = CompiledMesh::from_bytes(b"v 0 0 0").unwrap_err().to_string();
+    assert!(text.contains("RFMESH") && text.contains("rayfarm-master compile"), "{text}");
+    let (compiled, _) = CompiledMesh::compile(&sheet(2)).unwrap();
+    let mut newer = compiled.bytes().to_vec();
+    newer[6] = 9;
+    assert!(CompiledMesh::from_bytes(&newer).unwrap_err().to_string().contains("format version 9"));
+    let cut = CompiledMesh::from_bytes(&compiled.bytes()[..200]).unwrap_err().to_string();
+    assert!(cut.contains("there are 200"), "{cut}");
+}
+
+proptest! {
+    #[test]
+    fn changed_bytes_are_refused_or_still_a_sound_mesh(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let (compiled, _) = CompiledMesh::compile(&sheet(4)).unwrap();
+        let mut bytes = compiled.bytes().to_vec();
+        for (index, value) in changes {
+            let at = index.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Ok(mesh) = CompiledMesh::from_bytes(&bytes) {
+            for triangle in 0..mesh.triangle_count() as u32 {
+                prop_assert!((mesh.slot(triangle) as usize) < mesh.material_count());
+                mesh.corner_normals(triangle);
+            }
+        }
+    }
+
+    #[test]
+    fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..400), magic in any::<bool>()) {
+        let mut all = if magic { [&MAGIC[..], &1_u16.to_le_bytes()].concat() } else { Vec::new() };
+        all.extend(bytes);
+        prop_assert!(CompiledMesh::from_bytes(&all).is_err());
+    }
+}

@@ -5,10 +5,14 @@
 //! comes from.
 
 mod surface;
+#[cfg(test)]
+mod tests;
+
+use std::ops::ControlFlow::{self, Continue};
 
 use glam::{DVec3, Vec3};
 
-use crate::bvh::{RaySlabs, Walk, traverse};
+use crate::bvh::{RaySlabs, traverse};
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
 use crate::triangle::TriangleRay;
@@ -39,158 +43,154 @@ pub(crate) struct Hit {
     rank: (u32, u32),
 }
 
+/// What a visitor of hits answers: go on up to this distance, or stop.
+type Answer = ControlFlow<(), f64>;
+
+/// Which ray is traced, and what it cannot hit.
+#[derive(Clone, Copy)]
+struct Query {
+    ray: Ray,
+    leaving: Option<PrimitiveId>,
+}
+
+impl Query {
+    fn leaves(&self, primitive: PrimitiveId) -> bool {
+        self.leaving == Some(primitive)
+    }
+}
+
 impl PreparedFrame {
     /// The nearest hit with t > 0.
     pub(crate) fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let mut best = Best { hit: None, t_max: f64::INFINITY };
-        self.each_hit(ray, f64::INFINITY, None, |hit| {
-            best.offer(hit);
-            Walk::Continue(best.t_max as f32)
+        let mut best = None;
+        let mut limit = f64::INFINITY;
+        let _ = self.each_hit(Query { ray: *ray, leaving: None }, limit, |hit| {
+            if best.is_none_or(|best| hit.wins_over(&best)) {
+                limit = hit.t;
+                best = Some(hit);
+            }
+            Answer::Continue(limit)
         });
-        best.hit
+        best
     }
 
     /// Whether anything but the primitive that the ray leaves is hit within 0 < t < `t_max`.
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f64, leaving: PrimitiveId) -> bool {
-        let mut blocked = false;
-        self.each_hit(ray, t_max, Some(leaving), |hit| {
-            blocked = blocked || hit.t < t_max;
-            if blocked { Walk::Break(()) } else { Walk::Continue(t_max as f32) }
-        });
-        blocked
+        let query = Query { ray: *ray, leaving: Some(leaving) };
+        let visit = |hit: Hit| if hit.t < t_max { Answer::Break(()) } else { Answer::Continue(t_max) };
+        self.each_hit(query, t_max, visit).is_break()
     }
 
     /// Offers every hit that may matter to `visit`, which answers with the farthest distance still of interest.
     #[inline(always)]
-    fn each_hit(
-        &self,
-        ray: &Ray,
-        t_max: f64,
-        leaving: Option<PrimitiveId>,
-        mut visit: impl FnMut(Hit) -> Walk,
-    ) {
+    fn each_hit(&self, query: Query, t_max: f64, mut visit: impl FnMut(Hit) -> Answer) -> ControlFlow<()> {
         let mut limit = t_max;
-        for (index, plane) in (self.items.first_plane()..).zip(&self.planes) {
-            let primitive = PrimitiveId { item: index, triangle: 0 };
-            if leaving == Some(primitive) {
-                continue;
-            }
-            if let Some(t) = plane.intersect(ray.origin, ray.direction) {
-                match visit(Hit { t, primitive, uv: (0.0, 0.0), rank: (index, 0) }) {
-                    Walk::Continue(farthest) => limit = limit.min(f64::from(farthest)),
-                    Walk::Break(()) => return,
-                }
-            }
+        for hit in self.plane_hits(query) {
+            limit = visit(hit)?.min(limit);
         }
         let (lo, hi) = self.nodes[0].bounds();
-        let Some(start) = approach(ray, lo, hi) else { return };
-        let origin = ray.origin + ray.direction * start;
-        let slabs = RaySlabs::new(origin.as_vec3(), ray.direction.as_vec3());
-        let scene_triangle = TriangleRay::new(origin, ray.direction);
-        traverse(&self.nodes, &slabs, shifted(limit, start), |first, count| {
-            let mut farthest = shifted(limit, start);
+        let Some(start) = approach(&query.ray, lo, hi) else { return Continue(()) };
+        let local = query.ray.from(start);
+        let triangle_ray = TriangleRay::new(local.origin, local.direction);
+        traverse(&self.nodes, &local.slabs(), shifted(limit, start), |first, count| {
             for position in first..first + count {
                 let item = self.item_at(position);
-                let answer = match self.items.get(item) {
-                    Item::Model(i) => {
-                        self.model_hits(item, &self.instances[i], ray, limit, leaving, &mut visit)
-                    }
-                    Item::Sphere(i) => {
-                        let primitive = PrimitiveId { item, triangle: 0 };
-                        let t =
-                            self.spheres[i].intersect(ray.origin, ray.direction, leaving == Some(primitive));
-                        t.map(|t| visit(Hit { t, primitive, uv: (0.0, 0.0), rank: (item, 0) }))
-                    }
-                    Item::Triangle(i) => {
-                        let primitive = PrimitiveId { item, triangle: 0 };
-                        let triangle = &self.triangles[i];
-                        let hit = if leaving == Some(primitive) {
-                            None
-                        } else {
-                            scene_triangle.intersect_exact(&triangle.rounded, &triangle.corners)
-                        };
-                        hit.map(|hit| {
-                            visit(Hit { t: hit.t + start, primitive, uv: (hit.u, hit.v), rank: (item, 0) })
-                        })
-                    }
-                };
-                match answer {
-                    None => {}
-                    Some(Walk::Continue(nearer)) => {
-                        limit = limit.min(f64::from(nearer));
-                        farthest = shifted(limit, start);
-                    }
-                    Some(Walk::Break(())) => return Walk::Break(()),
+                if let Item::Model(index) = self.items.get(item) {
+                    limit = self.instances[index].each_hit(item, query, limit, &mut visit)?;
+                } else if let Some(hit) = self.item_hit(item, query, &triangle_ray, start) {
+                    limit = visit(hit)?.min(limit);
                 }
             }
-            Walk::Continue(farthest)
-        });
+            Continue(shifted(limit, start))
+        })
     }
 
-    /// The hits of one model. `None` where it has none.
+    fn plane_hits(&self, query: Query) -> impl Iterator<Item = Hit> {
+        (self.items.first_plane()..).zip(&self.planes).filter_map(move |(item, plane)| {
+            let t = plane.intersect(query.ray.origin, query.ray.direction)?;
+            let hit = Hit::of_item(item, t, (0.0, 0.0));
+            (!query.leaves(hit.primitive)).then_some(hit)
+        })
+    }
+
+    /// The hit of a sphere or a triangle of the scene file; `triangle_ray` starts at `start`.
+    fn item_hit(&self, item: u32, query: Query, triangle_ray: &TriangleRay, start: f64) -> Option<Hit> {
+        let leaves = query.leaves(PrimitiveId { item, triangle: 0 });
+        match self.items.get(item) {
+            Item::Model(_) => None,
+            Item::Sphere(index) => {
+                let t = self.spheres[index].intersect(query.ray.origin, query.ray.direction, leaves)?;
+                Some(Hit::of_item(item, t, (0.0, 0.0)))
+            }
+            Item::Triangle(_) if leaves => None,
+            Item::Triangle(index) => {
+                let triangle = &self.triangles[index];
+                let hit = triangle_ray.intersect_exact(&triangle.rounded, &triangle.corners)?;
+                Some(Hit::of_item(item, hit.t + start, (hit.u, hit.v)))
+            }
+        }
+    }
+}
+
+impl Instance {
+    /// Offers the hits of this model to `visit`. Continues with the farthest distance still of interest.
     #[inline(always)]
-    fn model_hits(
+    fn each_hit(
         &self,
         item: u32,
-        instance: &Instance,
-        ray: &Ray,
+        query: Query,
         mut limit: f64,
-        leaving: Option<PrimitiveId>,
-        visit: &mut impl FnMut(Hit) -> Walk,
-    ) -> Option<Walk> {
-        let mesh = &*instance.mesh;
-        let local = Ray {
-            origin: instance.inverse * (ray.origin - instance.translation),
-            direction: instance.inverse * ray.direction,
-        };
+        visit: &mut impl FnMut(Hit) -> Answer,
+    ) -> Answer {
+        let mesh = &*self.mesh;
+        let ray = self.to_mesh(&query.ray);
         let (lo, hi) = mesh.root_bounds();
-        let start = approach(&local, lo, hi)?;
-        if start > limit {
-            return None;
-        }
-        let origin = local.origin + local.direction * start;
-        let slabs = RaySlabs::new(origin.as_vec3(), local.direction.as_vec3());
-        let triangle_ray = TriangleRay::new(origin, local.direction);
-        let excluded = leaving.filter(|left| left.item == item).map(|left| left.triangle);
+        let Some(start) = approach(&ray, lo, hi).filter(|&start| start <= limit) else {
+            return Continue(limit);
+        };
+        let local = ray.from(start);
+        let triangle_ray = TriangleRay::new(local.origin, local.direction);
         let corners = mesh.all_corners();
-        let mut answer = None;
-        traverse(mesh.nodes(), &slabs, shifted(limit, start), |first, count| {
+        traverse(mesh.nodes(), &local.slabs(), shifted(limit, start), |first, count| {
             for triangle in first..first + count {
                 let Some(hit) = triangle_ray.intersect(&corners[triangle as usize]) else { continue };
-                if excluded == Some(triangle) {
-                    continue;
-                }
-                let said = visit(Hit {
-                    t: hit.t + start,
-                    primitive: PrimitiveId { item, triangle },
-                    uv: (hit.u, hit.v),
-                    rank: (item, mesh.source(triangle)),
-                });
-                answer = Some(said);
-                match said {
-                    Walk::Continue(nearer) => limit = limit.min(f64::from(nearer)),
-                    Walk::Break(()) => return said,
+                let primitive = PrimitiveId { item, triangle };
+                if !query.leaves(primitive) {
+                    let rank = (item, mesh.source(triangle));
+                    limit = visit(Hit { t: hit.t + start, primitive, uv: (hit.u, hit.v), rank })?.min(limit);
                 }
             }
-            Walk::Continue(shifted(limit, start))
-        });
-        answer
+            Continue(shifted(limit, start))
+        })?;
+        Continue(limit)
+    }
+
+    fn to_mesh(&self, ray: &Ray) -> Ray {
+        Ray {
+            origin: self.inverse * (ray.origin - self.translation),
+            direction: self.inverse * ray.direction,
+        }
     }
 }
 
-/// The nearest hit so far; ties go to the lower rank.
-struct Best {
-    hit: Option<Hit>,
-    t_max: f64,
+impl Hit {
+    fn of_item(item: u32, t: f64, uv: (f64, f64)) -> Self {
+        Self { t, primitive: PrimitiveId { item, triangle: 0 }, uv, rank: (item, 0) }
+    }
+
+    fn wins_over(&self, other: &Hit) -> bool {
+        self.t < other.t || (self.t == other.t && self.rank < other.rank)
+    }
 }
 
-impl Best {
-    fn offer(&mut self, hit: Hit) {
-        let wins = self.hit.is_none_or(|best| hit.t < best.t || (hit.t == best.t && hit.rank < best.rank));
-        if wins {
-            self.t_max = hit.t;
-            self.hit = Some(hit);
-        }
+impl Ray {
+    /// The same line, starting at distance `start`: t there is t here minus `start`.
+    fn from(&self, start: f64) -> Ray {
+        Ray { origin: self.origin + self.direction * start, direction: self.direction }
+    }
+
+    fn slabs(&self) -> RaySlabs {
+        RaySlabs::new(self.origin.as_vec3(), self.direction.as_vec3())
     }
 }
 
@@ -199,7 +199,11 @@ fn shifted(limit: f64, start: f64) -> f32 {
     ((limit - start).max(0.0)) as f32
 }
 
-/// Where the ray enters a box, or 0 if it starts inside; `None` if it misses it. A margin covers rounding.
+/// How far before a box a ray is started, in units of its space (boxes lie within [-1, 1] or so): far more than the
+/// rounding of its origin to `f32` may carry it past a flat box, and far less than would cost digits.
+const RUN_UP: f64 = 1.0 / (1 << 18) as f64;
+
+/// Where to start a ray so that it enters a box soon, 0 if it starts inside or close by; `None` if it misses the box.
 #[inline(always)]
 fn approach(ray: &Ray, lo: Vec3, hi: Vec3) -> Option<f64> {
     let (mut near, mut far) = (0.0_f64, f64::INFINITY);
@@ -212,5 +216,6 @@ fn approach(ray: &Ray, lo: Vec3, hi: Vec3) -> Option<f64> {
         near = if t_entry > near { t_entry } else { near };
         far = if t_exit < far { t_exit } else { far };
     }
-    (near <= far * (1.0 + 1e-12)).then_some(near)
+    let run_up = RUN_UP / ray.direction.abs().max_element();
+    (near <= far * (1.0 + 1e-12)).then_some((near - run_up).max(0.0))
 }
