@@ -4,14 +4,23 @@
 //! kilobytes whatever it shows. Positions and transforms are `f64`: a scene may stand 10^7 extents from the origin,
 //! and digits are dropped only after the camera's position has been subtracted. Colours are linear RGB.
 
+mod error;
+mod file;
+mod framing;
+mod load;
+mod obj;
+mod read;
 pub mod rotation;
 mod validate;
+mod warnings;
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::MeshId;
 
+pub use error::SceneError;
+pub use load::{LoadedScene, load, load_model};
 pub use validate::{
     MAX_COORDINATE, MAX_DEPTH, MAX_EXPONENT, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES,
     MAX_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TRIANGLES, ValidateError,

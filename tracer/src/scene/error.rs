@@ -1,0 +1,63 @@
+//! What can be wrong with a scene and the files it names.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::mesh::MeshError;
+
+/// Why a scene or model cannot be loaded. All of them are the input's fault and name the place.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// A place in a scene file.
+    #[error("{}:{line}:{column}: {message}", path.display())]
+    InScene {
+        /// The scene file.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// Characters, counted from 1.
+        column: usize,
+        /// What is wrong, what was expected, what to do.
+        message: String,
+    },
+    /// A line of a model file.
+    #[error("{}:{line}: {message}", path.display())]
+    InModel {
+        /// The model file.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong, what was expected, what to do.
+        message: String,
+    },
+    /// A file as a whole.
+    #[error("{}: {message}", path.display())]
+    InFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, what was expected, what to do.
+        message: String,
+    },
+    /// A file that cannot be opened or read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A model that cannot be compiled, or a compiled one that is broken.
+    #[error("{}: {source}", path.display())]
+    Mesh {
+        /// The model file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+}
+
+impl SceneError {
+    pub(super) fn in_file(path: &Path, message: impl Into<String>) -> Self {
+        Self::InFile { path: path.to_owned(), message: message.into() }
+    }
+}

@@ -1,0 +1,98 @@
+//! `[[model]]`, `[[sphere]]`, `[[plane]]`, `[[triangle]]`.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use super::super::{MAX_COORDINATE, NormalMode, Plane, Sphere, Triangle};
+use super::Reading;
+use super::fault::Read;
+use super::material::Materials;
+use super::table::Table;
+use super::value::Value;
+
+pub(super) const MODEL_KEYS: &[&str] = &["file", "material", "normals", "translate", "rotate", "scale"];
+pub(super) const SPHERE_KEYS: &[&str] = &["center", "radius", "material"];
+pub(super) const PLANE_KEYS: &[&str] = &["point", "normal", "material"];
+pub(super) const TRIANGLE_KEYS: &[&str] = &["vertices", "uvs", "material"];
+
+/// A model whose file has not been loaded.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ModelText {
+    /// As the scene file names it, relative to that file.
+    pub(crate) file: PathBuf,
+    /// Offset of the file's name in the text, for messages.
+    pub(crate) at: usize,
+    /// Overrides the model's own materials.
+    pub(crate) material: Option<u32>,
+    pub(crate) normals: NormalMode,
+    pub(crate) translate: DVec3,
+    pub(crate) rotate: DVec3,
+    pub(crate) scale: DVec3,
+}
+
+pub(super) fn model(table: Table<'_>, materials: &Materials) -> Read<ModelText> {
+    let file = table.required("file")?;
+    let name = file.text()?;
+    if name.is_empty() {
+        return Err(file.must_be("the name of a model file"));
+    }
+    let modes = [("smooth", NormalMode::Smooth), ("flat", NormalMode::Flat)];
+    Ok(ModelText {
+        file: PathBuf::from(name),
+        at: file.start(),
+        material: materials.referred(table)?,
+        normals: table.read("normals", |value| value.word(&modes))?.unwrap_or(NormalMode::Smooth),
+        translate: table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
+        rotate: table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
+        scale: table.read("scale", scale)?.unwrap_or(DVec3::ONE),
+    })
+}
+
+fn scale(value: Value<'_>) -> Read<DVec3> {
+    let expected = "one number, or three in an array, none of them 0";
+    let scale = if value.value.get_ref().is_array() {
+        value.vector()?
+    } else {
+        let fits = |n: f64| n.abs() <= MAX_COORDINATE;
+        DVec3::splat(value.number("(or an array of three), not 0 and up to 1e30", fits)?)
+    };
+    let flat = scale.to_array().contains(&0.0);
+    if flat { Err(value.must_be(expected)) } else { Ok(scale) }
+}
+
+pub(super) fn sphere(table: Table<'_>, materials: &mut Materials) -> Read<Sphere> {
+    Ok(Sphere {
+        center: table.required("center")?.vector()?,
+        radius: table.required("radius")?.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)?,
+        material: materials.referred_or_neutral(table)?,
+    })
+}
+
+pub(super) fn plane(table: Table<'_>, materials: &mut Materials) -> Read<Plane> {
+    Ok(Plane {
+        point: table.required("point")?.vector()?,
+        normal: table.required("normal")?.direction()?,
+        material: materials.referred_or_neutral(table)?,
+    })
+}
+
+/// `None` for a triangle without an area: nobody can see it.
+pub(super) fn triangle(
+    table: Table<'_>,
+    materials: &mut Materials,
+    reading: &mut Reading,
+) -> Read<Option<Triangle>> {
+    if let Some(uvs) = table.get("uvs") {
+        return Err(uvs.not_yet("a triangle with texture coordinates", "leave them out"));
+    }
+    let value = table.required("vertices")?;
+    let vertices = value.three_points()?;
+    let material = materials.referred_or_neutral(table)?;
+    let [a, b, c] = vertices;
+    if a == b || b == c || c == a {
+        reading.warn(value.start(), format!("{value} has no area: the triangle is left out"));
+        return Ok(None);
+    }
+    Ok(Some(Triangle { vertices, material }))
+}

@@ -1,0 +1,248 @@
+//! From a path to a scene that is ready: files read, models compiled, everything that is left open decided.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::file::{self, Aim, CameraText, ModelText, SceneText};
+use super::read::{Kind, MAX_MODEL_BYTES, MAX_SCENE_BYTES, bytes};
+use super::{Camera, Material, Model, NormalMode, Scene, SceneError, framing, obj};
+use crate::mesh::{CompileOptions, CompiledMesh, MeshId, MeshReport};
+
+/// A scene and the meshes it names.
+#[derive(Debug)]
+pub struct LoadedScene {
+    /// What to draw.
+    pub scene: Scene,
+    /// Every mesh of the scene, once.
+    pub meshes: Vec<Arc<CompiledMesh>>,
+    /// What was accepted although it looks unintended, ready to be shown, each with its place.
+    pub warnings: Vec<String>,
+}
+
+/// Loads a scene: a scene file (`.toml`), or a model (`.obj`, or a compiled one) as a scene by itself, framed by a
+/// camera that shows all of it.
+///
+/// # Errors
+/// What is wrong with the file or one it names; the message has the place and what was expected there.
+pub fn load(path: &Path) -> Result<LoadedScene, SceneError> {
+    let loaded = match Kind::of(path)? {
+        Kind::Scene => load_scene_file(path)?,
+        Kind::Obj | Kind::Compiled => {
+            let (mesh, warnings) = load_model(path)?;
+            LoadedScene { scene: framing::bare_model(&mesh), meshes: vec![mesh], warnings }
+        }
+    };
+    loaded.scene.validate().map_err(|fault| SceneError::in_file(path, fault.to_string()))?;
+    Ok(loaded)
+}
+
+/// Loads and compiles a model, or takes a compiled one as it is. With it come warnings.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_model(path: &Path) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
+    load_model_with(path, CompileOptions { normals: true })
+}
+
+fn load_model_with(
+    path: &Path,
+    options: CompileOptions,
+) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
+    let failed = |source| SceneError::Mesh { path: path.to_owned(), source };
+    match Kind::of(path)? {
+        Kind::Scene => Err(SceneError::in_file(path, "a scene file, where a model was expected")),
+        Kind::Compiled => {
+            let mesh = CompiledMesh::from_bytes(&bytes(path, MAX_MODEL_BYTES)?).map_err(failed)?;
+            Ok((Arc::new(mesh), Vec::new()))
+        }
+        Kind::Obj => {
+            let (mesh, mut warnings) = obj::load(path)?;
+            let (compiled, report) = CompiledMesh::compile_with(&mesh, options).map_err(failed)?;
+            warnings.extend(describe(path, report));
+            Ok((Arc::new(compiled), warnings))
+        }
+    }
+}
+
+fn describe(path: &Path, report: MeshReport) -> Option<String> {
+    let MeshReport { dropped_degenerate, dropped_duplicate, dropped_not_finite } = report;
+    (report.dropped() > 0).then(|| {
+        format!(
+            "{}: triangles left out: {dropped_degenerate} without an area, {dropped_duplicate} that repeat another, \
+             {dropped_not_finite} not finite",
+            path.display()
+        )
+    })
+}
+
+fn load_scene_file(path: &Path) -> Result<LoadedScene, SceneError> {
+    let content = bytes(path, MAX_SCENE_BYTES)?;
+    let text = text_of(path, &content)?;
+    let complain = |fault: file::Fault| {
+        let (line, column) = file::place(text, fault.at);
+        SceneError::InScene { path: path.to_owned(), line, column, message: fault.message }
+    };
+    let read = file::read(text).map_err(complain)?;
+    let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| complain(w).to_string()).collect();
+    let mut models = Models::open(path, &read.models).map_err(complain)?;
+    let (scene, meshes) = assemble(path, read, &mut models)?;
+    warnings.append(&mut models.warnings);
+    Ok(LoadedScene { scene, meshes, warnings })
+}
+
+fn text_of<'b>(path: &Path, content: &'b [u8]) -> Result<&'b str, SceneError> {
+    std::str::from_utf8(content).map_err(|e| {
+        let before = String::from_utf8_lossy(content.get(..e.valid_up_to()).unwrap_or_default());
+        let (line, column) = file::place(&before, before.len());
+        let message = "not valid UTF-8: save the scene file in that encoding".to_owned();
+        SceneError::InScene { path: path.to_owned(), line, column, message }
+    })
+}
+
+/// Puts the parts together and decides what the file left open.
+fn assemble(
+    path: &Path,
+    text: SceneText,
+    models: &mut Models,
+) -> Result<(Scene, Vec<Arc<CompiledMesh>>), SceneError> {
+    let mut scene = Scene {
+        ambient: text.ambient,
+        render: text.render,
+        camera: framing::camera_showing(None),
+        background: text.background,
+        lights: text.lights,
+        materials: text.materials,
+        models: Vec::new(),
+        spheres: text.spheres,
+        planes: text.planes,
+        triangles: text.triangles,
+    };
+    for model in &text.models {
+        let instance = models.instance(model, &mut scene.materials)?;
+        scene.models.push(instance);
+    }
+    let meshes = models.take_meshes();
+    let bounds = framing::bounds(&scene, &meshes);
+    scene.camera = match text.camera {
+        Some(camera) => aimed(camera, bounds),
+        None if bounds.is_none() => {
+            let message = "[camera] is missing, and nothing finite is there to be framed; add one with `position` and `look_at`";
+            return Err(SceneError::in_file(path, message));
+        }
+        None => framing::camera_showing(bounds),
+    };
+    if scene.lights.is_empty() {
+        scene.lights.push(framing::default_light(&scene.camera));
+    }
+    Ok((scene, meshes))
+}
+
+/// The camera with the point that it looks at.
+fn aimed(text: CameraText, bounds: Option<framing::Bounds>) -> Camera {
+    let CameraText { position, aim, up, fov, zoom } = text;
+    let look_at = match aim {
+        Aim::Point(point) => point,
+        Aim::Direction(direction) => framing::point_on_axis(position, direction, bounds),
+    };
+    Camera { position, look_at, up, fov, zoom }
+}
+
+/// The models of a scene file: each file is loaded and compiled once, however often and by whatever path it is named.
+struct Models {
+    /// The real path of each file that the scene names.
+    paths: BTreeMap<PathBuf, PathBuf>,
+    /// Where the names in the scene file begin.
+    folder: PathBuf,
+    /// Real paths of the files that some instance shows smoothly.
+    smooth: BTreeSet<PathBuf>,
+    loaded: BTreeMap<PathBuf, LoadedModel>,
+    warnings: Vec<String>,
+}
+
+struct LoadedModel {
+    mesh: Arc<CompiledMesh>,
+    /// Where the scene's materials hold the file's own, once an instance has asked for them.
+    own_materials: Option<Vec<u32>>,
+}
+
+impl Models {
+    /// Finds every file, so that a missing one is told with its place in the scene file before work begins.
+    fn open(scene: &Path, models: &[ModelText]) -> Result<Self, file::Fault> {
+        let folder = scene.parent().unwrap_or(Path::new(""));
+        let mut all = Self {
+            paths: BTreeMap::new(),
+            folder: folder.to_owned(),
+            smooth: BTreeSet::new(),
+            loaded: BTreeMap::new(),
+            warnings: Vec::new(),
+        };
+        for model in models {
+            let path = folder.join(&model.file);
+            let real = path.canonicalize().map_err(|e| file::Fault {
+                at: model.at,
+                message: format!(
+                    "cannot read the model {}: {e} (paths are relative to the scene file)",
+                    path.display()
+                ),
+            })?;
+            if model.normals == NormalMode::Smooth {
+                all.smooth.insert(real.clone());
+            }
+            all.paths.insert(model.file.clone(), real);
+        }
+        Ok(all)
+    }
+
+    fn instance(&mut self, text: &ModelText, materials: &mut Vec<Material>) -> Result<Model, SceneError> {
+        let real = self.paths.get(&text.file).unwrap_or(&text.file).clone();
+        let loaded = match self.loaded.entry(real) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let normals = self.smooth.contains(entry.key());
+                // Messages name the file as the user does.
+                let path = self.folder.join(&text.file);
+                let (mesh, warnings) = load_model_with(&path, CompileOptions { normals })?;
+                self.warnings.extend(warnings);
+                entry.insert(LoadedModel { mesh, own_materials: None })
+            }
+        };
+        let slots = match text.material {
+            Some(material) => vec![material; loaded.mesh.material_count()],
+            None => loaded.own_materials(materials),
+        };
+        Ok(Model {
+            mesh: loaded.mesh.id(),
+            materials: slots,
+            normals: text.normals,
+            translate: text.translate,
+            rotate: text.rotate,
+            scale: text.scale,
+        })
+    }
+
+    /// Files with the same content are one mesh.
+    fn take_meshes(&mut self) -> Vec<Arc<CompiledMesh>> {
+        let loaded = std::mem::take(&mut self.loaded);
+        let by_id: BTreeMap<MeshId, Arc<CompiledMesh>> =
+            loaded.into_values().map(|model| (model.mesh.id(), model.mesh)).collect();
+        by_id.into_values().collect()
+    }
+}
+
+impl LoadedModel {
+    fn own_materials(&mut self, materials: &mut Vec<Material>) -> Vec<u32> {
+        let mesh = &self.mesh;
+        self.own_materials
+            .get_or_insert_with(|| {
+                let first = materials.len() as u32;
+                materials.extend(mesh.materials().into_iter().map(|slot| slot.material));
+                (first..materials.len() as u32).collect()
+            })
+            .clone()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,103 @@
+//! The logical lines of an OBJ or MTL text: comments gone, continuations joined, numbered as in the file.
+
+use std::borrow::Cow;
+
+/// A logical line: a keyword and what follows it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Line<'t> {
+    /// Number of the first physical line, counted from 1.
+    pub(super) number: usize,
+    /// Trimmed, not empty.
+    pub(super) text: Cow<'t, str>,
+}
+
+impl Line<'_> {
+    pub(super) fn keyword(&self) -> &str {
+        keyword(&self.text)
+    }
+
+    /// What follows the keyword.
+    pub(super) fn rest(&self) -> &str {
+        self.text.get(self.keyword().len()..).unwrap_or_default().trim_start()
+    }
+}
+
+fn keyword(text: &str) -> &str {
+    text.split_ascii_whitespace().next().unwrap_or_default()
+}
+
+/// Whether the rest of such a line is a name: names may hold `#`, and paths may end in a backslash.
+fn holds_a_name(keyword: &str) -> bool {
+    matches!(keyword, "o" | "g" | "usemtl" | "mtllib" | "newmtl" | "bump" | "disp" | "decal")
+        || keyword.starts_with("map_")
+}
+
+/// The logical lines of a text, with `\n`, `\r\n` or both as line ends.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
+    let mut physical = text.split('\n').zip(1..);
+    std::iter::from_fn(move || {
+        loop {
+            let (line, number) = physical.next()?;
+            let line = line.trim();
+            if holds_a_name(keyword(line)) {
+                return Some(Line { number, text: Cow::Borrowed(line) });
+            }
+            let mut end = without_comment(line);
+            let mut joined = String::new();
+            while let Some(continued) = end.strip_suffix('\\') {
+                joined.push_str(continued);
+                joined.push(' ');
+                end = physical.next().map_or("", |(line, _)| without_comment(line.trim()));
+            }
+            let text = if joined.is_empty() {
+                Cow::Borrowed(end)
+            } else {
+                Cow::Owned((joined + end).trim().to_owned())
+            };
+            if !text.is_empty() {
+                return Some(Line { number, text });
+            }
+        }
+    })
+}
+
+fn without_comment(line: &str) -> &str {
+    line.split('#').next().unwrap_or_default().trim_end()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Vec<(usize, String)> {
+        lines(text).map(|line| (line.number, line.text.into_owned())).collect()
+    }
+
+    fn owned(expected: &[(usize, &str)]) -> Vec<(usize, String)> {
+        expected.iter().map(|(number, text)| (*number, (*text).to_owned())).collect()
+    }
+
+    #[test]
+    fn comments_and_blank_lines_are_gone_and_numbers_stay() {
+        let text = "# head\\\n\nv 1 2 3 # first\r\n  f 1 2 3#x\n#\n\tv 4\t5 6  ";
+        assert_eq!(read(text), owned(&[(3, "v 1 2 3"), (4, "f 1 2 3"), (6, "v 4\t5 6")]));
+    }
+
+    #[test]
+    fn continuations_are_joined_under_the_first_number() {
+        let text = "f 1 2 \\\r\n3 \\\n 4 # end\nv 1 2\\\n";
+        assert_eq!(read(text), owned(&[(1, "f 1 2  3  4"), (4, "v 1 2")]));
+        assert_eq!(read("f 1 \\"), owned(&[(1, "f 1")]));
+        assert_eq!(read("\\\n\\\n"), []);
+    }
+
+    #[test]
+    fn names_keep_their_hashes_and_backslashes() {
+        let text = "usemtl red#2\nmtllib C:\\models\\\nmap_Kd a#b.png\nv 1 2 3";
+        let expected =
+            [(1, "usemtl red#2"), (2, "mtllib C:\\models\\"), (3, "map_Kd a#b.png"), (4, "v 1 2 3")];
+        assert_eq!(read(text), owned(&expected));
+        let line = lines("usemtl  dark red").next().unwrap();
+        assert_eq!((line.keyword(), line.rest()), ("usemtl", "dark red"));
+    }
+}

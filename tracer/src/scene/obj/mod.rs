@@ -1,0 +1,158 @@
+//! Wavefront OBJ with its material libraries: a text in, a [`Mesh`] out.
+//!
+//! A first reading checks every line and keeps what is geometry ([`geometry`]); `tobj` cuts polygons into triangles
+//! and pairs positions with normals; materials are put back by the order of the triangles.
+
+mod geometry;
+mod lines;
+mod materials;
+
+#[cfg(test)]
+mod tests;
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::panic::catch_unwind;
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use super::read::{MAX_MODEL_BYTES, bytes};
+use super::warnings::Warnings;
+use super::{Material, SceneError};
+use crate::mesh::{Mesh, NamedMaterial};
+use geometry::{Geometry, MaterialRun};
+use materials::Library;
+
+/// Reads a model. With it come warnings about what was left out.
+///
+/// # Errors
+/// A file that cannot be read, a line that is no OBJ, an index that points nowhere, a used vertex that is not finite,
+/// a file without faces.
+pub(super) fn load(path: &Path) -> Result<(Mesh, Vec<String>), SceneError> {
+    let content = bytes(path, MAX_MODEL_BYTES)?;
+    let mut warnings = Warnings::about(path);
+    let geometry = read_geometry(path, &content, &mut warnings)?;
+    drop(content);
+    let triangles: usize = geometry.runs.iter().map(|run| run.triangles).sum();
+    if triangles == 0 {
+        return Err(SceneError::in_file(path, "no faces in the file; a model needs at least one `f` line"));
+    }
+    let (library, messages) = read_libraries(path, &geometry, &mut warnings);
+    let mut mesh = parse(path, &geometry.text, triangles, &mut warnings)?;
+    assign_materials(path, &mut mesh, &geometry.runs, &library)?;
+    let mut all = warnings.into_messages();
+    all.extend(messages);
+    Ok((mesh, all))
+}
+
+/// Comments in old files are in old encodings: what is no UTF-8 is replaced.
+fn read_geometry(path: &Path, content: &[u8], warnings: &mut Warnings) -> Result<Geometry, SceneError> {
+    let text: Cow<'_, str> = String::from_utf8_lossy(content);
+    let text = text.trim_start_matches('\u{feff}');
+    let failed = |e: geometry::LineError| SceneError::InModel {
+        path: path.to_owned(),
+        line: e.line,
+        message: e.message,
+    };
+    let geometry = geometry::read(text, true, warnings).map_err(failed)?;
+    if !geometry.uneven_normals {
+        return Ok(geometry);
+    }
+    warnings.at_file("some corners have a normal and some have none: normals are averaged instead");
+    // What is odd has been told the first time.
+    geometry::read(text, false, &mut Warnings::about(path)).map_err(failed)
+}
+
+/// All libraries that the file names. Where one is missing, unknown materials need no warnings of their own.
+fn read_libraries(path: &Path, geometry: &Geometry, warnings: &mut Warnings) -> (Library, Vec<String>) {
+    let mut library = Library::new();
+    let mut messages = Vec::new();
+    let mut complete = true;
+    for (line, names) in &geometry.libraries {
+        let (whole, more) = materials::load(path, names, *line, &mut library, warnings);
+        complete &= whole;
+        messages.extend(more);
+    }
+    if complete {
+        warn_of_unknown(&geometry.runs, &library, warnings);
+    }
+    (library, messages)
+}
+
+fn warn_of_unknown(runs: &[MaterialRun], library: &Library, warnings: &mut Warnings) {
+    let mut unknown: BTreeMap<&str, usize> = BTreeMap::new();
+    for run in runs {
+        if let Some(name) = run.material.as_deref().filter(|name| find(library, name).is_none()) {
+            unknown.entry(name).or_insert(run.line);
+        }
+    }
+    for (name, line) in unknown {
+        let name: String = name.chars().take(60).collect();
+        let message = format!("no material library defines `{name}`: drawn with the neutral material");
+        warnings.at_line(line, message);
+    }
+}
+
+/// The material of a name; some writers put a comment behind it.
+fn find(library: &Library, name: &str) -> Option<Material> {
+    let bare = || name.split_once(" #").and_then(|(bare, _)| library.get(bare.trim_end()));
+    library.get(name).or_else(bare).copied()
+}
+
+fn parse(path: &Path, text: &str, triangles: usize, warnings: &mut Warnings) -> Result<Mesh, SceneError> {
+    let options =
+        tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
+    // Every line has been checked, but what other people's code makes of them must not end the program.
+    let parsed = catch_unwind(|| {
+        tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Err(tobj::LoadError::OpenFileFailed))
+    });
+    let refused = |reason: String| SceneError::in_file(path, format!("the model cannot be read: {reason}"));
+    let (mut models, _) = parsed
+        .map_err(|_| refused("the parser gave up".into()))?
+        .map_err(|reason| refused(reason.to_string()))?;
+    let parsed = models.pop().ok_or_else(|| refused("no geometry".into()))?.mesh;
+    if !models.is_empty() || parsed.indices.len() != 3 * triangles {
+        return Err(refused(format!("{} corners for {triangles} triangles", parsed.indices.len())));
+    }
+    let positions: Vec<DVec3> = points(&parsed.positions).collect();
+    let mut normals: Vec<Vec3> =
+        points(&parsed.normals).map(|normal| normal.normalize_or_zero().as_vec3()).collect();
+    if !normals.is_empty() && normals.len() != positions.len() {
+        warnings.at_file("normals do not fit the vertices: they are averaged instead");
+        normals.clear();
+    }
+    let triangles = parsed.indices.chunks_exact(3).filter_map(|corner| corner.try_into().ok()).collect();
+    Ok(Mesh { positions, normals, triangles, ..Mesh::default() })
+}
+
+fn points(numbers: &[f64]) -> impl Iterator<Item = DVec3> {
+    numbers.chunks_exact(3).map(DVec3::from_slice)
+}
+
+/// Gives every triangle its slot; a slot for each material that triangles use, in the order of their first use.
+fn assign_materials(
+    path: &Path,
+    mesh: &mut Mesh,
+    runs: &[MaterialRun],
+    library: &Library,
+) -> Result<(), SceneError> {
+    let mut slots: BTreeMap<Option<&str>, u16> = BTreeMap::new();
+    for run in runs.iter().filter(|run| run.triangles > 0) {
+        let name = run.material.as_deref();
+        let slot = match slots.get(&name) {
+            Some(slot) => *slot,
+            None => {
+                let slot = u16::try_from(mesh.materials.len()).map_err(|_| {
+                    SceneError::in_file(path, "more than 65536 materials are used; merge some of them")
+                })?;
+                let material = name.and_then(|name| find(library, name)).unwrap_or(Material::NEUTRAL);
+                mesh.materials.push(NamedMaterial { name: name.unwrap_or("neutral").to_owned(), material });
+                slots.insert(name, slot);
+                slot
+            }
+        };
+        mesh.triangle_materials.extend(std::iter::repeat_n(slot, run.triangles));
+    }
+    Ok(())
+}
