@@ -77,7 +77,7 @@ fn the_point_on_the_axis_is_the_one_nearest_to_the_middle() {
 fn bounds_follow_scale_rotation_and_translation() {
     let mesh = Arc::new(box_mesh(DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0)));
     let mut scene = bare_model(&mesh);
-    assert_eq!(bounds(&scene, &[mesh.clone()]), Some((DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0))));
+    assert_eq!(bounds(&scene, std::slice::from_ref(&mesh)), Some((DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0))));
     scene.models[0].scale = DVec3::new(1.0, -1.0, 0.5);
     scene.models[0].rotate = DVec3::new(0.0, 90.0, 0.0);
     scene.models[0].translate = DVec3::new(10.0, 0.0, 0.0);
