@@ -1,5 +1,7 @@
 //! Sessions over in-memory pipes: order, back pressure, endings.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
+
 mod common;
 
 use std::time::Duration;
