@@ -6,3 +6,44 @@
 
 pub mod farm;
 pub mod scheduler;
+
+mod camera_control;
+mod cli;
+mod commands;
+mod display;
+mod error;
+mod logging;
+mod orbit;
+mod output;
+mod progress;
+mod report;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use cli::Invocation;
+
+/// The whole program: does what the command line (program name first) asks for and says how it went.
+///
+/// Exit status: 0 done; 2 wrong use or wrong input; 1 anything else. What is wrong is told on standard error.
+pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let (command, log) = match Invocation::parse(args) {
+        Ok(Invocation::LocalWorker(args)) => {
+            eprintln!("error: this build has no local worker to run with {args:?}");
+            return ExitCode::FAILURE;
+        }
+        Ok(Invocation::Command(command, log)) => (command, log),
+        Err(error) => {
+            let _ = error.print(); // there is nowhere left to say that it could not be said
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1));
+        }
+    };
+    logging::start(log);
+    match commands::run(command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            error.exit_code()
+        }
+    }
+}

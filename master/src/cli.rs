@@ -1,0 +1,216 @@
+//! The command line: what may be asked for, and how wrong use is refused.
+//!
+//! Parsing touches nothing outside the arguments. `view` is the default command, so `rayfarm-master SCENE` opens a
+//! window. The hidden `local-worker` is how the master starts itself again as its own render node; everything after
+//! that word belongs to the worker's own command line.
+
+use std::ffi::OsString;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::error::ErrorKind;
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use crate::scheduler::policy::SegmentPolicy;
+use values::{Size, degrees, frame_count, listen_address, sample_count, size, thread_count, worker_count};
+
+mod values;
+
+/// The word that turns the master into a worker.
+pub(crate) const LOCAL_WORKER: &str = "local-worker";
+
+/// What one command line asks for.
+#[derive(Debug)]
+pub(crate) enum Invocation {
+    /// Be a render node of a master on this machine; the arguments are the worker's.
+    LocalWorker(Vec<OsString>),
+    /// Do one of the commands.
+    Command(Command, LogArgs),
+}
+
+impl Invocation {
+    /// Reads a whole command line, program name first.
+    ///
+    /// # Errors
+    /// clap's error, which carries the message and the exit status (2; 0 for `--help` and `--version`).
+    pub(crate) fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
+        let args: Vec<OsString> = args.into_iter().collect();
+        if args.get(1).is_some_and(|word| word == LOCAL_WORKER) {
+            return Ok(Self::LocalWorker(args.into_iter().skip(2).collect()));
+        }
+        let matches = Cli::command().try_get_matches_from(args)?;
+        refuse_options_before_the_command(&matches)?;
+        let cli = Cli::from_arg_matches(&matches)?;
+        Ok(Self::Command(cli.command.unwrap_or(Command::View(cli.view)), cli.log))
+    }
+}
+
+/// The options of the default command are known before a command's name too, but mean nothing to that command:
+/// ignoring them in silence would render something else than was asked for.
+fn refuse_options_before_the_command(matches: &ArgMatches) -> Result<(), clap::Error> {
+    let Some(name) = matches.subcommand_name() else { return Ok(()) };
+    let mut cli = Cli::command();
+    cli.build(); // names arguments as its own messages do
+    let given = |arg: &&Arg| {
+        !arg.is_global_set() && matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine)
+    };
+    let stray = cli.get_arguments().find(given).map(ToString::to_string);
+    stray.map_or(Ok(()), |stray| {
+        let message = format!("{stray} stands before {name}; what belongs to {name} follows it");
+        Err(cli.error(ErrorKind::ArgumentConflict, message))
+    })
+}
+
+/// An interactive ray tracer that renders with all the machines of a room.
+///
+/// Without a command it opens a window: rayfarm-master [SCENE] is rayfarm-master view [SCENE].
+#[derive(Debug, Parser)]
+#[command(name = "rayfarm-master", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    view: ViewArgs,
+    #[command(flatten)]
+    log: LogArgs,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Show a scene in a window; workers on this machine render it, and others may join.
+    View(ViewArgs),
+    /// Render frames to files; needs no display.
+    Render(RenderArgs),
+    /// Write a model with its bounding volume hierarchy, ready to load.
+    Compile(CompileArgs),
+    /// Measure the tracer alone, in this one process, without the farm.
+    Bench(BenchArgs),
+}
+
+/// `view`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// A scene (.toml), or a model (.obj or compiled); without it, the room that comes with rayfarm.
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) farm: FarmArgs,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+    /// End after N frames; without it, the window stays until Esc.
+    #[arg(long, value_name = "N", value_parser = frame_count)]
+    pub(crate) frames: Option<u32>,
+    /// Write a CSV line per frame.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) fps_log: Option<PathBuf>,
+}
+
+/// `render`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct RenderArgs {
+    /// A scene (.toml), or a model (.obj or compiled).
+    pub(crate) scene: PathBuf,
+    /// The picture to write: .png or .ppm; frame-%04d.png numbers a sequence from 0000.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) farm: FarmArgs,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+    /// Frames to render.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
+    pub(crate) frames: u32,
+    /// Write a CSV line per frame.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) fps_log: Option<PathBuf>,
+    /// Print one line of JSON about the run on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `compile`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct CompileArgs {
+    /// The model (.obj).
+    pub(crate) model: PathBuf,
+    /// The compiled model to write.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+}
+
+/// `bench`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct BenchArgs {
+    /// A scene (.toml), or a model (.obj or compiled).
+    pub(crate) scene: PathBuf,
+    /// Render threads; without it, all cores.
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+    /// Frames to measure, after one that is not counted.
+    #[arg(long, value_name = "N", default_value = "20", value_parser = frame_count)]
+    pub(crate) frames: u32,
+    /// Print one line of JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Who renders.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct FarmArgs {
+    /// Where workers connect, for workers on other machines [default: 127.0.0.1:7117].
+    #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address)]
+    pub(crate) listen: Option<SocketAddr>,
+    /// Worker processes on this machine that the master starts and ends.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
+    local_workers: u32,
+    /// Start no worker: wait for others to connect.
+    #[arg(long, conflicts_with = "local_workers")]
+    no_local_workers: bool,
+    /// Render threads of each local worker; without it, they share all cores.
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(crate) threads: Option<usize>,
+    /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
+    #[arg(long, value_name = "POLICY", default_value = "adaptive")]
+    pub(crate) segment: SegmentPolicy,
+}
+
+impl FarmArgs {
+    /// Local workers to start.
+    pub(crate) fn local_workers(&self) -> u32 {
+        if self.no_local_workers { 0 } else { self.local_workers }
+    }
+}
+
+/// What the picture is like; each wins over the scene file.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct PictureArgs {
+    /// Picture size in pixels.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<Size>,
+    /// Rays per pixel: a square number, 1, 4, 9, 16, ...
+    #[arg(long, value_name = "N", value_parser = sample_count)]
+    pub(crate) samples: Option<u32>,
+    /// The camera goes round its look-at point by this angle over the frames.
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = degrees)]
+    pub(crate) orbit: f64,
+    /// The models turn about y by this angle each frame.
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = degrees)]
+    pub(crate) spin: f64,
+}
+
+/// How much is told on standard error; RUST_LOG wins over both.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct LogArgs {
+    /// Tell more on standard error.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
+    /// Tell only of errors on standard error.
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,156 @@
+use super::*;
+
+fn parse(line: &str) -> Result<Invocation, clap::Error> {
+    Invocation::parse(line.split_whitespace().map(OsString::from))
+}
+
+fn view(line: &str) -> ViewArgs {
+    match parse(line) {
+        Ok(Invocation::Command(Command::View(view), _)) => view,
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+fn render(line: &str) -> RenderArgs {
+    match parse(line) {
+        Ok(Invocation::Command(Command::Render(render), _)) => render,
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+fn refused(line: &str) -> String {
+    match parse(line) {
+        Err(error) => {
+            assert_eq!(error.exit_code(), 2, "{line}");
+            error.to_string()
+        }
+        Ok(invocation) => panic!("{line} was taken as {invocation:?}"),
+    }
+}
+
+#[test]
+fn view_is_the_default_command() {
+    assert_eq!(view("rayfarm-master").scene, None);
+    for line in ["rayfarm-master a.toml", "rayfarm-master view a.toml"] {
+        assert_eq!(view(line).scene, Some("a.toml".into()), "{line}");
+    }
+    assert_eq!(view("rayfarm-master --size 64x48 a.toml").picture.size, Some(Size { width: 64, height: 48 }));
+}
+
+#[test]
+fn what_is_not_said_is_as_documented() {
+    let args = render("rayfarm-master render a.toml -o b.png");
+    assert_eq!((args.scene, args.output), ("a.toml".into(), "b.png".into()));
+    assert_eq!((args.frames, args.json, args.fps_log), (1, false, None));
+    assert_eq!((args.farm.listen, args.farm.local_workers(), args.farm.threads), (None, 1, None));
+    assert_eq!(args.farm.segment, SegmentPolicy::Adaptive);
+    assert_eq!((args.picture.size, args.picture.samples), (None, None));
+    assert_eq!((args.picture.orbit, args.picture.spin), (0.0, 0.0));
+    assert_eq!(view("rayfarm-master").frames, None);
+}
+
+#[test]
+fn every_common_option_is_read() {
+    let args = render(
+        "rayfarm-master render --listen 0.0.0.0:7117 --local-workers 3 --threads 2 --size 1024x768 --samples 9 \
+         --segment smart:24 --frames 100 --orbit -90.5 --spin 2 --fps-log log.csv --json -o f%04d.ppm a.obj",
+    );
+    assert_eq!(args.farm.listen, Some(SocketAddr::from(([0, 0, 0, 0], 7117))));
+    assert_eq!((args.farm.local_workers(), args.farm.threads), (3, Some(2)));
+    assert_eq!(args.farm.segment, SegmentPolicy::Smart(24));
+    assert_eq!(args.picture.size, Some(Size { width: 1024, height: 768 }));
+    assert_eq!(args.picture.samples, Some(9));
+    assert_eq!((args.picture.orbit, args.picture.spin), (-90.5, 2.0));
+    assert_eq!((args.frames, args.fps_log, args.json), (100, Some("log.csv".into()), true));
+}
+
+#[test]
+fn the_other_commands_are_read() {
+    match parse("rayfarm-master compile bust.obj -o bust.rfm") {
+        Ok(Invocation::Command(Command::Compile(args), _)) => {
+            assert_eq!((args.model, args.output), ("bust.obj".into(), "bust.rfm".into()));
+        }
+        other => panic!("{other:?}"),
+    }
+    match parse("rayfarm-master bench a.toml --threads 1 --frames 5 --samples 4 --json") {
+        Ok(Invocation::Command(Command::Bench(args), _)) => {
+            assert_eq!((args.threads, args.frames, args.json), (Some(1), 5, true));
+            assert_eq!(args.picture.samples, Some(4));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn no_local_workers_is_none() {
+    assert_eq!(view("rayfarm-master --no-local-workers").farm.local_workers(), 0);
+    assert_eq!(view("rayfarm-master --local-workers 0").farm.local_workers(), 0);
+}
+
+#[test]
+fn the_local_worker_gets_its_arguments_untouched() {
+    match parse("rayfarm-master local-worker --master 127.0.0.1:1 --help") {
+        Ok(Invocation::LocalWorker(args)) => assert_eq!(args, ["--master", "127.0.0.1:1", "--help"]),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn wrong_use_is_status_2_and_says_what_was_expected() {
+    for (line, hint) in [
+        ("rayfarm-master --size 0x5", "1024x768"),
+        ("rayfarm-master --size 800", "1024x768"),
+        ("rayfarm-master --size 800x", "1024x768"),
+        ("rayfarm-master --size 16385x1", "16384"),
+        ("rayfarm-master --samples 0", "square number"),
+        ("rayfarm-master --samples 2", "square number"),
+        ("rayfarm-master --samples 4294967296", "square number"),
+        ("rayfarm-master --frames 0", "from 1"),
+        ("rayfarm-master --threads 0", "from 1"),
+        ("rayfarm-master --local-workers -1", "-1"),
+        ("rayfarm-master --local-workers 2 --no-local-workers", "cannot be used with"),
+        ("rayfarm-master --listen 7117", "0.0.0.0:7117"),
+        ("rayfarm-master --listen example.org:7117", "0.0.0.0:7117"),
+        ("rayfarm-master --segment static", "static:ROWS"),
+        ("rayfarm-master --segment smart:0", "smart:ROWS"),
+        ("rayfarm-master --orbit nan", "degrees"),
+        ("rayfarm-master --spin inf", "degrees"),
+        ("rayfarm-master --colour", "--colour"),
+        ("rayfarm-master a.toml b.toml", "b.toml"),
+        ("rayfarm-master render a.toml", "--output"),
+        ("rayfarm-master render -o b.png", "<SCENE>"),
+        ("rayfarm-master compile a.obj", "--output"),
+        ("rayfarm-master bench", "<SCENE>"),
+        ("rayfarm-master view --json", "--json"),
+        ("rayfarm-master -v -q", "cannot be used with"),
+        ("rayfarm-master --size 5x5 render a.toml -o b.png", "--size <WxH> stands before render"),
+        ("rayfarm-master a.toml render b.toml -o b.png", "[SCENE] stands before render"),
+    ] {
+        let message = refused(line);
+        assert!(message.contains(hint), "{line}: {message}");
+    }
+}
+
+#[test]
+fn log_options_stand_before_or_after_the_command() {
+    for line in
+        ["rayfarm-master render a.toml -o b.png -v", "rayfarm-master -v a.toml", "rayfarm-master view -v"]
+    {
+        match parse(line) {
+            Ok(Invocation::Command(_, log)) => assert!(log.verbose && !log.quiet, "{line}"),
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    for line in ["rayfarm-master --help", "rayfarm-master render --help", "rayfarm-master --version"] {
+        assert_eq!(parse(line).unwrap_err().exit_code(), 0, "{line}");
+    }
+}
+
+#[test]
+fn the_definition_itself_is_sound() {
+    Cli::command().debug_assert();
+}

@@ -1,0 +1,80 @@
+//! The values of options: each parser says what was expected, so clap's message names option, value and remedy.
+
+use std::net::SocketAddr;
+
+use rayfarm_tracer::image::MAX_SIDE;
+use rayfarm_tracer::scene::MAX_SAMPLES;
+
+const MAX_FRAMES: u32 = 10_000_000;
+const MAX_LOCAL_WORKERS: u32 = 64;
+const MAX_THREADS: usize = 1_024;
+
+/// Picture size in pixels; neither side is zero or above [`MAX_SIDE`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size {
+    /// Pixels per row.
+    pub(crate) width: u32,
+    /// Rows.
+    pub(crate) height: u32,
+}
+
+/// `1024x768`.
+pub(super) fn size(text: &str) -> Result<Size, String> {
+    let expected = || format!("expected WIDTHxHEIGHT, each from 1 to {MAX_SIDE}, such as 1024x768");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
+    let side = |digits: &str| match digits.parse() {
+        Ok(side @ 1..=MAX_SIDE) => Ok(side),
+        _ => Err(expected()),
+    };
+    Ok(Size { width: side(width)?, height: side(height)? })
+}
+
+/// A square number of rays.
+pub(super) fn sample_count(text: &str) -> Result<u32, String> {
+    let expected = || format!("expected a square number from 1 to {MAX_SAMPLES}: 1, 4, 9, 16, ...");
+    let samples: u32 = text.parse().map_err(|_| expected())?;
+    let square = samples.isqrt().pow(2) == samples;
+    if square && (1..=MAX_SAMPLES).contains(&samples) { Ok(samples) } else { Err(expected()) }
+}
+
+/// One frame or more.
+pub(super) fn frame_count(text: &str) -> Result<u32, String> {
+    whole_number(text, 1, MAX_FRAMES)
+}
+
+/// Local workers; zero is none.
+pub(super) fn worker_count(text: &str) -> Result<u32, String> {
+    whole_number(text, 0, MAX_LOCAL_WORKERS)
+}
+
+/// One render thread or more.
+pub(super) fn thread_count(text: &str) -> Result<usize, String> {
+    whole_number(text, 1, MAX_THREADS)
+}
+
+/// A finite angle.
+pub(super) fn degrees(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(angle) if angle.is_finite() => Ok(angle),
+        _ => Err("expected an angle in degrees, such as 360 or -12.5".to_owned()),
+    }
+}
+
+/// `0.0.0.0:7117`; names are not looked up, because the address is one of this machine's own.
+pub(super) fn listen_address(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        "expected ADDR:PORT with an address of this machine in digits: \
+         0.0.0.0:7117 lets other machines connect, 127.0.0.1:7117 only this one, [::]:7117 is for IPv6"
+            .to_owned()
+    })
+}
+
+fn whole_number<T>(text: &str, least: T, most: T) -> Result<T, String>
+where
+    T: std::str::FromStr + PartialOrd + std::fmt::Display,
+{
+    match text.parse() {
+        Ok(number) if number >= least && number <= most => Ok(number),
+        _ => Err(format!("expected a whole number from {least} to {most}")),
+    }
+}

@@ -1,0 +1,171 @@
+//! `bench`: the tracer alone, in this one process: what a farm of one worker could reach if it cost nothing.
+
+use std::io::{self, Write};
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::{Cancelled, CompiledScene, PreparedFrame, RayCounts, TILE_SIZE, render_rows};
+
+use super::source::{Source, animation};
+use crate::cli::BenchArgs;
+use crate::display::overlay::{counted, grouped};
+use crate::error::CommandError;
+use crate::report::{BenchReport, MsPerFrame, RaysPerFrame, print_json, round_to_us};
+
+/// Measures the frames of a scene and tells the figures on standard output.
+///
+/// # Errors
+/// A wrong scene.
+pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
+    let started = Instant::now();
+    let source = Source::load(&args.scene)?;
+    let view = source.view(&args.picture)?;
+    let scene = Arc::new(source.compiled()?);
+    let load = started.elapsed();
+    let threads = args.threads.unwrap_or_else(all_cores);
+    let animation = animation(&args.picture, args.frames);
+
+    let mut bench = Bench::new(scene, &view, threads);
+    bench.frame(&view)?; // warms caches and page tables
+    bench.forget();
+    for index in 0..u64::from(args.frames) {
+        bench.frame(&animation.view(&view, index))?;
+    }
+    let report = bench.report(&view, load);
+    if args.json { print_json(&report) } else { print_table(&report) }
+}
+
+fn all_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+struct Bench {
+    scene: Arc<CompiledScene>,
+    threads: usize,
+    pixels: Vec<u8>,
+    times: Vec<Duration>,
+    rays: RayCounts,
+}
+
+impl Bench {
+    fn new(scene: Arc<CompiledScene>, view: &FrameView, threads: usize) -> Self {
+        let pixels = vec![0; view.width as usize * view.height as usize * 3];
+        Self { scene, threads, pixels, times: Vec::new(), rays: RayCounts::default() }
+    }
+
+    /// One frame, with all that belongs to it: preparing it for its camera and tracing it.
+    fn frame(&mut self, view: &FrameView) -> Result<(), CommandError> {
+        let started = Instant::now();
+        let frame = PreparedFrame::new(Arc::clone(&self.scene), view).map_err(CommandError::failed)?;
+        let rays = trace(&frame, view, &mut self.pixels, self.threads).map_err(|_| {
+            CommandError::Failed("the tracer stopped although nobody cancelled it".to_owned())
+        })?;
+        self.times.push(started.elapsed());
+        self.rays += rays;
+        Ok(())
+    }
+
+    fn forget(&mut self) {
+        self.times.clear();
+        self.rays = RayCounts::default();
+    }
+
+    fn report(&self, view: &FrameView, load: Duration) -> BenchReport {
+        let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
+        let RayCounts { primary, shadow, secondary, .. } = self.rays;
+        let rays = RaysPerFrame { primary, shadow, secondary };
+        let seconds = self.times.iter().sum::<Duration>().as_secs_f64();
+        BenchReport {
+            frames,
+            width: view.width,
+            height: view.height,
+            samples: view.samples,
+            threads: self.threads,
+            triangles: self.scene.triangle_count(),
+            load_ms: round_to_us(load),
+            rays_per_frame: rays.mean(frames),
+            ms_per_frame: MsPerFrame::of(&self.times),
+            rays_per_second: if seconds > 0.0 { rays.total() as f64 / seconds } else { 0.0 },
+            blake3: blake3::hash(&self.pixels).to_hex().to_string(),
+        }
+    }
+}
+
+/// Traces a frame with `threads` threads, each taking the next band of rows that nobody has begun.
+fn trace(
+    frame: &PreparedFrame,
+    view: &FrameView,
+    pixels: &mut [u8],
+    threads: usize,
+) -> Result<RayCounts, Cancelled> {
+    let band_bytes = view.width as usize * 3 * TILE_SIZE as usize;
+    let bands = Mutex::new(pixels.chunks_mut(band_bytes).zip(bands(view.height)));
+    let work = || {
+        let mut rays = RayCounts::default();
+        loop {
+            let next = bands.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let Some((out, rows)) = next else { return Ok(rays) };
+            rays += render_rows(frame, rows, out, &|| false)?;
+        }
+    };
+    if threads == 1 {
+        return work();
+    }
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let mut rays = RayCounts::default();
+        for thread in threads {
+            rays += thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        }
+        Ok(rays)
+    })
+}
+
+/// The rows of each band, top to bottom.
+fn bands(height: u32) -> impl Iterator<Item = Range<u32>> {
+    (0..height).step_by(TILE_SIZE as usize).map(move |first| first..(first + TILE_SIZE).min(height))
+}
+
+fn print_table(report: &BenchReport) -> Result<(), CommandError> {
+    let BenchReport { ms_per_frame: ms, rays_per_frame: rays, .. } = report;
+    let text = format!(
+        "{} of {} x {}, {}, {} triangles, {}\n\
+         ms per frame: {:.2} median, {:.2} min, {:.2} p95, {:.2} max ({:.1} FPS)\n\
+         rays per frame: {} primary, {} shadow, {} secondary; {:.1} million per second\n\
+         read and built in {:.0} ms; pixels {}",
+        counted(report.frames as usize, "frame"),
+        report.width,
+        report.height,
+        counted(report.samples as usize, "sample"),
+        grouped(report.triangles),
+        counted(report.threads, "thread"),
+        ms.median,
+        ms.min,
+        ms.p95,
+        ms.max,
+        if ms.median > 0.0 { 1e3 / ms.median } else { 0.0 },
+        grouped(rays.primary),
+        grouped(rays.shadow),
+        grouped(rays.secondary),
+        report.rays_per_second / 1e6,
+        report.load_ms,
+        report.blake3,
+    );
+    writeln!(io::stdout().lock(), "{text}")
+        .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_every_row_once() {
+        for height in [1, 7, 8, 9, 768] {
+            let rows: Vec<u32> = bands(height).flatten().collect();
+            assert_eq!(rows, (0..height).collect::<Vec<_>>());
+        }
+    }
+}

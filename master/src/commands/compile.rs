@@ -1,0 +1,82 @@
+//! `compile`: a model with its bounding volume hierarchy, ready to load.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use rayfarm_tracer::scene;
+
+use crate::cli::CompileArgs;
+use crate::display::overlay::grouped;
+use crate::error::CommandError;
+use crate::output::check_writable;
+
+/// Reads a model, builds its tree and writes both; tells what came of it on standard output.
+///
+/// # Errors
+/// A wrong model or output; a full disk.
+pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
+    check_writable(&args.output)?;
+    let started = Instant::now();
+    let (mesh, warnings) = scene::load_model(&args.model).map_err(CommandError::wrong_input)?;
+    let seconds = started.elapsed().as_secs_f64();
+    for warning in warnings {
+        tracing::warn!("{warning}");
+    }
+    write_whole(&args.output, mesh.bytes())
+        .map_err(|error| CommandError::Failed(format!("{}: {error}", args.output.display())))?;
+    let line = format!(
+        "{}: {} triangles, {} bytes, read and built in {seconds:.2} s",
+        args.output.display(),
+        grouped(mesh.triangle_count() as u64),
+        grouped(mesh.bytes().len() as u64),
+    );
+    writeln!(io::stdout().lock(), "{line}")
+        .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
+
+/// Writes a file under a temporary name beside it and renames it: it is there whole, or as it was before.
+fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let temporary = temporary_name(path);
+    let written = File::create(&temporary).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    let result = written.and_then(|()| fs::rename(&temporary, path));
+    if result.is_err() {
+        let _ = fs::remove_file(&temporary); // what went wrong is already known
+    }
+    result
+}
+
+fn temporary_name(path: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.tmp", std::process::id()));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_nothing_else_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.rfm");
+        write_whole(&path, b"first").unwrap();
+        write_whole(&path, b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_failed_write_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let occupied = folder.path().join("a.rfm");
+        fs::create_dir_all(occupied.join("in the way")).unwrap();
+        assert!(write_whole(&occupied, b"bytes").is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,219 @@
+//! `render`: frames to files, no display needed.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::time::{Duration, Instant};
+
+use rayfarm_tracer::image::RgbImage;
+use rayfarm_tracer::scene::FrameView;
+use tokio_util::sync::CancellationToken;
+
+use super::interrupt::cancelled_by_signals;
+use super::source::{Source, animation};
+use crate::cli::RenderArgs;
+use crate::display::frame_rate::FrameRate;
+use crate::error::CommandError;
+use crate::farm::{Farm, FarmOptions, FarmScene, FinishedFrame};
+use crate::orbit::Animation;
+use crate::output::{FrameWriter, OutputPattern, check_writable};
+use crate::progress::Progress;
+use crate::report::{
+    BytesPerFrame, FpsLog, FrameLine, MsPerFrame, RaysPerFrame, RenderReport, mean, print_json,
+};
+
+/// The frame being rendered and the one after it, so that workers never run dry between two frames.
+const OPEN_REQUESTS: u64 = 2;
+/// How often the progress display looks at the farm.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
+
+/// Renders all frames and writes them.
+///
+/// # Errors
+/// A wrong scene or output, found before anything is rendered; a farm that cannot listen or go on; a full disk; an
+/// interruption.
+pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
+    let pattern = OutputPattern::parse(&args.output, args.frames)?;
+    check_writable(&pattern.path(0))?;
+    let source = Source::load(&args.scene)?;
+    let view = source.view(&args.picture)?;
+    let triangles = source.compiled()?.triangle_count();
+    let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
+    let options = FarmOptions {
+        listen: args.farm.listen,
+        local_workers: args.farm.local_workers(),
+        threads: args.farm.threads,
+        policy: args.farm.segment,
+    };
+    let run = Run {
+        view,
+        animation: animation(&args.picture, args.frames),
+        frames: u64::from(args.frames),
+        requested: 0,
+        writer: FrameWriter::new(pattern),
+        totals: Totals::new(triangles, log),
+    };
+    let scene = FarmScene { scene: source.scene, meshes: source.meshes };
+    let report = super::runtime()?.block_on(run.carry_out(options, scene))?;
+    if args.json {
+        print_json(&report)?;
+    }
+    Ok(())
+}
+
+/// One run of `render`.
+struct Run {
+    view: FrameView,
+    animation: Animation,
+    frames: u64,
+    requested: u64,
+    writer: FrameWriter,
+    totals: Totals,
+}
+
+impl Run {
+    /// Starts a farm, renders everything with it, and ends it whatever happened.
+    async fn carry_out(
+        mut self,
+        options: FarmOptions,
+        scene: FarmScene,
+    ) -> Result<RenderReport, CommandError> {
+        let interrupted = cancelled_by_signals();
+        let local_workers = options.local_workers;
+        let mut farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
+        let mut progress = Progress::new(self.frames, farm.address(), local_workers);
+        let rendered = self.render(&mut farm, &mut progress, &interrupted).await;
+        let written = self.writer.finish().await;
+        progress.finish(self.writer.written());
+        farm.shut_down().await;
+        match rendered.and(written) {
+            Err(CommandError::Interrupted(_)) => Err(CommandError::Interrupted(format!(
+                "{} of {} frames are written",
+                self.writer.written(),
+                self.frames
+            ))),
+            result => result.map(|()| self.totals.report(&self.view)),
+        }
+    }
+
+    async fn render(
+        &mut self,
+        farm: &mut Farm,
+        progress: &mut Progress,
+        interrupted: &CancellationToken,
+    ) -> Result<(), CommandError> {
+        let mut look = tokio::time::interval(LOOK_EVERY);
+        self.request_up_to(OPEN_REQUESTS, farm);
+        for index in 0..self.frames {
+            let frame = loop {
+                tokio::select! {
+                    biased;
+                    () = interrupted.cancelled() => return Err(CommandError::Interrupted(String::new())),
+                    frame = farm.finished() => break frame.map_err(CommandError::failed)?,
+                    _ = look.tick() => progress.look(&farm.status()),
+                }
+            };
+            self.request_up_to(index + 1 + OPEN_REQUESTS, farm);
+            self.totals.add(&frame)?;
+            progress.completed(index + 1, self.totals.fps());
+            let FrameView { width, height, .. } = frame.view;
+            self.writer.write(index, RgbImage { width, height, pixels: frame.pixels.into_vec() }).await?;
+        }
+        Ok(())
+    }
+
+    fn request_up_to(&mut self, count: u64, farm: &Farm) {
+        while self.requested < count.min(self.frames) {
+            farm.request(self.animation.view(&self.view, self.requested));
+            self.requested += 1;
+        }
+    }
+}
+
+/// Sums over the frames of a run.
+struct Totals {
+    started: Instant,
+    previous: Duration,
+    times: Vec<Duration>,
+    rays: RaysPerFrame,
+    bytes: BytesPerFrame,
+    scene_bytes: u64,
+    workers: u32,
+    threads: u32,
+    triangles: u64,
+    hash: blake3::Hash,
+    rate: FrameRate,
+    log: Option<FpsLog<BufWriter<File>>>,
+}
+
+impl Totals {
+    fn new(triangles: u64, log: Option<FpsLog<BufWriter<File>>>) -> Self {
+        Self {
+            started: Instant::now(),
+            previous: Duration::ZERO,
+            times: Vec::new(),
+            rays: RaysPerFrame::default(),
+            bytes: BytesPerFrame::default(),
+            scene_bytes: 0,
+            workers: 0,
+            threads: 0,
+            triangles,
+            hash: blake3::hash(&[]),
+            rate: FrameRate::default(),
+            log,
+        }
+    }
+
+    fn add(&mut self, frame: &FinishedFrame) -> Result<(), CommandError> {
+        let at = self.started.elapsed();
+        // Frames overlap: the time that both took counts for the earlier one only.
+        let elapsed = frame.elapsed.min(at - self.previous);
+        self.previous = at;
+        self.rate.completed(at, elapsed);
+        let counts = frame.counts;
+        let rays =
+            RaysPerFrame { primary: counts.primary, shadow: counts.shadow, secondary: counts.secondary };
+        let bytes = BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes };
+        let line = FrameLine {
+            frame: self.times.len() as u64,
+            at,
+            elapsed,
+            fps: self.rate.fps(at),
+            workers: frame.workers,
+            threads: frame.threads,
+            rays,
+            bytes,
+        };
+        self.times.push(elapsed);
+        self.rays.add(rays);
+        self.bytes.add(bytes);
+        self.scene_bytes += frame.scene_bytes;
+        (self.workers, self.threads) = (frame.workers, frame.threads);
+        self.hash = blake3::hash(&frame.pixels);
+        self.log.as_mut().map_or(Ok(()), |log| log.add(&line))
+    }
+
+    fn fps(&self) -> f64 {
+        self.rate.fps(self.started.elapsed())
+    }
+
+    fn report(&self, view: &FrameView) -> RenderReport {
+        let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
+        RenderReport {
+            frames,
+            width: view.width,
+            height: view.height,
+            samples: view.samples,
+            workers: self.workers,
+            threads: self.threads,
+            triangles: self.triangles,
+            rays_per_frame: self.rays.mean(frames),
+            ms_per_frame: MsPerFrame::of(&self.times),
+            bytes_per_frame: BytesPerFrame {
+                sent: mean(self.bytes.sent, frames),
+                received: mean(self.bytes.received, frames),
+            },
+            scene_bytes: self.scene_bytes,
+            blake3: self.hash.to_hex().to_string(),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! `view`: a window on the main thread, the farm beside it.
+
+use rayfarm_tracer::scene::FrameView;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use super::interrupt::cancelled_by_signals;
+use super::source::{Source, animation, default_scene};
+use crate::camera_control::CameraControl;
+use crate::cli::ViewArgs;
+use crate::display::feed::{self, NewsDesk, Orders};
+use crate::display::window::{About, Display, Link};
+use crate::error::CommandError;
+use crate::farm::{Farm, FarmOptions, FarmScene};
+use crate::report::FpsLog;
+
+/// `--orbit` without `--frames` goes round over this many frames, and on.
+const FRAMES_PER_ORBIT: u32 = 360;
+
+/// Shows a scene until the user has seen enough, or `--frames` are done.
+///
+/// # Errors
+/// A wrong scene; no display; a farm that cannot listen or go on.
+pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
+    let path = args.scene.clone().map_or_else(default_scene, Ok)?;
+    let source = Source::load(&path)?;
+    let view = source.view(&args.picture)?;
+    let compiled = source.compiled()?;
+    let about = About {
+        name: source.name.clone(),
+        triangles: compiled.triangle_count(),
+        local_workers: args.farm.local_workers(),
+    };
+    let camera = CameraControl::new(view.camera, compiled.bounds());
+    drop(compiled);
+    let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
+    let display = Display::open(about, view.width, view.height).map_err(|problem| {
+        CommandError::Failed(format!(
+            "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
+            path.display()
+        ))
+    })?;
+
+    let runtime = super::runtime()?;
+    let (wanted, wishes) = watch::channel(view);
+    let orders = Orders {
+        wanted: wishes,
+        animation: animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT)),
+        limit: args.frames.map(u64::from),
+        log,
+    };
+    let interrupted = runtime.block_on(async { cancelled_by_signals() });
+    let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, interrupted.child_token()))?;
+    let shown = display.run(view, camera, &link).map_err(CommandError::Failed);
+    let ended = runtime.block_on(farm).map_err(CommandError::failed)?;
+    ended.and(shown).and_then(|()| all_shown(&args, &link, &interrupted))
+}
+
+/// Starts the farm and the task that keeps it busy.
+async fn start(
+    args: &ViewArgs,
+    source: Source,
+    wanted: watch::Sender<FrameView>,
+    orders: Orders,
+    stop: CancellationToken,
+) -> Result<(Link, JoinHandle<Result<(), CommandError>>), CommandError> {
+    let options = FarmOptions {
+        listen: args.farm.listen,
+        local_workers: args.farm.local_workers(),
+        threads: args.farm.threads,
+        policy: args.farm.segment,
+    };
+    let scene = FarmScene { scene: source.scene, meshes: source.meshes };
+    let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
+    let link = Link { wanted, desk: NewsDesk::new(), address: farm.address(), stop };
+    let task = tokio::spawn(feed::run(farm, orders, link.desk.clone(), link.stop.clone()));
+    Ok((link, task))
+}
+
+/// Who closes the window has seen enough; a signal may come before all frames that were asked for.
+fn all_shown(args: &ViewArgs, link: &Link, interrupted: &CancellationToken) -> Result<(), CommandError> {
+    match args.frames.map(u64::from) {
+        Some(frames) if interrupted.is_cancelled() && link.desk.completed() < frames => {
+            Err(CommandError::Interrupted(format!("{} of {frames} frames were shown", link.desk.completed())))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,225 @@
+//! Keeps the farm busy with what the window wants to see, and holds the newest picture for it.
+//!
+//! Always two frames are asked for: the one being rendered and the one after it, so that workers which have nothing
+//! left to do in the first begin the second. A moved camera replaces the second as long as it has not begun.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::BufWriter;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use rayfarm_tracer::scene::FrameView;
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+use super::frame_rate::FrameRate;
+use crate::error::CommandError;
+use crate::farm::{Farm, FarmStatus, FinishedFrame, FrameId};
+use crate::orbit::Animation;
+use crate::report::{BytesPerFrame, FpsLog, FrameLine, RaysPerFrame};
+
+/// How often the window learns of workers that come and go.
+const STATUS_EVERY: Duration = Duration::from_millis(100);
+/// The frame being rendered and the one after it.
+const OPEN_REQUESTS: usize = 2;
+
+/// What is asked of the farm.
+pub(crate) struct Orders {
+    /// What the window wants to see; the newest counts.
+    pub(crate) wanted: watch::Receiver<FrameView>,
+    /// What moves by itself.
+    pub(crate) animation: Animation,
+    /// End after so many frames.
+    pub(crate) limit: Option<u64>,
+    /// Where each frame is noted.
+    pub(crate) log: Option<FpsLog<BufWriter<File>>>,
+}
+
+/// What the window may know at any moment.
+#[derive(Debug)]
+pub(crate) struct News {
+    started: Instant,
+    /// The newest picture that the window has not taken yet.
+    latest: Option<FinishedFrame>,
+    status: FarmStatus,
+    rate: FrameRate,
+    completed: u64,
+    last_completed: Duration,
+}
+
+/// The window's end of [`News`].
+#[derive(Clone, Debug)]
+pub(crate) struct NewsDesk(Arc<Mutex<News>>);
+
+impl NewsDesk {
+    /// With no news yet.
+    pub(crate) fn new() -> Self {
+        Self(Arc::new(Mutex::new(News {
+            started: Instant::now(),
+            latest: None,
+            status: FarmStatus::default(),
+            rate: FrameRate::default(),
+            completed: 0,
+            last_completed: Duration::ZERO,
+        })))
+    }
+
+    /// The newest picture, once.
+    pub(crate) fn take_picture(&self) -> Option<FinishedFrame> {
+        self.lock().latest.take()
+    }
+
+    /// The farm as last seen.
+    pub(crate) fn status(&self) -> FarmStatus {
+        self.lock().status.clone()
+    }
+
+    /// Frames per second and the time of one, now.
+    pub(crate) fn rate(&self) -> (f64, Duration) {
+        let news = self.lock();
+        (news.rate.fps(news.started.elapsed()), news.rate.frame_time())
+    }
+
+    /// Frames completed so far.
+    pub(crate) fn completed(&self) -> u64 {
+        self.lock().completed
+    }
+
+    /// How long no frame has been completed.
+    pub(crate) fn since_last_frame(&self) -> Duration {
+        let news = self.lock();
+        news.started.elapsed().saturating_sub(news.last_completed)
+    }
+
+    /// Notes a finished frame and returns its line for the log.
+    fn completed_frame(&self, frame: FinishedFrame) -> FrameLine {
+        let mut news = self.lock();
+        let at = news.started.elapsed();
+        news.rate.completed(at, frame.elapsed);
+        let counts = frame.counts;
+        let line = FrameLine {
+            frame: news.completed,
+            at,
+            elapsed: frame.elapsed,
+            fps: news.rate.fps(at),
+            workers: frame.workers,
+            threads: frame.threads,
+            rays: RaysPerFrame {
+                primary: counts.primary,
+                shadow: counts.shadow,
+                secondary: counts.secondary,
+            },
+            bytes: BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes },
+        };
+        news.completed += 1;
+        news.last_completed = at;
+        news.latest = Some(frame);
+        line
+    }
+
+    /// Nothing panics while it holds the lock, and news are whole after every statement: a poisoned lock is usable.
+    fn lock(&self) -> MutexGuard<'_, News> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Drives the farm until `stop` is cancelled, the limit is reached or the farm fails; cancels `stop` and shuts the
+/// farm down in every case.
+///
+/// # Errors
+/// What the farm could not do, or a frame log that could not be written.
+pub(crate) async fn run(
+    mut farm: Farm,
+    orders: Orders,
+    desk: NewsDesk,
+    stop: CancellationToken,
+) -> Result<(), CommandError> {
+    let result = drive(&mut farm, orders, &desk, &stop).await;
+    stop.cancel();
+    farm.shut_down().await;
+    result
+}
+
+async fn drive(
+    farm: &mut Farm,
+    orders: Orders,
+    desk: &NewsDesk,
+    stop: &CancellationToken,
+) -> Result<(), CommandError> {
+    let Orders { mut wanted, animation, limit, mut log } = orders;
+    let mut requests = Requests { animation, limit, next: 0, open: VecDeque::new() };
+    let mut look = tokio::time::interval(STATUS_EVERY);
+    let mut window_is_there = true;
+    requests.fill(farm, &wanted.borrow_and_update().clone());
+    loop {
+        tokio::select! {
+            biased;
+            () = stop.cancelled() => return Ok(()),
+            frame = farm.finished() => {
+                let frame = frame.map_err(CommandError::failed)?;
+                requests.finished(frame.frame);
+                let line = desk.completed_frame(frame);
+                if let Some(log) = &mut log {
+                    log.add(&line)?;
+                }
+                if limit == Some(desk.completed()) {
+                    return Ok(());
+                }
+                requests.after_finish(farm, &wanted.borrow_and_update().clone());
+            }
+            changed = wanted.changed(), if window_is_there => {
+                window_is_there = changed.is_ok();
+                requests.replace(farm, &wanted.borrow_and_update().clone());
+            }
+            _ = look.tick() => desk.lock().status = farm.status(),
+        }
+    }
+}
+
+/// Which frames have been asked for and are not here yet.
+struct Requests {
+    animation: Animation,
+    limit: Option<u64>,
+    /// The number, within the animation, of the next frame to ask for.
+    next: u64,
+    open: VecDeque<(FrameId, u32, u32)>,
+}
+
+impl Requests {
+    /// Asks until two are open.
+    fn fill(&mut self, farm: &Farm, base: &FrameView) {
+        while self.open.len() < OPEN_REQUESTS && self.ask(farm, base) {}
+    }
+
+    /// Frames come in order: all up to `frame` are done, or were replaced and will never come.
+    fn finished(&mut self, frame: FrameId) {
+        self.open.retain(|(open, ..)| *open > frame);
+    }
+
+    /// The next one is due. Asking even when two seem open costs nothing: one of them was replaced, or this replaces
+    /// a request that has not begun by one for a newer camera.
+    fn after_finish(&mut self, farm: &Farm, base: &FrameView) {
+        self.ask(farm, base);
+        self.fill(farm, base);
+    }
+
+    /// The camera has moved: the last request shall show what it sees now.
+    fn replace(&mut self, farm: &Farm, base: &FrameView) {
+        self.next = self.next.saturating_sub(1);
+        self.ask(farm, base);
+        self.fill(farm, base);
+    }
+
+    fn ask(&mut self, farm: &Farm, base: &FrameView) -> bool {
+        if self.limit.is_some_and(|limit| self.next >= limit) && !self.open.is_empty() {
+            return false;
+        }
+        let view = self.animation.view(base, self.next);
+        // The farm gives up all requests of another size.
+        self.open.retain(|&(_, width, height)| (width, height) == (view.width, view.height));
+        self.open.push_back((farm.request(view), view.width, view.height));
+        self.next += 1;
+        true
+    }
+}

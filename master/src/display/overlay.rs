@@ -1,0 +1,229 @@
+//! What is written over the picture: figures, the list of keys, and what the window waits for.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use super::canvas::{Canvas, GLYPH, Rect};
+
+/// Between lines, and between text and the edge of its panel, in dots.
+const LINE: usize = GLYPH + 3;
+const MARGIN: usize = 5;
+const WHITE: u32 = 0x00f4_f4f4;
+const SOFT: u32 = 0x00c4_ccd4;
+
+/// The keys of the window, and what each does.
+const KEYS: [(&str, &str); 9] = [
+    ("W A S D", "move"),
+    ("Q E", "move down, up"),
+    ("arrows", "look around"),
+    ("drag", "orbit"),
+    ("wheel", "nearer, farther"),
+    ("R", "back to the start"),
+    ("O", "hide the figures"),
+    ("H", "hide this list"),
+    ("Esc", "end"),
+];
+
+/// The figures in the corner.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Figures {
+    /// Completed frames per second.
+    pub(super) fps: f64,
+    /// What a frame takes.
+    pub(super) frame_time: Duration,
+    /// Pixels per row and rows.
+    pub(super) size: (u32, u32),
+    /// Rays per pixel.
+    pub(super) samples: u32,
+    /// Workers connected.
+    pub(super) workers: usize,
+    /// Their render threads together.
+    pub(super) threads: u32,
+    /// Triangles over all instances.
+    pub(super) triangles: u64,
+    /// How much of the frame being rendered is done, where that is worth telling: 0..=1.
+    pub(super) progress: Option<f64>,
+}
+
+impl Figures {
+    /// As lines of the overlay.
+    fn lines(&self) -> Vec<String> {
+        let mut lines = vec![self.speed()];
+        let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
+        lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
+        lines.push(format!(
+            "{}, {}",
+            counted(self.workers, "worker"),
+            counted(self.threads as usize, "thread")
+        ));
+        lines.push(format!("{} triangles", grouped(self.triangles)));
+        if let Some(progress) = self.progress {
+            lines.push(format!("next frame: {:.0} %", progress.clamp(0.0, 1.0) * 100.0));
+        }
+        lines.push("H: keys".to_owned());
+        lines
+    }
+
+    /// As it also stands in the title.
+    pub(super) fn speed(&self) -> String {
+        format!("{} FPS  {} ms", three_digits(self.fps), three_digits(self.frame_time.as_secs_f64() * 1e3))
+    }
+}
+
+/// Draws the figures in the upper left corner.
+pub(super) fn draw_figures(canvas: &mut Canvas, figures: &Figures) {
+    let lines = figures.lines();
+    let panel = Panel::fit(canvas, &lines);
+    let at = MARGIN * panel.scale;
+    panel.draw(canvas, at, at, lines.len());
+}
+
+/// Draws the list of keys in the middle.
+pub(super) fn draw_help(canvas: &mut Canvas) {
+    let widest = KEYS.iter().map(|(keys, _)| keys.len()).max().unwrap_or(0);
+    let lines: Vec<String> = KEYS.iter().map(|(keys, what)| format!("{keys:widest$}  {what}")).collect();
+    draw_centred(canvas, &lines, lines.len());
+}
+
+/// Draws a message in the middle, the rest of the picture darkened: it is not the newest.
+pub(super) fn draw_message(canvas: &mut Canvas, lines: &[String]) {
+    canvas.darken(Rect { x: 0, y: 0, width: canvas.width(), height: canvas.height() });
+    draw_centred(canvas, lines, 1);
+}
+
+/// What the window says while there is no worker.
+pub(super) fn waiting_for_workers(address: SocketAddr, local_workers: u32) -> Vec<String> {
+    let first = match local_workers {
+        0 => "Waiting for a worker.".to_owned(),
+        1 => "Waiting for this machine's worker.".to_owned(),
+        n => format!("Waiting for this machine's {n} workers."),
+    };
+    let where_to = if address.ip().is_loopback() { "on this machine" } else { "on any machine" };
+    vec![first, String::new(), format!("To start one {where_to}:"), worker_command(address)]
+}
+
+/// The command line that starts a worker for a master that listens on `address`.
+pub(crate) fn worker_command(address: SocketAddr) -> String {
+    format!("rayfarm-worker --master {}", reachable(address))
+}
+
+/// An address that others can connect to: "any" is where a socket listens, not where one connects.
+fn reachable(address: SocketAddr) -> SocketAddr {
+    if !address.ip().is_unspecified() {
+        return address;
+    }
+    SocketAddr::new(own_address(address.is_ipv6()), address.port())
+}
+
+/// The address of the interface that leads out of this machine. Connecting a datagram socket only asks the routing
+/// table; nothing is sent. Without a route it is the loopback address.
+fn own_address(ipv6: bool) -> std::net::IpAddr {
+    use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, UdpSocket};
+    // Addresses reserved for documentation: RFC 5737 and RFC 3849.
+    let (any, outside): (IpAddr, IpAddr) = if ipv6 {
+        (Ipv6Addr::UNSPECIFIED.into(), Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into())
+    } else {
+        (Ipv4Addr::UNSPECIFIED.into(), Ipv4Addr::new(192, 0, 2, 1).into())
+    };
+    let asked = UdpSocket::bind((any, 0))
+        .and_then(|socket| socket.connect((outside, 9)).and_then(|()| socket.local_addr()))
+        .map(|own| own.ip());
+    let loopback = if ipv6 { Ipv6Addr::LOCALHOST.into() } else { Ipv4Addr::LOCALHOST.into() };
+    asked.unwrap_or(loopback)
+}
+
+fn draw_centred(canvas: &mut Canvas, lines: &[String], bright: usize) {
+    let panel = Panel::fit(canvas, lines);
+    let x = canvas.width().saturating_sub(panel.width()) / 2;
+    let y = canvas.height().saturating_sub(panel.height()) / 2;
+    panel.draw(canvas, x, y, bright);
+}
+
+/// Lines of text on a dark rectangle, as large as the canvas allows.
+struct Panel {
+    lines: Vec<String>,
+    scale: usize,
+}
+
+impl Panel {
+    /// The largest text that fits and suits the canvas; lines that are too long even for the smallest are broken.
+    fn fit(canvas: &Canvas, lines: &[String]) -> Self {
+        let suits = ((canvas.height() + 225) / 450).clamp(1, 4);
+        let panel = |scale| Self { lines: lines.to_vec(), scale };
+        let fits = |panel: &Self| {
+            panel.width() + 2 * MARGIN <= canvas.width() && panel.height() + 2 * MARGIN <= canvas.height()
+        };
+        (1..=suits).rev().map(panel).find(fits).unwrap_or_else(|| {
+            let columns = (canvas.width().saturating_sub(4 * MARGIN) / GLYPH).max(1);
+            Self { lines: lines.iter().flat_map(|line| broken(line, columns)).collect(), scale: 1 }
+        })
+    }
+
+    fn width(&self) -> usize {
+        let columns = self.lines.iter().map(|line| line.chars().count()).max().unwrap_or(0);
+        (columns * GLYPH + 2 * MARGIN) * self.scale
+    }
+
+    fn height(&self) -> usize {
+        (self.lines.len() * LINE + 2 * MARGIN - (LINE - GLYPH)) * self.scale
+    }
+
+    /// The first `bright` lines stand out.
+    fn draw(&self, canvas: &mut Canvas, x: usize, y: usize, bright: usize) {
+        canvas.darken(Rect { x, y, width: self.width(), height: self.height() });
+        for (index, line) in self.lines.iter().enumerate() {
+            let color = if index < bright { WHITE } else { SOFT };
+            let (left, top) = (x + MARGIN * self.scale, y + (MARGIN + index * LINE) * self.scale);
+            canvas.text(left, top, self.scale, color, line);
+        }
+    }
+}
+
+/// A line broken at spaces into pieces of at most `columns` characters; a longer word is cut.
+fn broken(line: &str, columns: usize) -> Vec<String> {
+    let (mut pieces, mut piece) = (Vec::new(), String::new());
+    for word in line.split(' ') {
+        for part in word.chars().collect::<Vec<_>>().chunks(columns) {
+            let needs = part.len() + usize::from(!piece.is_empty());
+            if !piece.is_empty() && piece.chars().count() + needs > columns {
+                pieces.push(std::mem::take(&mut piece));
+            }
+            if !piece.is_empty() {
+                piece.push(' ');
+            }
+            piece.extend(part);
+        }
+    }
+    pieces.push(piece);
+    pieces
+}
+
+/// `1 worker`, `2 workers`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+/// `1234567` as `1,234,567`.
+pub(crate) fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+fn three_digits(value: f64) -> String {
+    match value {
+        value if value < 10.0 => format!("{value:.2}"),
+        value if value < 100.0 => format!("{value:.1}"),
+        value => format!("{value:.0}"),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,135 @@
+use super::*;
+
+fn canvas(width: usize, height: usize) -> Canvas {
+    let mut canvas = Canvas::default();
+    canvas.resize(width, height);
+    canvas.fill(0x0080_8080);
+    canvas
+}
+
+fn figures() -> Figures {
+    Figures {
+        fps: 31.25,
+        frame_time: Duration::from_micros(32_100),
+        size: (1024, 768),
+        samples: 4,
+        workers: 2,
+        threads: 4,
+        triangles: 1_234_567,
+        progress: Some(0.421),
+    }
+}
+
+/// The text that stands on the canvas in `color`, found glyph by glyph at `scale`, from (`x`, `y`).
+fn read(canvas: &Canvas, x: usize, y: usize, scale: usize, characters: usize, color: u32) -> String {
+    let drawn = |column: usize, character: char| {
+        let mut expected = Canvas::default();
+        expected.resize(GLYPH * scale, GLYPH * scale);
+        expected.text(0, 0, scale, 1, &character.to_string());
+        (0..GLYPH * scale).all(|row| {
+            (0..GLYPH * scale).all(|dot| {
+                let there =
+                    canvas.pixels()[(y + row) * canvas.width() + x + column * GLYPH * scale + dot] == color;
+                there == (expected.pixels()[row * GLYPH * scale + dot] == 1)
+            })
+        })
+    };
+    (0..characters)
+        .map(|column| (' '..='~').find(|&character| drawn(column, character)).unwrap_or('\u{fffd}'))
+        .collect()
+}
+
+#[test]
+fn figures_can_be_read_off_the_canvas() {
+    let mut canvas = canvas(1024, 768);
+    draw_figures(&mut canvas, &figures());
+    let (scale, at) = (2, 2 * MARGIN * 2);
+    let line =
+        |index: usize, characters| read(&canvas, at, at + index * LINE * scale, scale, characters, WHITE);
+    assert_eq!(line(0, 18), "31.2 FPS  32.1 ms ");
+    assert_eq!(line(1, 21), "1024 x 768, 4 samples");
+    assert_eq!(line(2, 20), "2 workers, 4 threads");
+    assert_eq!(line(3, 19), "1,234,567 triangles");
+    assert_eq!(line(4, 16), "next frame: 42 %");
+}
+
+#[test]
+fn every_window_size_can_be_drawn_on() {
+    let message = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 1);
+    for width in [0, 1, 2, 7, 16, 40, 100, 333, 1024, 5000] {
+        for height in [0, 1, 2, 9, 30, 90, 240, 2200] {
+            let mut canvas = canvas(width, height);
+            draw_figures(&mut canvas, &figures());
+            draw_help(&mut canvas);
+            draw_message(&mut canvas, &message);
+            assert_eq!(canvas.pixels().len(), width * height);
+        }
+    }
+}
+
+#[test]
+fn the_list_of_keys_stands_on_a_dark_panel_whatever_is_below() {
+    let mut canvas = canvas(640, 480);
+    canvas.fill(0x00ff_ffff);
+    draw_help(&mut canvas);
+    // The panel in the middle: every line of keys and its margins.
+    let columns = 9 + KEYS.iter().map(|(_, what)| what.len()).max().unwrap();
+    let (width, height) = (columns * GLYPH + 2 * MARGIN, KEYS.len() * LINE + 2 * MARGIN - (LINE - GLYPH));
+    let (left, top) = ((640 - width) / 2, (480 - height) / 2);
+    for (row, pixels) in canvas.pixels().chunks(640).enumerate() {
+        for (column, &pixel) in pixels.iter().enumerate() {
+            let inside = (left..left + width).contains(&column) && (top..top + height).contains(&row);
+            let expected: &[u32] = if inside { &[WHITE, 0x003f_3f3f] } else { &[0x00ff_ffff] };
+            assert!(expected.contains(&pixel), "{pixel:06x} at {column}, {row}");
+        }
+    }
+    let first = read(&canvas, left + MARGIN, top + MARGIN, 1, 13, WHITE);
+    assert_eq!(first, "W A S D  move");
+}
+
+#[test]
+fn text_grows_with_the_window_as_long_as_it_fits() {
+    let scale = |width, height| Panel::fit(&canvas(width, height), &figures().lines()).scale;
+    assert_eq!([scale(640, 480), scale(1024, 768), scale(3840, 2160)], [1, 2, 4]);
+    assert_eq!(scale(230, 2160), 1, "a narrow window has small text");
+}
+
+#[test]
+fn long_lines_are_broken_at_spaces_and_long_words_are_cut() {
+    assert_eq!(broken("to start one here", 8), ["to start", "one here"]);
+    assert_eq!(broken("--master 127.0.0.1:7117", 9), ["--master", "127.0.0.1", ":7117"]);
+    assert_eq!(broken("", 5), [""]);
+    assert_eq!(broken("ab", 1), ["a", "b"]);
+}
+
+#[test]
+fn the_waiting_message_says_how_to_start_a_worker() {
+    let local = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 0);
+    assert_eq!(
+        local,
+        [
+            "Waiting for a worker.",
+            "",
+            "To start one on this machine:",
+            "rayfarm-worker --master 127.0.0.1:7117"
+        ]
+    );
+    let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2);
+    assert_eq!(elsewhere[2], "To start one on any machine:");
+    assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
+}
+
+#[test]
+fn nobody_is_told_to_connect_to_the_unspecified_address() {
+    for listening in ["0.0.0.0:7117", "[::]:7117"] {
+        let command = worker_command(listening.parse().unwrap());
+        let address: SocketAddr = command.rsplit(' ').next().unwrap().parse().unwrap();
+        assert!(!address.ip().is_unspecified() && address.port() == 7117, "{command}");
+    }
+}
+
+#[test]
+fn numbers_are_short() {
+    assert_eq!([grouped(0), grouped(999), grouped(1000), grouped(99_938)], ["0", "999", "1,000", "99,938"]);
+    assert_eq!([three_digits(0.254), three_digits(31.25), three_digits(240.4)], ["0.25", "31.2", "240"]);
+}

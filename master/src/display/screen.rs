@@ -1,0 +1,115 @@
+//! Opening the window, or saying clearly why there is none.
+
+use minifb::{ScaleMode, Window, WindowOptions};
+
+/// Looks at the input this many times a second; pictures are shown as they come.
+const UPDATES_PER_SECOND: usize = 120;
+
+/// Opens a window whose inside has the given size.
+///
+/// # Errors
+/// Why there is no display, in words for the user.
+pub(super) fn open(title: &str, width: u32, height: u32) -> Result<Window, String> {
+    let _probe = x11::Probe::new()?;
+    let options =
+        WindowOptions { resize: true, scale_mode: ScaleMode::UpperLeft, ..WindowOptions::default() };
+    let mut window =
+        Window::new(title, width as usize, height as usize, options).map_err(|error| error.to_string())?;
+    window.set_target_fps(UPDATES_PER_SECOND);
+    Ok(window)
+}
+
+/// minifb 0.29 needs 32 bits a pixel. It does notice an X screen without them, but then frees the screen's graphics
+/// context twice and dies of a segmentation fault, so the screen is looked at before minifb is asked.
+#[cfg(any(
+    target_os = "linux",
+    target_os = "freebsd",
+    target_os = "dragonfly",
+    target_os = "netbsd",
+    target_os = "openbsd"
+))]
+mod x11 {
+    use std::ptr;
+
+    use x11_dl::xlib::{Display, Xlib};
+
+    /// A connection to the X screen, if there is one, that minifb would survive too.
+    ///
+    /// Keep it until the window is open: a server without clients resets itself, and would refuse the next one meanwhile.
+    pub(super) struct Probe(Option<(Xlib, *mut Display)>);
+
+    impl Probe {
+        /// Refuses an X screen whose pixels do not have 32 bits. One that cannot be asked is left to minifb's report.
+        pub(super) fn new() -> Result<Self, String> {
+            if std::env::var_os("WAYLAND_DISPLAY").is_some() {
+                return Ok(Self(None)); // minifb tries Wayland first
+            }
+            let probe = Self(Xlib::open().ok().and_then(connect));
+            match probe.bits_per_pixel() {
+                Some(bits) if bits != 32 => Err(format!(
+                    "the screen has {bits} bits per pixel; a depth of 24 with 32 bits per pixel is needed"
+                )),
+                _ => Ok(probe),
+            }
+        }
+
+        /// Bits that a pixel of the default screen takes in memory.
+        fn bits_per_pixel(&self) -> Option<i32> {
+            let (xlib, display) = self.0.as_ref()?;
+            let mut count = 0;
+            // SAFETY: the display is open until `self` is dropped. XListPixmapFormats returns null, or an array of
+            // `count` formats that is the caller's to read until it is freed with XFree; the slice ends before that.
+            unsafe {
+                let depth = (xlib.XDefaultDepth)(*display, (xlib.XDefaultScreen)(*display));
+                let formats = (xlib.XListPixmapFormats)(*display, &mut count);
+                if formats.is_null() {
+                    return None;
+                }
+                let bits = std::slice::from_raw_parts(formats, usize::try_from(count).unwrap_or(0))
+                    .iter()
+                    .find(|format| format.depth == depth)
+                    .map(|format| format.bits_per_pixel);
+                (xlib.XFree)(formats.cast());
+                bits
+            }
+        }
+    }
+
+    impl Drop for Probe {
+        fn drop(&mut self) {
+            if let Some((xlib, display)) = self.0.take() {
+                // SAFETY: `connect` opened the display, `take` makes this its only closing, and nothing uses it after.
+                unsafe { (xlib.XCloseDisplay)(display) };
+            }
+        }
+    }
+
+    fn connect(xlib: Xlib) -> Option<(Xlib, *mut Display)> {
+        // SAFETY: XInitThreads has no precondition but to come before all other Xlib calls of the process, and this is
+        // the first; XOpenDisplay takes null for "what $DISPLAY names" and returns null where it cannot connect.
+        let display = unsafe {
+            (xlib.XInitThreads)();
+            (xlib.XOpenDisplay)(ptr::null())
+        };
+        (!display.is_null()).then_some((xlib, display))
+    }
+}
+
+#[cfg(not(any(
+    target_os = "linux",
+    target_os = "freebsd",
+    target_os = "dragonfly",
+    target_os = "netbsd",
+    target_os = "openbsd"
+)))]
+mod x11 {
+    /// No X here.
+    pub(super) struct Probe;
+
+    impl Probe {
+        /// Nothing to refuse.
+        pub(super) fn new() -> Result<Self, String> {
+            Ok(Self)
+        }
+    }
+}

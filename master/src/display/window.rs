@@ -1,0 +1,200 @@
+//! The window: shows the newest picture with its figures, and turns keys and mouse into cameras.
+
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use minifb::Window;
+use rayfarm_tracer::image::MAX_SIDE;
+use rayfarm_tracer::scene::FrameView;
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+use super::canvas::{Canvas, Picture};
+use super::feed::NewsDesk;
+use super::input::{Controls, Happened};
+use super::overlay::{self, Figures};
+use super::screen;
+use crate::camera_control::CameraControl;
+use crate::farm::{FarmStatus, FinishedFrame};
+
+/// A window whose picture has not changed is drawn again this often: another window may have covered it, and the
+/// figures want to be new.
+const REDRAW_EVERY: Duration = Duration::from_millis(200);
+const TITLE_EVERY: Duration = Duration::from_millis(500);
+/// A frame that takes longer than this is told how far it is.
+const PATIENCE: Duration = Duration::from_millis(700);
+/// What is seen before the first picture.
+const GROUND: u32 = 0x0020_2428;
+
+/// What the window shows besides pictures.
+#[derive(Clone, Debug)]
+pub(crate) struct About {
+    /// The scene's name, for the title.
+    pub(crate) name: String,
+    /// Triangles over all instances.
+    pub(crate) triangles: u64,
+    /// Workers that the master starts itself.
+    pub(crate) local_workers: u32,
+}
+
+/// A window on the screen that shows nothing yet.
+pub(crate) struct Display {
+    window: Window,
+    controls: Controls,
+    about: About,
+    canvas: Canvas,
+    picture: Option<FinishedFrame>,
+    show_help: bool,
+    show_figures: bool,
+}
+
+/// The two ways between the window and the farm.
+pub(crate) struct Link {
+    /// Where the newest view goes.
+    pub(crate) wanted: watch::Sender<FrameView>,
+    /// Where the newest picture comes from.
+    pub(crate) desk: NewsDesk,
+    /// Where workers connect.
+    pub(crate) address: SocketAddr,
+    /// Cancelled by either side to end.
+    pub(crate) stop: CancellationToken,
+}
+
+impl Display {
+    /// Opens a window of the given size.
+    ///
+    /// # Errors
+    /// Why there is no display.
+    pub(crate) fn open(about: About, width: u32, height: u32) -> Result<Self, String> {
+        let mut window = screen::open(&format!("rayfarm - {}", about.name), width, height)?;
+        let controls = Controls::of(&mut window);
+        let canvas = Canvas::default();
+        Ok(Self { window, controls, about, canvas, picture: None, show_help: false, show_figures: true })
+    }
+
+    /// Shows pictures until the user ends it or `link.stop` is cancelled, and cancels that. Never waits for the farm.
+    ///
+    /// # Errors
+    /// A screen that takes no pictures any more.
+    pub(crate) fn run(
+        mut self,
+        view: FrameView,
+        mut camera: CameraControl,
+        link: &Link,
+    ) -> Result<(), String> {
+        let (mut last_step, mut last_draw, mut last_title) = (Instant::now(), None, Instant::now());
+        while self.window.is_open() && !link.stop.is_cancelled() {
+            let happened = self.controls.look(&mut self.window);
+            if happened.end {
+                break;
+            }
+            camera.step(&happened.camera, last_step.elapsed().as_secs_f64());
+            last_step = Instant::now();
+            self.ask_for(FrameView { camera: camera.camera(), ..view }, link);
+
+            let fresh = self.take_news(&happened, link);
+            if fresh || last_draw.is_none_or(|then: Instant| then.elapsed() > REDRAW_EVERY) {
+                self.draw(link)?;
+                last_draw = Some(Instant::now());
+            } else {
+                self.window.update();
+            }
+            if last_title.elapsed() > TITLE_EVERY {
+                self.window.set_title(&self.title(link));
+                last_title = Instant::now();
+            }
+        }
+        link.stop.cancel();
+        Ok(())
+    }
+
+    /// Wants a picture of the window's size; only a change of view is worth a message.
+    fn ask_for(&self, view: FrameView, link: &Link) {
+        let (width, height) = self.window.get_size();
+        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(MAX_SIDE).clamp(1, MAX_SIDE);
+        let view = FrameView { width: side(width), height: side(height), ..view };
+        link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, view) != view);
+    }
+
+    /// Whether there is something new to see.
+    fn take_news(&mut self, happened: &Happened, link: &Link) -> bool {
+        self.show_help ^= happened.toggle_help;
+        self.show_figures ^= happened.toggle_figures;
+        let picture = link.desk.take_picture();
+        let fresh = picture.is_some() || happened.toggle_help || happened.toggle_figures;
+        self.picture = picture.or(self.picture.take());
+        fresh
+    }
+
+    fn draw(&mut self, link: &Link) -> Result<(), String> {
+        let (width, height) = self.window.get_size();
+        self.canvas.resize(width, height);
+        match &self.picture {
+            None => self.canvas.fill(GROUND),
+            Some(frame) => self.canvas.show(Picture {
+                width: frame.view.width as usize,
+                height: frame.view.height as usize,
+                rgb: &frame.pixels,
+            }),
+        }
+        self.draw_overlay(link);
+        self.window
+            .update_with_buffer(self.canvas.pixels(), width, height)
+            .map_err(|error| format!("the window takes no more pictures: {error}"))
+    }
+
+    fn draw_overlay(&mut self, link: &Link) {
+        let status = link.desk.status();
+        let room_for_both = self.canvas.width() >= 640 && self.canvas.height() >= 480;
+        if self.show_figures && self.picture.is_some() && (room_for_both || !self.show_help) {
+            let figures = self.figures(&status, link);
+            overlay::draw_figures(&mut self.canvas, &figures);
+        }
+        if self.show_help {
+            overlay::draw_help(&mut self.canvas);
+        } else if status.workers.is_empty() {
+            let message = overlay::waiting_for_workers(link.address, self.about.local_workers);
+            overlay::draw_message(&mut self.canvas, &message);
+        } else if self.picture.is_none() {
+            overlay::draw_message(&mut self.canvas, &[first_picture(&status)]);
+        }
+    }
+
+    fn figures(&self, status: &FarmStatus, link: &Link) -> Figures {
+        let (fps, frame_time) = link.desk.rate();
+        let view = *link.wanted.borrow();
+        let slow = link.desk.since_last_frame() > PATIENCE && !status.workers.is_empty();
+        Figures {
+            fps,
+            frame_time,
+            size: (view.width, view.height),
+            samples: view.samples,
+            workers: status.workers.len(),
+            threads: status.workers.iter().map(|worker| worker.threads).sum(),
+            triangles: self.about.triangles,
+            progress: slow.then(|| progress(status)),
+        }
+    }
+
+    fn title(&self, link: &Link) -> String {
+        let status = link.desk.status();
+        match &self.picture {
+            Some(_) => {
+                format!("rayfarm - {} - {}", self.about.name, self.figures(&status, link).speed())
+            }
+            None => format!("rayfarm - {}", self.about.name),
+        }
+    }
+}
+
+fn first_picture(status: &FarmStatus) -> String {
+    match progress(status) {
+        done if done > 0.0 => format!("Rendering the first picture: {:.0} %", done * 100.0),
+        _ => "Sending the scene to the workers.".to_owned(),
+    }
+}
+
+/// How much of the frame being rendered is done: 0..=1.
+fn progress(status: &FarmStatus) -> f64 {
+    f64::from(status.rows_done) / f64::from(status.rows.max(1))
+}

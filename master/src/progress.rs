@@ -1,0 +1,146 @@
+//! How far a `render` run is: a bar where standard error is a terminal, a line now and then where it is not.
+
+use std::io::{self, IsTerminal, Write};
+use std::net::SocketAddr;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::display::overlay::worker_command;
+use crate::farm::FarmStatus;
+
+/// Between two lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+/// How long no worker may be there before that is told, and told again. A local worker needs a moment to start.
+const PATIENCE: Duration = Duration::from_secs(3);
+const REMIND_EVERY: Duration = Duration::from_secs(30);
+
+/// The bar on the terminal, if there is one: log lines are written above it.
+static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// The progress of one run.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    frames: u64,
+    done: u64,
+    fps: f64,
+    address: SocketAddr,
+    local_workers: u32,
+    alone_since: Option<Instant>,
+    next_reminder: Duration,
+    started: Instant,
+    last_line: Instant,
+    quiet: bool,
+}
+
+impl Progress {
+    /// Of a run of `frames` frames, rendered by workers that connect to `address`.
+    pub(crate) fn new(frames: u64, address: SocketAddr, local_workers: u32) -> Self {
+        let quiet = !tracing::enabled!(tracing::Level::INFO);
+        let target = match io::stderr().is_terminal() && !quiet {
+            true => ProgressDrawTarget::stderr(),
+            false => ProgressDrawTarget::hidden(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(frames), target).with_style(style());
+        if !bar.is_hidden() {
+            *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
+        }
+        let now = Instant::now();
+        Self {
+            bar,
+            frames,
+            done: 0,
+            fps: 0.0,
+            address,
+            local_workers,
+            alone_since: None,
+            next_reminder: PATIENCE,
+            started: now,
+            last_line: now,
+            quiet,
+        }
+    }
+
+    /// `done` frames are complete, the last ones at this rate.
+    pub(crate) fn completed(&mut self, done: u64, fps: f64) {
+        (self.done, self.fps) = (done, fps);
+        self.bar.set_position(done);
+    }
+
+    /// Shows what the farm is doing; several times a second.
+    pub(crate) fn look(&mut self, status: &FarmStatus) {
+        self.bar.set_message(message(status, self.fps));
+        self.remind_of_workers(status.workers.is_empty());
+        if self.bar.is_hidden() && !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
+            self.last_line = Instant::now();
+            tracing::info!("{}", self.line(status));
+        }
+    }
+
+    /// The run is over, and `written` frames are on the disk.
+    pub(crate) fn finish(&mut self, written: u64) {
+        self.bar.finish_and_clear();
+        *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        let seconds = self.started.elapsed().as_secs_f64();
+        tracing::info!("{written} of {} frames written in {seconds:.1} s", self.frames);
+    }
+
+    fn remind_of_workers(&mut self, alone: bool) {
+        if !alone {
+            self.alone_since = None;
+            self.next_reminder = PATIENCE;
+            return;
+        }
+        let since = *self.alone_since.get_or_insert_with(Instant::now);
+        if since.elapsed() >= self.next_reminder {
+            self.next_reminder += REMIND_EVERY;
+            let whose = if self.local_workers == 0 { "a worker" } else { "this machine's worker" };
+            tracing::warn!("waiting for {whose}; to start one: {}", worker_command(self.address));
+        }
+    }
+
+    fn line(&self, status: &FarmStatus) -> String {
+        let left = match self.fps > 0.0 {
+            true => format!(", {:.0} s left", (self.frames - self.done) as f64 / self.fps),
+            false => String::new(),
+        };
+        format!("{} of {} frames{left}; {}", self.done, self.frames, message(status, self.fps))
+    }
+}
+
+fn style() -> ProgressStyle {
+    ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left, {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+fn message(status: &FarmStatus, fps: f64) -> String {
+    let workers = match status.workers.len() {
+        0 => "waiting for a worker".to_owned(),
+        1 => "1 worker".to_owned(),
+        n => format!("{n} workers"),
+    };
+    if fps >= 1.0 {
+        return format!("{fps:.1} FPS, {workers}");
+    }
+    let percent = 100.0 * f64::from(status.rows_done) / f64::from(status.rows.max(1));
+    format!("{fps:.2} FPS, {workers}, frame {percent:.0} %")
+}
+
+/// Standard error, below which a progress bar may stand: what is written appears above the bar.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct AboveTheBar;
+
+impl Write for AboveTheBar {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let bar = BAR.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        match bar {
+            Some(bar) => bar.suspend(|| io::stderr().write(bytes)),
+            None => io::stderr().write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}

@@ -1,0 +1,317 @@
+//! What a run is told as: one line of JSON, and a CSV line per frame.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::error::CommandError;
+
+/// What a `render` run did; `--json` prints it as one line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct RenderReport {
+    /// Frames rendered.
+    pub(crate) frames: u32,
+    /// Pixels per row.
+    pub(crate) width: u32,
+    /// Rows.
+    pub(crate) height: u32,
+    /// Rays per pixel.
+    pub(crate) samples: u32,
+    /// Workers connected when the last frame was done.
+    pub(crate) workers: u32,
+    /// Their render threads together.
+    pub(crate) threads: u32,
+    /// Triangles over all instances.
+    pub(crate) triangles: u64,
+    /// The mean over the frames.
+    pub(crate) rays_per_frame: RaysPerFrame,
+    /// Over the frames.
+    pub(crate) ms_per_frame: MsPerFrame,
+    /// The mean over the frames, all workers together.
+    pub(crate) bytes_per_frame: BytesPerFrame,
+    /// Bytes of scene and frame descriptions sent in the whole run, all workers together.
+    pub(crate) scene_bytes: u64,
+    /// Of the last frame's pixels: RGB8 rows, top to bottom.
+    pub(crate) blake3: String,
+}
+
+/// What a `bench` run measured; `--json` prints it as one line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct BenchReport {
+    /// Frames measured.
+    pub(crate) frames: u32,
+    /// Pixels per row.
+    pub(crate) width: u32,
+    /// Rows.
+    pub(crate) height: u32,
+    /// Rays per pixel.
+    pub(crate) samples: u32,
+    /// Render threads.
+    pub(crate) threads: usize,
+    /// Triangles over all instances.
+    pub(crate) triangles: u64,
+    /// Reading the scene and its models, and building what has to be built.
+    pub(crate) load_ms: f64,
+    /// The mean over the frames.
+    pub(crate) rays_per_frame: RaysPerFrame,
+    /// Over the frames: preparing and tracing.
+    pub(crate) ms_per_frame: MsPerFrame,
+    /// All rays by all time.
+    pub(crate) rays_per_second: f64,
+    /// Of the last frame's pixels: RGB8 rows, top to bottom.
+    pub(crate) blake3: String,
+}
+
+/// Rays of one frame by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct RaysPerFrame {
+    /// From the camera.
+    pub(crate) primary: u64,
+    /// Towards lights.
+    pub(crate) shadow: u64,
+    /// Reflected and transmitted.
+    pub(crate) secondary: u64,
+}
+
+impl RaysPerFrame {
+    /// The mean of a total over `frames` frames, to the nearest ray.
+    pub(crate) fn mean(self, frames: u32) -> Self {
+        let mean = |total| mean(total, frames);
+        Self { primary: mean(self.primary), shadow: mean(self.shadow), secondary: mean(self.secondary) }
+    }
+
+    /// Adds another frame's.
+    pub(crate) fn add(&mut self, other: Self) {
+        self.primary += other.primary;
+        self.shadow += other.shadow;
+        self.secondary += other.secondary;
+    }
+
+    /// Of all kinds.
+    pub(crate) fn total(self) -> u64 {
+        self.primary + self.shadow + self.secondary
+    }
+}
+
+/// How long frames took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct MsPerFrame {
+    /// The fastest.
+    pub(crate) min: f64,
+    /// Half were faster.
+    pub(crate) median: f64,
+    /// Nineteen in twenty were faster.
+    pub(crate) p95: f64,
+    /// The slowest.
+    pub(crate) max: f64,
+}
+
+impl MsPerFrame {
+    /// Of a run's frames; all zero for none.
+    pub(crate) fn of(times: &[Duration]) -> Self {
+        let mut sorted = times.to_vec();
+        sorted.sort_unstable();
+        let at = |share| round_to_us(percentile(&sorted, share));
+        Self { min: at(0.0), median: at(0.5), p95: at(0.95), max: at(1.0) }
+    }
+}
+
+/// Bytes on the wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct BytesPerFrame {
+    /// By the master.
+    pub(crate) sent: u64,
+    /// By the master.
+    pub(crate) received: u64,
+}
+
+impl BytesPerFrame {
+    /// Adds another frame's.
+    pub(crate) fn add(&mut self, other: Self) {
+        self.sent += other.sent;
+        self.received += other.received;
+    }
+}
+
+/// `total / count`, rounded to the nearest.
+pub(crate) fn mean(total: u64, count: u32) -> u64 {
+    let count = u64::from(count.max(1));
+    (total + count / 2) / count
+}
+
+/// The value that `share` (0..=1) of `sorted` lie below, interpolated between neighbours; zero for an empty slice.
+pub(crate) fn percentile(sorted: &[Duration], share: f64) -> Duration {
+    let Some(last) = sorted.len().checked_sub(1) else { return Duration::ZERO };
+    let place = share.clamp(0.0, 1.0) * last as f64;
+    let below = place.floor() as usize;
+    let above = (below + 1).min(last);
+    sorted[below] + (sorted[above] - sorted[below]).mul_f64(place - below as f64)
+}
+
+/// Milliseconds, with three digits behind the point: what clocks can tell.
+pub(crate) fn round_to_us(time: Duration) -> f64 {
+    (time.as_secs_f64() * 1e6).round() / 1e3
+}
+
+/// Prints `report` as one line on standard output.
+///
+/// # Errors
+/// A closed or full standard output.
+pub(crate) fn print_json(report: &impl Serialize) -> Result<(), CommandError> {
+    let line = serde_json::to_string(report).map_err(CommandError::failed)?;
+    writeln!(io::stdout().lock(), "{line}")
+        .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
+
+/// One line of the frame log.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct FrameLine {
+    /// From 0.
+    pub(crate) frame: u64,
+    /// Since the run began.
+    pub(crate) at: Duration,
+    /// What the frame took.
+    pub(crate) elapsed: Duration,
+    /// Frames a second, smoothed over about a second.
+    pub(crate) fps: f64,
+    /// Workers connected.
+    pub(crate) workers: u32,
+    /// Their render threads together.
+    pub(crate) threads: u32,
+    /// Rays of the frame.
+    pub(crate) rays: RaysPerFrame,
+    /// Bytes on the wire for the frame.
+    pub(crate) bytes: BytesPerFrame,
+}
+
+/// `--fps-log`: a CSV file with a line per frame, each on the disk as soon as it is known.
+#[derive(Debug)]
+pub(crate) struct FpsLog<W: Write> {
+    out: W,
+    name: String,
+}
+
+/// What the columns are.
+const CSV_HEADER: &str =
+    "frame,seconds,ms,fps,workers,threads,primary_rays,shadow_rays,secondary_rays,sent_bytes,received_bytes";
+
+impl FpsLog<BufWriter<File>> {
+    /// Creates the file and writes its first line.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub(crate) fn create(path: &Path) -> Result<Self, CommandError> {
+        let file = File::create(path).map_err(|error| {
+            CommandError::WrongInput(format!("{}: cannot write the frame log: {error}", path.display()))
+        })?;
+        Self::new(BufWriter::new(file), path.display().to_string())
+    }
+}
+
+impl<W: Write> FpsLog<W> {
+    fn new(out: W, name: String) -> Result<Self, CommandError> {
+        let mut log = Self { out, name };
+        log.write_line(CSV_HEADER)?;
+        Ok(log)
+    }
+
+    /// Adds one frame.
+    ///
+    /// # Errors
+    /// A full disk, for one.
+    pub(crate) fn add(&mut self, line: &FrameLine) -> Result<(), CommandError> {
+        let FrameLine { frame, at, elapsed, fps, workers, threads, rays, bytes } = line;
+        self.write_line(&format!(
+            "{frame},{:.6},{:.3},{fps:.3},{workers},{threads},{},{},{},{},{}",
+            at.as_secs_f64(),
+            elapsed.as_secs_f64() * 1e3,
+            rays.primary,
+            rays.shadow,
+            rays.secondary,
+            bytes.sent,
+            bytes.received,
+        ))
+    }
+
+    fn write_line(&mut self, line: &str) -> Result<(), CommandError> {
+        writeln!(self.out, "{line}")
+            .and_then(|()| self.out.flush())
+            .map_err(|error| CommandError::Failed(format!("{}: {error}", self.name)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(values: &[u64]) -> Vec<Duration> {
+        values.iter().copied().map(Duration::from_millis).collect()
+    }
+
+    #[test]
+    fn percentiles_interpolate() {
+        let sorted = ms(&[10, 20, 30, 40]);
+        assert_eq!(percentile(&sorted, 0.0), Duration::from_millis(10));
+        assert_eq!(percentile(&sorted, 0.5), Duration::from_millis(25));
+        assert_eq!(percentile(&sorted, 1.0), Duration::from_millis(40));
+        assert_eq!(percentile(&sorted, 7.0), Duration::from_millis(40));
+        assert_eq!(percentile(&[], 0.5), Duration::ZERO);
+        assert_eq!(percentile(&ms(&[3]), 0.95), Duration::from_millis(3));
+    }
+
+    #[test]
+    fn the_order_of_frames_does_not_matter() {
+        let expected = MsPerFrame { min: 1.0, median: 3.0, p95: 8.2, max: 9.0 };
+        assert_eq!(MsPerFrame::of(&ms(&[9, 1, 3, 5, 2])), expected);
+        assert_eq!(MsPerFrame::of(&ms(&[1, 2, 3, 5, 9])), expected);
+        assert_eq!(MsPerFrame::of(&[]), MsPerFrame::default());
+    }
+
+    #[test]
+    fn means_round_to_the_nearest() {
+        assert_eq!([mean(10, 4), mean(9, 4), mean(0, 4), mean(7, 0)], [3, 2, 0, 7]);
+    }
+
+    #[test]
+    fn the_json_line_has_the_documented_shape() {
+        let report = RenderReport {
+            frames: 2,
+            width: 64,
+            height: 48,
+            samples: 4,
+            workers: 1,
+            threads: 2,
+            triangles: 12,
+            rays_per_frame: RaysPerFrame { primary: 12_288, shadow: 7, secondary: 0 },
+            ms_per_frame: MsPerFrame { min: 1.5, median: 2.0, p95: 2.45, max: 2.5 },
+            bytes_per_frame: BytesPerFrame { sent: 100, received: 9_216 },
+            scene_bytes: 4_096,
+            blake3: "00ff".to_owned(),
+        };
+        assert_eq!(
+            serde_json::to_string(&report).unwrap(),
+            concat!(
+                r#"{"frames":2,"width":64,"height":48,"samples":4,"workers":1,"threads":2,"triangles":12,"#,
+                r#""rays_per_frame":{"primary":12288,"shadow":7,"secondary":0},"#,
+                r#""ms_per_frame":{"min":1.5,"median":2.0,"p95":2.45,"max":2.5},"#,
+                r#""bytes_per_frame":{"sent":100,"received":9216},"scene_bytes":4096,"blake3":"00ff"}"#,
+            )
+        );
+    }
+
+    #[test]
+    fn the_log_has_as_many_columns_as_its_first_line() {
+        let mut log = FpsLog::new(Vec::new(), "log".to_owned()).unwrap();
+        let line =
+            FrameLine { frame: 3, elapsed: Duration::from_micros(12_345), fps: 80.0, ..FrameLine::default() };
+        log.add(&line).unwrap();
+        let text = String::from_utf8(log.out).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 2);
+        assert_eq!(lines[1], "3,0.000000,12.345,80.000,0,0,0,0,0,0,0");
+        assert_eq!(lines[0].split(',').count(), lines[1].split(',').count());
+    }
+}
