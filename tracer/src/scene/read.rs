@@ -59,8 +59,11 @@ fn unreadable(path: &Path, source: io::Error) -> SceneError {
 /// All bytes of a file of at most `limit` bytes.
 pub(super) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, SceneError> {
     let read = || {
-        let mut bytes = Vec::new();
-        File::open(path)?.take(limit + 1).read_to_end(&mut bytes)?;
+        let file = File::open(path)?;
+        // Room for all of it at once: a compiled model may have hundreds of megabytes.
+        let announced = file.metadata()?.len().min(limit);
+        let mut bytes = Vec::with_capacity(usize::try_from(announced).unwrap_or_default());
+        file.take(limit + 1).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
     let bytes = read().map_err(|source| unreadable(path, source))?;

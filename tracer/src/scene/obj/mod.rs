@@ -11,7 +11,7 @@ mod materials;
 mod tests;
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::panic::catch_unwind;
 use std::path::Path;
 
@@ -123,7 +123,28 @@ fn parse(path: &Path, text: &str, triangles: usize, warnings: &mut Warnings) -> 
         normals.clear();
     }
     let triangles = parsed.indices.chunks_exact(3).filter_map(|corner| corner.try_into().ok()).collect();
-    Ok(Mesh { positions, normals, triangles, ..Mesh::default() })
+    let mesh = Mesh { positions, normals, triangles, ..Mesh::default() };
+    Ok(if mesh.normals.is_empty() { welded(mesh) } else { mesh })
+}
+
+/// Makes vertices at one place one vertex. Patches and parts repeat the vertices of their seams, and without normals
+/// of the file's own the averaged ones must not see those seams.
+fn welded(mesh: Mesh) -> Mesh {
+    let mut positions: Vec<DVec3> = Vec::with_capacity(mesh.positions.len());
+    let mut places: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.positions.len());
+    let mut weld = |position: &DVec3| {
+        // Adding zero makes one zero of both.
+        let place = position.to_array().map(|coordinate| (coordinate + 0.0).to_bits());
+        *places.entry(place).or_insert_with(|| {
+            positions.push(*position);
+            (positions.len() - 1) as u32
+        })
+    };
+    let vertices: Vec<u32> = mesh.positions.iter().map(&mut weld).collect();
+    // Indices come from the parser, which counted them itself; one astray is left for the compiler to refuse.
+    let weld_corner = |corner: u32| vertices.get(corner as usize).copied().unwrap_or(u32::MAX);
+    let triangles = mesh.triangles.into_iter().map(|triangle| triangle.map(weld_corner)).collect();
+    Mesh { positions, triangles, ..mesh }
 }
 
 fn points(numbers: &[f64]) -> impl Iterator<Item = DVec3> {

@@ -92,6 +92,16 @@ fn seams_of_texture_coordinates_do_not_split_vertices() {
 }
 
 #[test]
+fn seams_of_parts_do_not_split_vertices_unless_the_file_has_normals() {
+    let parts = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv -0.0 0 0\nv 1 1 0\nv 0 1 0\n";
+    let (mesh, _) = read(&format!("{parts}f 1 2 3\nf 4 5 6\n"));
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(corners(&mesh), square_corners());
+    let (mesh, _) = read(&format!("{parts}vn 0 0 1\nf 1//1 2//1 3//1\nf 4//1 5//1 6//1\n"));
+    assert_eq!(mesh.positions.len(), 6);
+}
+
+#[test]
 fn normals_of_the_file_are_kept_and_brought_to_unit_length() {
     let (mesh, warnings) = read(&format!("{SQUARE}vn 0 0 5\nvn 3 0 4\nf 1//1 2//2 3//1\nf 1//2 3//1 4//1"));
     assert_eq!(warnings, [""; 0]);

@@ -1,0 +1,121 @@
+use super::super::{NormalMode, Plane, Sphere, Triangle};
+use super::*;
+
+fn scene() -> Scene {
+    let direction = DVec3::NEG_Y;
+    let light = |kind| Light {
+        kind,
+        color: Vec3::ONE,
+        attenuation: Attenuation::Polynomial { constant: 1.0, linear: 0.0, quadratic: 0.5 },
+        shadows: true,
+    };
+    let position = DVec3::splat(3.0);
+    Scene {
+        ambient: Vec3::splat(0.1),
+        render: RenderSettings::default(),
+        camera: Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+        background: Background::Gradient { bottom: Vec3::ZERO, top: Vec3::ONE },
+        lights: vec![
+            light(LightKind::Point { position }),
+            light(LightKind::Spot { position, direction, beam_angle: 40.0, penumbra: 20.0 }),
+            light(LightKind::Directional { direction }),
+        ],
+        materials: vec![Material::NEUTRAL; 2],
+        models: vec![Model {
+            mesh: MeshId([7; 32]),
+            materials: vec![0, 1],
+            normals: NormalMode::Smooth,
+            translate: DVec3::ZERO,
+            rotate: DVec3::ZERO,
+            scale: DVec3::new(1.0, -2.0, 3.0),
+        }],
+        spheres: vec![Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 }],
+        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1 }],
+        triangles: vec![Triangle { vertices: [DVec3::X, DVec3::Y, DVec3::Z], material: 1 }],
+    }
+}
+
+fn spoiled(spoil: impl FnOnce(&mut Scene)) -> String {
+    let mut scene = scene();
+    spoil(&mut scene);
+    scene.validate().unwrap_err().to_string()
+}
+
+#[test]
+fn a_sound_scene_passes_and_names_its_meshes() {
+    assert_eq!(scene().validate(), Ok(()));
+    assert_eq!(scene().mesh_ids(), BTreeSet::from([MeshId([7; 32])]));
+    assert_eq!(FrameView::of(&scene()).validate(), Ok(()));
+}
+
+#[test]
+fn indices_that_point_nowhere_are_found() {
+    assert_eq!(spoiled(|s| s.spheres[0].material = 2), "spheres[0] names material 2, but the scene has 2");
+    assert!(spoiled(|s| s.planes[0].material = u32::MAX).starts_with("planes[0] names material"));
+    assert!(spoiled(|s| s.triangles[0].material = 9).starts_with("triangles[0] names material 9"));
+    assert!(spoiled(|s| s.models[0].materials[1] = 5).starts_with("models[0] names material 5"));
+}
+
+#[test]
+fn numbers_out_of_bounds_are_found_by_name() {
+    type Spoil = fn(&mut Scene);
+    let cases: [(Spoil, &str); 22] = [
+        (|s| s.ambient.x = f32::NAN, "ambient"),
+        (|s| s.render.width = 0, "width"),
+        (|s| s.render.height = 16_385, "height"),
+        (|s| s.render.samples = 8, "samples"),
+        (|s| s.render.max_depth = 65, "max_depth"),
+        (|s| s.render.min_contribution = -0.1, "min_contribution"),
+        (|s| s.camera.position.x = f64::INFINITY, "camera.position"),
+        (|s| s.camera.fov = 180.0, "camera.fov"),
+        (|s| s.camera.zoom = 0.0, "camera.zoom"),
+        (|s| s.camera.look_at = s.camera.position, "somewhere else"),
+        (|s| s.camera.up = DVec3::Z * 5.0, "parallel"),
+        (|s| s.background = Background::Color(Vec3::splat(2.0)), "background"),
+        (|s| s.lights[0].color.y = -1.0, "lights[0].color"),
+        (|s| s.lights[1].kind = LightKind::Directional { direction: DVec3::ONE }, "lights[1].direction"),
+        (|s| s.lights[2].kind = LightKind::Point { position: DVec3::NAN }, "lights[2].position"),
+        (|s| s.materials[1].exponent = f32::INFINITY, "materials[1].exponent"),
+        (|s| s.materials[0].diffuse.z = 1.5, "materials[0].diffuse"),
+        (|s| s.models[0].scale.y = 0.0, "models[0].scale"),
+        (|s| s.models[0].rotate.y = f64::NAN, "models[0].rotate"),
+        (|s| s.spheres[0].radius = -1.0, "spheres[0].radius"),
+        (|s| s.planes[0].normal = DVec3::ZERO, "planes[0].normal"),
+        (|s| s.triangles[0].vertices[2].y = 1e31, "triangles[0].vertices"),
+    ];
+    for (spoil, name) in cases {
+        let message = spoiled(spoil);
+        assert!(message.contains(name), "{message} / {name}");
+    }
+}
+
+#[test]
+fn attenuations_that_divide_by_zero_are_found() {
+    let message = spoiled(|s| {
+        s.lights[0].attenuation = Attenuation::Polynomial { constant: 0.0, linear: 0.0, quadratic: 0.0 };
+    });
+    assert!(message.contains("lights[0].attenuation"), "{message}");
+}
+
+#[test]
+fn lists_are_bounded() {
+    let message = spoiled(|s| s.planes = vec![s.planes[0]; MAX_PLANES + 1]);
+    assert_eq!(message, "the scene has 1025 planes; 1024 are allowed");
+    let message = spoiled(|s| s.lights = vec![s.lights[0]; MAX_LIGHTS + 1]);
+    assert!(message.contains("4097 lights"), "{message}");
+}
+
+#[test]
+fn cameras_are_refused_only_when_up_is_truly_parallel() {
+    assert_eq!(view_fault(DVec3::new(1e-9, -1.0, 0.0), DVec3::Y), None);
+    assert!(view_fault(DVec3::new(0.1, 0.7, -0.3) * 1e-20, DVec3::new(-0.1, -0.7, 0.3) * 1e20).is_some());
+}
+
+#[test]
+fn frames_from_the_wire_are_checked() {
+    let mut view = FrameView::of(&scene());
+    view.spin = f64::NAN;
+    assert!(view.validate().unwrap_err().to_string().starts_with("spin"));
+    view = FrameView { width: 0, ..FrameView::of(&scene()) };
+    assert!(view.validate().unwrap_err().to_string().contains("1 to 16384"));
+}
