@@ -2,7 +2,7 @@
 //!
 //! The pipeline, in the order of the data:
 //!
-//! ```ignore
+//! ```
 //! use std::sync::Arc;
 //! use rayfarm_tracer::{CompiledScene, PreparedFrame, image, render_rows, scene};
 //!
