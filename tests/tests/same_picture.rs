@@ -1,0 +1,111 @@
+//! The same picture, whoever renders it: workers, threads and policies change no byte.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+
+use rayfarm_tests::{Running, Scenes, master, shared};
+use rayfarm_tracer::image::RgbImage;
+use rayfarm_tracer::scene::{FrameView, load};
+use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
+
+fn render(scene: &Path, output: &Path, more: &[&str]) -> serde_json::Value {
+    let mut command: Command = master();
+    command.arg("render").arg(scene).arg("-o").arg(output).args(["--json", "--listen", "127.0.0.1:0"]).args(more);
+    let outcome = Running::start(&mut command).finish().expect_success();
+    let mut lines = outcome.stdout.lines();
+    let report = serde_json::from_str(lines.next().unwrap()).unwrap();
+    assert_eq!(lines.next(), None, "one line of JSON and nothing else");
+    report
+}
+
+/// The tracer in this process, without the farm.
+fn traced(scene: &Path) -> RgbImage {
+    let loaded = load(scene).unwrap();
+    let view = FrameView::of(&loaded.scene);
+    let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes).unwrap());
+    let mut image = RgbImage::new(view.width, view.height);
+    render_rows(&PreparedFrame::new(compiled, &view).unwrap(), 0..view.height, &mut image.pixels, &|| false)
+        .unwrap();
+    image
+}
+
+#[test]
+fn one_two_and_three_workers_render_the_bytes_of_the_tracer() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    let expected = traced(&scene);
+    for workers in ["1", "2", "3"] {
+        let name = format!("by-{workers}.png");
+        let report =
+            render(&scene, &scenes.path(&name), &["--local-workers", workers, "--threads", "1"]);
+        let image = rayfarm_tracer::image::load(&scenes.path(&name)).unwrap();
+        assert!(image == expected, "{workers} workers");
+        assert_eq!(report["workers"], workers.parse::<u32>().unwrap());
+        assert_eq!(report["blake3"], blake3::hash(&expected.pixels).to_string());
+        assert_eq!(report["rays_per_frame"]["primary"], 160 * 120);
+    }
+    assert_eq!(scenes.read("by-1.png"), scenes.read("by-2.png"));
+    assert_eq!(scenes.read("by-1.png"), scenes.read("by-3.png"));
+}
+
+#[test]
+fn every_policy_and_segment_size_renders_the_same_bytes() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    let expected = traced(&scene);
+    for segment in ["static:1", "static:7", "static:1000", "smart:16", "smart:3", "adaptive"] {
+        let output = scenes.path("picture.ppm");
+        render(&scene, &output, &["--segment", segment, "--local-workers", "2", "--threads", "2"]);
+        assert!(rayfarm_tracer::image::load(&output).unwrap() == expected, "{segment}");
+    }
+}
+
+#[test]
+fn a_compiled_model_renders_as_its_source_does() {
+    let scenes = Scenes::new();
+    let (source, compiled) = (scenes.path("bumps.obj"), scenes.path("bumps.rfm"));
+    let mut compile = master();
+    compile.arg("compile").arg(&source).arg("-o").arg(&compiled);
+    Running::start(&mut compile).finish().expect_success();
+    let size = ["--size", "120x90"];
+    let [a, b] = [(&source, "a.png"), (&compiled, "b.png")]
+        .map(|(model, name)| render(model, &scenes.path(name), &size)["blake3"].clone());
+    assert_eq!(a, b);
+}
+
+#[test]
+fn a_camera_move_costs_each_worker_less_than_a_kilobyte() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    let scene_bytes = |frames: &str| {
+        let output = scenes.path("frame-%03d.ppm");
+        let more = ["--frames", frames, "--orbit", "90", "--size", "40x30", "--local-workers", "2"];
+        render(&scene, &output, &more)["scene_bytes"].as_u64().unwrap()
+    };
+    let (few, many) = (scene_bytes("2"), scene_bytes("42"));
+    // 40 more frames, two workers.
+    let per_frame_and_worker = (many - few) / 80;
+    assert!(per_frame_and_worker > 0 && per_frame_and_worker < 1024, "{per_frame_and_worker} bytes");
+}
+
+/// The seed system's headline scene, where its mesh is at hand.
+#[test]
+fn workload_w1_by_one_two_and_three_workers() {
+    let Some(scene) = shared("workloads/w1.toml") else { return };
+    let Some(reference) = shared("workloads/reference/w1.png") else { return };
+    let scenes = Scenes::new();
+    for workers in ["1", "2", "3"] {
+        let name = format!("w1-by-{workers}.png");
+        render(&scene, &scenes.path(&name), &["--local-workers", workers]);
+        assert!(scenes.read(&name) == scenes.read("w1-by-1.png"), "{workers} workers");
+    }
+    let picture = rayfarm_tracer::image::load(&scenes.path("w1-by-1.png")).unwrap();
+    let reference = rayfarm_tracer::image::load(&reference).unwrap();
+    let off = (picture.pixels.chunks_exact(3).zip(reference.pixels.chunks_exact(3)))
+        .filter(|(a, b)| a.iter().zip(b.iter()).any(|(a, b)| a.abs_diff(*b) > 2))
+        .count();
+    // An independent tracer in single precision: single pixels at silhouettes and shadow edges differ.
+    assert!(off < 400, "{off} of 786432 pixels differ from the reference picture");
+}
