@@ -12,7 +12,13 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 fn render(scene: &Path, output: &Path, more: &[&str]) -> serde_json::Value {
     let mut command: Command = master();
-    command.arg("render").arg(scene).arg("-o").arg(output).args(["--json", "--listen", "127.0.0.1:0"]).args(more);
+    command
+        .arg("render")
+        .arg(scene)
+        .arg("-o")
+        .arg(output)
+        .args(["--json", "--listen", "127.0.0.1:0"])
+        .args(more);
     let outcome = Running::start(&mut command).finish().expect_success();
     let mut lines = outcome.stdout.lines();
     let report = serde_json::from_str(lines.next().unwrap()).unwrap();
@@ -38,8 +44,7 @@ fn one_two_and_three_workers_render_the_bytes_of_the_tracer() {
     let expected = traced(&scene);
     for workers in ["1", "2", "3"] {
         let name = format!("by-{workers}.png");
-        let report =
-            render(&scene, &scenes.path(&name), &["--local-workers", workers, "--threads", "1"]);
+        let report = render(&scene, &scenes.path(&name), &["--local-workers", workers, "--threads", "1"]);
         let image = rayfarm_tracer::image::load(&scenes.path(&name)).unwrap();
         assert!(image == expected, "{workers} workers");
         assert_eq!(report["workers"], workers.parse::<u32>().unwrap());

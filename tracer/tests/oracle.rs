@@ -5,6 +5,7 @@
 
 mod common;
 
+use std::path::Path;
 use std::sync::Arc;
 
 use common::{analytic, empty, instanced, light, point, render};
@@ -107,4 +108,26 @@ fn no_light_a_light_on_a_surface_one_at_the_camera_and_a_thousand() {
         let wrong = off_from_oracle(&scene, &[], &FrameView::of(&scene));
         assert_eq!(wrong, 0, "{} lights", scene.lights.len());
     }
+}
+/// The scene of the seed system's headline, where its mesh is at hand: every 97th pixel against the oracle.
+#[test]
+fn workload_w1_every_97th_pixel() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/workloads/w1.toml");
+    if !path.exists() {
+        eprintln!("skipped: {} is not there", path.display());
+        return;
+    }
+    let loaded = rayfarm_tracer::scene::load(&path).unwrap();
+    let view = FrameView { width: 256, height: 192, ..FrameView::of(&loaded.scene) };
+    let (image, _) = render(&loaded.scene, &loaded.meshes, &view);
+    let oracle = Oracle::new(&loaded.scene, &loaded.meshes, &view);
+    let tested: Vec<u32> = (0..view.width * view.height).step_by(97).collect();
+    let wrong = tested.iter().filter(|&&i| {
+        let (x, y) = (i % view.width, i / view.width);
+        let expected = oracle.encoded_pixel(x, y);
+        let found = image.pixel(x, y).unwrap();
+        found.iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 1)
+    });
+    let wrong = wrong.count();
+    assert_eq!(wrong, 0, "of {} pixels", tested.len());
 }
