@@ -30,7 +30,7 @@ impl Scenes {
     pub fn new() -> Self {
         let scenes = Self { folder: tempfile::tempdir().unwrap() };
         scenes.write("small.toml", SMALL);
-        scenes.write("bumps.obj", &bumps(40));
+        scenes.write("bumps.obj", bumps(40));
         scenes
     }
 
