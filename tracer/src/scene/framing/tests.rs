@@ -70,6 +70,7 @@ fn the_point_on_the_axis_is_the_one_nearest_to_the_middle() {
     // Behind, sideways, and here.
     assert_eq!(at(middle_at(DVec3::new(0.0, 0.0, 5.0))), DVec3::NEG_Z * 5.0);
     assert_eq!(at(middle_at(DVec3::new(3.0, 4.0, 0.0))), DVec3::NEG_Z * 5.0);
+    assert_eq!(at(middle_at(DVec3::new(3.0, 4.0, -1e-9))), DVec3::NEG_Z * 5.0);
     assert_eq!(at(middle_at(DVec3::ZERO)), DVec3::NEG_Z);
 }
 
