@@ -12,16 +12,27 @@
 //! for, in order. A third open request replaces the second as long as that one has not begun, so a moving camera never queues up.
 //! A request of another picture size gives up all earlier ones, begun or not: nobody can show them any more.
 
-use std::net::SocketAddr;
-use std::ops::Deref;
+use std::io::ErrorKind;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{FrameView, Scene};
+use rayfarm_tracer::scene::{FrameView, Scene, ValidateError};
+use tokio::net::TcpListener;
+use tokio_util::sync::{CancellationToken, DropGuard};
+use tokio_util::task::TaskTracker;
 
+use crate::assets::Assets;
+use crate::driver::Driver;
+use crate::local_workers::LocalWorkers;
+use crate::server;
+
+pub use crate::assets::AssetError;
+pub use crate::framebuffer::FramePixels;
 pub use crate::scheduler::policy::SegmentPolicy;
-pub use rayfarm_protocol::FrameId;
+pub use rayfarm_protocol::{Cost as FrameCounts, FrameId};
 
 /// Where workers connect when nobody says otherwise.
 pub const DEFAULT_PORT: u16 = 7117;
@@ -52,6 +63,10 @@ pub struct FarmScene {
 /// only without waiting for them.
 pub struct Farm {
     address: SocketAddr,
+    driver: Arc<Driver>,
+    sessions: TaskTracker,
+    processes: TaskTracker,
+    stop: DropGuard,
 }
 
 /// A completed picture and what it took.
@@ -63,7 +78,8 @@ pub struct FinishedFrame {
     pub view: FrameView,
     /// RGB8 sRGB rows, top to bottom: `view.width * view.height * 3` bytes.
     pub pixels: FramePixels,
-    /// What the segments of the picture took, summed: nanoseconds of tracing and rays by kind.
+    /// What the segments of the picture took, summed: nanoseconds of tracing over all threads, and rays by kind.
+    /// Each row counts once, however many workers rendered it.
     pub counts: FrameCounts,
     /// From the moment the frame began to its last row.
     pub elapsed: Duration,
@@ -77,40 +93,6 @@ pub struct FinishedFrame {
     pub received_bytes: u64,
     /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
     pub scene_bytes: u64,
-}
-
-/// What a frame's segments took. Each row counts once, however many workers rendered it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FrameCounts {
-    /// Time that workers spent tracing, summed, in nanoseconds.
-    pub trace_ns: u64,
-    /// Primary rays.
-    pub primary: u64,
-    /// Shadow rays.
-    pub shadow: u64,
-    /// Rays of reflection and transmission.
-    pub secondary: u64,
-}
-
-/// The pixels of a finished frame; read them as `&[u8]`.
-#[derive(Debug)]
-pub struct FramePixels {
-    bytes: Vec<u8>,
-}
-
-impl FramePixels {
-    /// Takes the bytes out, for those who keep the picture.
-    pub fn into_vec(self) -> Vec<u8> {
-        self.bytes
-    }
-}
-
-impl Deref for FramePixels {
-    type Target = [u8];
-
-    fn deref(&self) -> &[u8] {
-        &self.bytes
-    }
 }
 
 /// A look at the farm, for overlays and progress bars.
@@ -139,33 +121,103 @@ pub struct WorkerStatus {
     pub threads: u32,
     /// Segments it has finished since it connected.
     pub segments_done: u64,
-    /// Rows per second, smoothed; 0 before the first segment.
+    /// Rows of average cost per second, smoothed; 0 before that is known.
     pub speed: f64,
+    /// Why it could not render a frame, the last time it could not.
+    pub trouble: Option<String>,
 }
 
 /// Why a farm cannot start or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum FarmError {
     /// The address cannot be listened on.
-    #[error("cannot listen for workers on {address}: {source}; {remedy}")]
+    #[error("cannot listen for workers on {address}: {source}; {}", remedy(source, address))]
     Listen {
         /// What was asked for.
         address: SocketAddr,
         /// What the operating system said.
         source: std::io::Error,
-        /// What to do about it.
-        remedy: &'static str,
     },
+    /// The scene cannot be sent to workers.
+    #[error(transparent)]
+    Assets(#[from] AssetError),
+    /// A frame was requested that cannot be rendered.
+    #[error("this frame cannot be rendered: {0}")]
+    View(#[source] ValidateError),
+    /// Nobody is left to render: the local workers keep dying, and no other is connected.
+    #[error(
+        "no worker is left: {reason}; look at its messages above, or start workers by hand: \
+         rayfarm-worker --master {address}"
+    )]
+    NoWorkers {
+        /// What became of the last local worker.
+        reason: String,
+        /// Where workers connect.
+        address: SocketAddr,
+    },
+}
+
+fn remedy(error: &std::io::Error, address: &SocketAddr) -> String {
+    let port = address.port();
+    match error.kind() {
+        ErrorKind::AddrInUse => format!(
+            "port {port} belongs to another program (another rayfarm-master?): end it, or choose another port with \
+             --listen {}:PORT",
+            address.ip()
+        ),
+        ErrorKind::AddrNotAvailable => format!(
+            "{} is no address of this machine; --listen 0.0.0.0:{port} listens on all it has",
+            address.ip()
+        ),
+        ErrorKind::PermissionDenied => "choose a port above 1023 with --listen ADDR:PORT".to_owned(),
+        _ => "choose another address or port with --listen ADDR:PORT".to_owned(),
+    }
 }
 
 impl Farm {
     /// Binds the listening address, starts the local workers and waits for requests.
     ///
     /// # Errors
-    /// [`FarmError::Listen`] when the address is taken or does not belong to this machine.
-    pub async fn start(options: FarmOptions, _scene: FarmScene) -> Result<Farm, FarmError> {
-        let address = options.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], DEFAULT_PORT)));
-        Ok(Farm { address })
+    /// [`FarmError::Listen`] when the address is taken or does not belong to this machine, [`FarmError::Assets`]
+    /// when the scene cannot be sent.
+    pub async fn start(options: FarmOptions, scene: FarmScene) -> Result<Farm, FarmError> {
+        // Where even this is not known, the name alone may be found, and the failure to start is reported.
+        let program = std::env::current_exe().unwrap_or_else(|_| "rayfarm-master".into());
+        Self::start_with_worker_program(options, scene, program).await
+    }
+
+    /// As [`Farm::start`], with local workers run from another program; it is given the same arguments.
+    ///
+    /// # Errors
+    /// As [`Farm::start`].
+    pub async fn start_with_worker_program(
+        options: FarmOptions,
+        scene: FarmScene,
+        program: PathBuf,
+    ) -> Result<Farm, FarmError> {
+        let assets = Assets::new(&scene.scene, scene.meshes)?;
+        let (listener, address) = listen(options.listen).await?;
+        let driver = Arc::new(Driver::new(options.policy, assets));
+        let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());
+        let stop = CancellationToken::new();
+
+        let clock = driver.clone();
+        let stopped = stop.clone();
+        tokio::spawn(async move { clock.keep_time(stopped).await });
+        tokio::spawn(server::accept(listener, driver.clone(), sessions.clone(), stop.clone()));
+        let local = LocalWorkers {
+            program,
+            count: options.local_workers,
+            threads: options.threads,
+            listening: address,
+        };
+        let bereaved = driver.clone();
+        local.start(&processes, &stop, move |reason| {
+            if bereaved.worker_count() == 0 {
+                bereaved.report(FarmError::NoWorkers { reason, address });
+            }
+        });
+        Ok(Farm { address, driver, sessions, processes, stop: stop.drop_guard() })
     }
 
     /// Where workers connect.
@@ -173,24 +225,53 @@ impl Farm {
         self.address
     }
 
-    /// The frame to render next; see the top of this file for what becomes of earlier requests.
-    pub fn request(&self, _view: FrameView) -> FrameId {
-        FrameId(0)
+    /// The frame to render next; see the top of this file for what becomes of earlier requests. A frame that cannot
+    /// be rendered at all (no pixels, a camera that sees nothing) is an error of [`Farm::finished`].
+    pub fn request(&self, view: FrameView) -> FrameId {
+        self.driver.request(view)
     }
 
-    /// The next completed frame, in the order of requests. Waits for as long as it takes.
+    /// The next completed frame, in the order of requests. Waits for as long as it takes. Safe to drop half-way, as
+    /// `select!` does.
     ///
     /// # Errors
-    /// When the farm cannot complete frames any more; the message says why and what to do.
+    /// [`FarmError::View`] for a request that cannot be rendered; [`FarmError::NoWorkers`], once, when nobody is
+    /// left to render: a worker that connects later goes on with the frame.
     pub async fn finished(&mut self) -> Result<FinishedFrame, FarmError> {
-        std::future::pending().await
+        self.driver.next_finished().await
     }
 
     /// What is going on right now.
     pub fn status(&self) -> FarmStatus {
-        FarmStatus::default()
+        self.driver.status()
     }
 
     /// Says goodbye to all workers and waits, not for long, until the local ones have ended; kills what has not.
-    pub async fn shut_down(self) {}
+    pub async fn shut_down(self) {
+        self.driver.part("the master ends").await;
+        let stop = self.stop.disarm();
+        stop.cancel();
+        for tasks in [self.processes, self.sessions] {
+            tasks.close();
+            tasks.wait().await;
+        }
+    }
+}
+
+/// Binds the address asked for, or else the usual one, or else whatever is free.
+async fn listen(asked: Option<SocketAddr>) -> Result<(TcpListener, SocketAddr), FarmError> {
+    let usual = SocketAddr::from((Ipv4Addr::LOCALHOST, DEFAULT_PORT));
+    let address = asked.unwrap_or(usual);
+    let bound = match TcpListener::bind(address).await {
+        Err(error) if asked.is_none() && error.kind() == ErrorKind::AddrInUse => {
+            let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await;
+            if let Some(port) = free.as_ref().ok().and_then(|listener| listener.local_addr().ok()) {
+                tracing::info!("port {DEFAULT_PORT} is taken; workers connect to {port} instead");
+            }
+            free
+        }
+        bound => bound,
+    };
+    let found = bound.and_then(|listener| listener.local_addr().map(|address| (listener, address)));
+    found.map_err(|source| FarmError::Listen { address, source })
 }

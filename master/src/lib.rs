@@ -4,19 +4,31 @@
 //! reports) asks for frames and shows them; everything below it (scheduler, sessions, framebuffers, local worker
 //! processes) sees to it that each one completes.
 
-pub mod farm;
-pub mod scheduler;
-
+mod assets;
 mod camera_control;
 mod cli;
 mod commands;
 mod display;
+mod driver;
 mod error;
+pub mod farm;
+mod framebuffer;
+mod lease_book;
+mod local_workers;
 mod logging;
 mod orbit;
 mod output;
 mod progress;
 mod report;
+pub mod scheduler;
+mod server;
+
+#[cfg(test)]
+mod fake_worker;
+#[cfg(test)]
+mod farm_tests;
+#[cfg(test)]
+mod test_scene;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

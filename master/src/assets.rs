@@ -1,0 +1,154 @@
+//! What workers fetch once and keep: the scene body and the meshes it names, each under the hash of its bytes.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use bytes::Bytes;
+use rayfarm_protocol::AssetId;
+use rayfarm_protocol::codec::{self, CodecError};
+use rayfarm_protocol::limits::{MAX_ASSET_BYTES, MAX_DECODE_BYTES};
+use rayfarm_tracer::mesh::{CompiledMesh, MeshId};
+use rayfarm_tracer::scene::Scene;
+
+/// Why a scene cannot be sent.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetError {
+    /// The scene has no encoding.
+    #[error("cannot encode the scene for the workers: {0}")]
+    Encode(#[from] CodecError),
+
+    /// The scene body is longer than a worker reads.
+    #[error(
+        "the scene without its meshes takes {bytes} bytes, workers take at most {limit}; \
+         move single [[triangle]]s into an OBJ file"
+    )]
+    SceneTooLong {
+        /// Its length.
+        bytes: usize,
+        /// The bound.
+        limit: usize,
+    },
+
+    /// A mesh is longer than an asset may be.
+    #[error(
+        "a compiled mesh takes {bytes} bytes, an asset at most {limit}; split the model into several files"
+    )]
+    MeshTooLong {
+        /// Its length.
+        bytes: usize,
+        /// The bound.
+        limit: u64,
+    },
+
+    /// The scene names a mesh that was not given.
+    #[error("the scene names the mesh {0}, which was not loaded with it")]
+    MissingMesh(AssetId),
+}
+
+/// The assets of one scene. Bytes are shared with whoever sends them, never copied.
+#[derive(Debug)]
+pub(crate) struct Assets {
+    scene: AssetId,
+    blobs: BTreeMap<AssetId, Bytes>,
+}
+
+/// A compiled mesh as the owner of its bytes: 100 MB lie in memory once, however many workers fetch them.
+struct MeshBytes(Arc<CompiledMesh>);
+
+impl AsRef<[u8]> for MeshBytes {
+    fn as_ref(&self) -> &[u8] {
+        self.0.bytes()
+    }
+}
+
+impl Assets {
+    /// The scene's body, and those of `meshes` that it names.
+    pub(crate) fn new(scene: &Scene, meshes: Vec<Arc<CompiledMesh>>) -> Result<Self, AssetError> {
+        let body = codec::encode(scene)?;
+        if body.len() > MAX_DECODE_BYTES {
+            return Err(AssetError::SceneTooLong { bytes: body.len(), limit: MAX_DECODE_BYTES });
+        }
+        let scene_id = AssetId::of(&body);
+        let mut blobs = BTreeMap::from([(scene_id, Bytes::from(body))]);
+        let mut missing: BTreeSet<MeshId> = scene.mesh_ids();
+        for mesh in meshes.into_iter().filter(|mesh| missing.remove(&mesh.id())) {
+            let (id, bytes) = (AssetId(mesh.id().0), mesh.bytes().len());
+            if bytes as u64 > MAX_ASSET_BYTES {
+                return Err(AssetError::MeshTooLong { bytes, limit: MAX_ASSET_BYTES });
+            }
+            blobs.insert(id, Bytes::from_owner(MeshBytes(mesh)));
+        }
+        match missing.first() {
+            Some(id) => Err(AssetError::MissingMesh(AssetId(id.0))),
+            None => Ok(Self { scene: scene_id, blobs }),
+        }
+    }
+
+    /// The name of the scene body.
+    pub(crate) fn scene(&self) -> AssetId {
+        self.scene
+    }
+
+    /// An asset's bytes.
+    pub(crate) fn get(&self, id: AssetId) -> Option<Bytes> {
+        self.blobs.get(&id).cloned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use rayfarm_tracer::mesh::{Mesh, NamedMaterial};
+    use rayfarm_tracer::scene::{Material, Model, NormalMode};
+
+    use super::*;
+    use crate::test_scene;
+
+    fn triangle() -> Arc<CompiledMesh> {
+        let mesh = Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]],
+            triangle_materials: vec![0],
+            materials: vec![NamedMaterial { name: "plain".into(), material: Material::NEUTRAL }],
+            ..Mesh::default()
+        };
+        Arc::new(CompiledMesh::compile(&mesh).unwrap().0)
+    }
+
+    fn scene_with(mesh: MeshId) -> Scene {
+        let model = Model {
+            mesh,
+            materials: vec![0],
+            normals: NormalMode::Flat,
+            translate: DVec3::ZERO,
+            rotate: DVec3::ZERO,
+            scale: DVec3::ONE,
+        };
+        Scene { models: vec![model], ..test_scene::scene() }
+    }
+
+    #[test]
+    fn assets_bear_the_hash_of_their_bytes_and_share_the_mesh() {
+        let mesh = triangle();
+        let scene = scene_with(mesh.id());
+        let assets = Assets::new(&scene, vec![mesh.clone(), mesh.clone()]).unwrap();
+        let bytes = assets.get(AssetId(mesh.id().0)).unwrap();
+        assert_eq!(bytes.as_ptr(), mesh.bytes().as_ptr());
+        assert_eq!(AssetId::of(&bytes).0, mesh.id().0);
+        let body = assets.get(assets.scene()).unwrap();
+        assert_eq!(codec::decode::<Scene>(&body, MAX_DECODE_BYTES).unwrap(), scene);
+    }
+
+    #[test]
+    fn meshes_that_nobody_names_are_left_out() {
+        let mesh = triangle();
+        let assets = Assets::new(&test_scene::scene(), vec![mesh.clone()]).unwrap();
+        assert_eq!(assets.get(AssetId(mesh.id().0)), None);
+    }
+
+    #[test]
+    fn a_missing_mesh_is_named() {
+        let error = Assets::new(&scene_with(MeshId([0xab; 32])), Vec::new()).unwrap_err();
+        assert!(error.to_string().contains("abababab"), "{error}");
+    }
+}

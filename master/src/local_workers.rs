@@ -1,0 +1,202 @@
+//! Worker processes on this machine: started with the farm, ended with it, started again when they die.
+//!
+//! Each one is this program run again as a worker. The master holds the other end of its standard input and never
+//! writes to it: when the master dies, in whatever way, the pipe closes and the worker ends.
+
+use std::ffi::OsString;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::path::PathBuf;
+use std::process::{ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use tokio::process::{Child, Command};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+use crate::cli::LOCAL_WORKER;
+
+/// A worker that dies before it has lived this long died young.
+const YOUNG: Duration = Duration::from_secs(30);
+/// Deaths of young workers in a row before one is given up.
+const MAX_YOUNG_DEATHS: u32 = 5;
+/// The pause before a worker is started again; doubled with each young death.
+const FIRST_PAUSE: Duration = Duration::from_millis(500);
+/// How long a worker may take to end when it is asked to.
+const ENDING: Duration = Duration::from_secs(3);
+
+/// What to start.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalWorkers {
+    pub(crate) program: PathBuf,
+    pub(crate) count: u32,
+    /// Render threads of each; `None` divides the cores.
+    pub(crate) threads: Option<usize>,
+    /// Where the master listens.
+    pub(crate) listening: SocketAddr,
+}
+
+impl LocalWorkers {
+    /// Starts all of them, each with a task that looks after it until `stop`. When the last one has been given
+    /// up, `given_up` is told why.
+    pub(crate) fn start(
+        self,
+        tasks: &TaskTracker,
+        stop: &CancellationToken,
+        given_up: impl Fn(String) + Send + Sync + 'static,
+    ) {
+        let left = Arc::new(AtomicU32::new(self.count));
+        let given_up = Arc::new(given_up);
+        for number in 0..self.count {
+            let (left, given_up, stop) = (left.clone(), given_up.clone(), stop.clone());
+            let nursery =
+                Nursery { number: number + 1, program: self.program.clone(), args: self.args(number) };
+            tasks.spawn(async move {
+                let reason = nursery.run(&stop).await;
+                if let Some(reason) = reason.filter(|_| left.fetch_sub(1, Ordering::Relaxed) == 1) {
+                    given_up(reason);
+                }
+            });
+        }
+    }
+
+    fn args(&self, number: u32) -> Vec<OsString> {
+        let master = reachable(self.listening).to_string();
+        let name = format!("local-{}", number + 1);
+        let mut args = vec![LOCAL_WORKER.to_owned(), "--master".into(), master, "--exit-with-stdin".into()];
+        args.extend(["--name".into(), name]);
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        if let Some(threads) = self.threads.or_else(|| share(cores, self.count, number)) {
+            args.extend(["--threads".into(), threads.to_string()]);
+        }
+        args.into_iter().map(OsString::from).collect()
+    }
+}
+
+/// The address under which a process of this machine reaches a listener.
+fn reachable(listening: SocketAddr) -> SocketAddr {
+    let ip = match listening.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
+        IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
+        ip => ip,
+    };
+    SocketAddr::new(ip, listening.port())
+}
+
+/// The `number`th worker's share of the cores, at least one; a single worker takes what it finds.
+fn share(cores: usize, workers: u32, number: u32) -> Option<usize> {
+    let (workers, number) = (workers as usize, number as usize);
+    let extra = usize::from(number < cores.checked_rem(workers)?);
+    (workers > 1).then_some((cores / workers + extra).max(1))
+}
+
+/// One place for a worker process.
+struct Nursery {
+    number: u32,
+    program: PathBuf,
+    args: Vec<OsString>,
+}
+
+impl Nursery {
+    /// Keeps a worker running. Returns why it was given up; `None` when it was stopped.
+    async fn run(&self, stop: &CancellationToken) -> Option<String> {
+        let mut young_deaths = 0;
+        loop {
+            let born = Instant::now();
+            let end = match self.spawn() {
+                Ok(mut child) => {
+                    tokio::select! {
+                        () = stop.cancelled() => {
+                            end(&mut child, self.number).await;
+                            return None;
+                        }
+                        status = child.wait() => told(status),
+                    }
+                }
+                Err(error) => format!("cannot be started from {}: {error}", self.program.display()),
+            };
+            let number = self.number;
+            young_deaths = if born.elapsed() < YOUNG { young_deaths + 1 } else { 1 };
+            if young_deaths >= MAX_YOUNG_DEATHS {
+                let reason = format!("local worker {number} {end}, {young_deaths} times in a row");
+                tracing::error!("{reason}; it is not started again");
+                return Some(reason);
+            }
+            let pause = FIRST_PAUSE * (1 << (young_deaths - 1));
+            tracing::warn!("local worker {number} {end}; starting it again in {} ms", pause.as_millis());
+            tokio::select! {
+                () = stop.cancelled() => return None,
+                () = tokio::time::sleep(pause) => {}
+            }
+        }
+    }
+
+    fn spawn(&self) -> std::io::Result<Child> {
+        let mut command = Command::new(&self.program);
+        command.args(&self.args).stdin(Stdio::piped()).stdout(Stdio::null()).kill_on_drop(true);
+        // Ctrl-C is the master's to hear: it says goodbye to its workers in order.
+        #[cfg(unix)]
+        command.process_group(0);
+        command.spawn()
+    }
+}
+
+/// Asks a worker to end by closing its standard input, and kills it if it does not.
+async fn end(child: &mut Child, number: u32) {
+    drop(child.stdin.take());
+    if tokio::time::timeout(ENDING, child.wait()).await.is_err() {
+        tracing::warn!("local worker {number} does not end within {} s and is killed", ENDING.as_secs());
+        // It fails only for a process that has ended meanwhile.
+        let _ = child.kill().await;
+    }
+}
+
+fn told(status: std::io::Result<ExitStatus>) -> String {
+    match status {
+        Ok(status) => format!("ended ({status})"),
+        Err(error) => format!("cannot be waited for: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cores_are_divided_and_nobody_goes_without() {
+        let shares = |cores, workers| (0..workers).map(|n| share(cores, workers, n)).collect::<Vec<_>>();
+        assert_eq!(shares(8, 1), [None]);
+        assert_eq!(shares(8, 3), [Some(3), Some(3), Some(2)]);
+        assert_eq!(shares(2, 4), [Some(1); 4]);
+    }
+
+    #[test]
+    fn workers_are_told_an_address_that_they_can_reach() {
+        for (listening, master) in
+            [("0.0.0.0:7117", "127.0.0.1:7117"), ("[::]:7", "[::1]:7"), ("10.1.2.3:4", "10.1.2.3:4")]
+        {
+            assert_eq!(reachable(listening.parse().unwrap()).to_string(), master);
+        }
+    }
+
+    #[tokio::test]
+    async fn a_worker_that_cannot_live_is_given_up_with_the_reason() {
+        let nursery = Nursery { number: 1, program: "/nonexistent/worker".into(), args: Vec::new() };
+        tokio::time::pause();
+        let reason = nursery.run(&CancellationToken::new()).await.unwrap();
+        assert!(reason.contains("/nonexistent/worker") && reason.contains("5 times"), "{reason}");
+    }
+
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_worker_ends_with_its_standard_input() {
+        let tasks = TaskTracker::new();
+        let stop = CancellationToken::new();
+        let cat = Nursery { number: 1, program: "cat".into(), args: Vec::new() };
+        let stopped = stop.clone();
+        let task = tasks.spawn(async move { cat.run(&stopped).await });
+        stop.cancel();
+        assert_eq!(task.await.unwrap(), None);
+    }
+}
