@@ -1,0 +1,40 @@
+//! Writes the meshes of `models/`: everything that comes with the project to look at is made here.
+//!
+//! `cargo run --release -p rayfarm-tracer --example make_models -- models`
+//!
+//! The output is a function of this code alone, byte for byte, on every platform; `tracer/tests/models.rs` compares
+//! it with the files in the repository.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[path = "make_models/mod.rs"]
+mod generator;
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args_os().skip(1);
+    let (Some(folder), None) = (arguments.next(), arguments.next()) else {
+        eprintln!("usage: make_models FOLDER   (the repository's models folder)");
+        return ExitCode::from(2);
+    };
+    match write_all(&PathBuf::from(folder)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("make_models: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn write_all(folder: &Path) -> Result<(), String> {
+    for file in generator::files() {
+        let path = folder.join(&file.path);
+        let told = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(told)?;
+        }
+        std::fs::write(&path, &file.text).map_err(told)?;
+        println!("{:28} {:8} triangles {:9} bytes", file.path, file.triangles, file.text.len());
+    }
+    Ok(())
+}

@@ -1,0 +1,67 @@
+//! The generator: named shapes, things built of them, and the text that is written.
+
+mod angle;
+mod camera;
+mod chess;
+mod obj;
+mod random;
+mod room;
+mod shape;
+mod shapes;
+
+use obj::{Digits, Shading, mtl_text, obj_text};
+use shape::Model;
+
+/// A generated file.
+pub(crate) struct GeneratedFile {
+    /// Path inside `models/`.
+    pub(crate) path: String,
+    /// What stands in it.
+    pub(crate) text: String,
+    /// Triangles in it; none in a material library.
+    pub(crate) triangles: usize,
+}
+
+/// The OBJ files of one scene with their common material library.
+pub(crate) struct Folder {
+    /// Name of the folder and of the library.
+    pub(crate) name: &'static str,
+    /// What becomes an OBJ file each.
+    pub(crate) parts: Vec<Part>,
+}
+
+/// One OBJ file.
+pub(crate) struct Part {
+    name: &'static str,
+    shading: Shading,
+    digits: Digits,
+    model: Model,
+}
+
+impl Part {
+    /// Names a model's file and how it is written.
+    pub(crate) fn new(name: &'static str, shading: Shading, digits: Digits, model: Model) -> Self {
+        Self { name, shading, digits, model }
+    }
+}
+
+/// Every generated file of `models/`.
+pub(crate) fn files() -> Vec<GeneratedFile> {
+    [room::folder(), camera::folder(), chess::folder()].iter().flat_map(files_of).collect()
+}
+
+fn files_of(folder: &Folder) -> Vec<GeneratedFile> {
+    let library = format!("{}.mtl", folder.name);
+    let materials =
+        folder.parts.iter().flat_map(|part| part.model.groups.iter().map(|(material, _)| *material));
+    let mut files = vec![GeneratedFile {
+        path: format!("{}/{library}", folder.name),
+        text: mtl_text(materials),
+        triangles: 0,
+    }];
+    files.extend(folder.parts.iter().map(|part| {
+        let (text, triangles) = obj_text(&part.model, &library, part.shading, part.digits);
+        GeneratedFile { path: format!("{}/{}.obj", folder.name, part.name), text, triangles }
+    }));
+    files
+}
