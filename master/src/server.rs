@@ -116,7 +116,7 @@ async fn serve(driver: &Driver, newcomer: Newcomer, address: SocketAddr) {
     driver.join(worker, hello, address, sender.clone(), traffic);
     let ended = tokio::select! {
         ended = listen(driver, worker, receiver, want) => ended,
-        () = send_assets(driver, &sender, wanted) => Err(SessionError::Closed),
+        () = send_assets(driver, worker, &sender, wanted) => Err(SessionError::Closed),
     };
     match ended {
         Ok(reason) => {
@@ -156,10 +156,15 @@ async fn listen(
 }
 
 /// Sends the assets that a worker asks for, one after the other, as fast as it takes them. Ends with the session.
-async fn send_assets(driver: &Driver, sender: &Sender<ToWorker>, mut wanted: mpsc::Receiver<AssetId>) {
+async fn send_assets(
+    driver: &Driver,
+    worker: WorkerId,
+    sender: &Sender<ToWorker>,
+    mut wanted: mpsc::Receiver<AssetId>,
+) {
     while let Some(id) = wanted.recv().await {
         let sent = match driver.assets.get(id) {
-            Some(bytes) => send_asset(sender, id, bytes).await,
+            Some(bytes) => send_asset(driver, worker, sender, id, bytes).await,
             None => sender.send(ToWorker::AssetUnknown { id }).await,
         };
         match sent {
@@ -171,7 +176,13 @@ async fn send_assets(driver: &Driver, sender: &Sender<ToWorker>, mut wanted: mps
     }
 }
 
-async fn send_asset(sender: &Sender<ToWorker>, id: AssetId, mut bytes: Bytes) -> Result<(), SendError> {
+async fn send_asset(
+    driver: &Driver,
+    worker: WorkerId,
+    sender: &Sender<ToWorker>,
+    id: AssetId,
+    mut bytes: Bytes,
+) -> Result<(), SendError> {
     sender.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await?;
     let mut offset = 0;
     while !bytes.is_empty() {
@@ -179,6 +190,8 @@ async fn send_asset(sender: &Sender<ToWorker>, id: AssetId, mut bytes: Bytes) ->
         let next = offset + chunk.len() as u64;
         sender.send(ToWorker::AssetChunk { id, offset, bytes: chunk }).await?;
         offset = next;
+        // On a slow link its answers to pings wait behind megabytes in the operating system's buffers.
+        driver.handle(Event::Heard { worker });
     }
     Ok(())
 }

@@ -184,7 +184,9 @@ impl Scheduler {
         if self.policy != SegmentPolicy::Adaptive {
             return now;
         }
-        let held = self.workers.values().filter_map(|worker| worker.leases.get(&(frame, segment)));
+        // Those who may have died without a word do not count.
+        let holders = self.workers.values().filter(|worker| !worker.is_suspect(now));
+        let held = holders.filter_map(|worker| worker.leases.get(&(frame, segment)));
         let expected =
             held.map(|held| (held.expected_at, held.work)).min_by_key(|(at, _)| at.unwrap_or(Duration::MAX));
         let copier = self.workers.get(&id);

@@ -67,6 +67,11 @@ pub enum Event {
         /// The ping's number.
         nonce: u64,
     },
+    /// A worker has given another sign of life: it takes the assets that it is sent.
+    Heard {
+        /// Who.
+        worker: WorkerId,
+    },
     /// The time of [`poll_timeout`](super::Scheduler::poll_timeout) has come.
     Woken,
 }

@@ -121,6 +121,7 @@ impl Scheduler {
             Event::SegmentDone { worker, lease, cost } => self.segment_done(now, worker, lease, cost),
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
             Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
+            Event::Heard { worker } => self.heard(now, worker),
             Event::Woken => self.check_pulses(now),
         }
         self.complete_frames();
@@ -138,7 +139,7 @@ impl Scheduler {
     pub fn poll_timeout(&self) -> Option<Duration> {
         let pulses = self.workers.values().flat_map(|worker| {
             let pulse = worker.ping_at().min(worker.lost_at());
-            [Some(pulse), worker.rested_at(self.handled_at)]
+            [Some(pulse), worker.rested_at(self.handled_at), worker.suspect_at(self.handled_at)]
         });
         pulses.chain([self.recheck_at]).flatten().min()
     }
@@ -237,6 +238,12 @@ impl Scheduler {
     fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64) {
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.pong(now, nonce);
+        }
+    }
+
+    fn heard(&mut self, now: Duration, id: WorkerId) {
+        if let Some(worker) = self.workers.get_mut(&id) {
+            worker.heard(now);
         }
     }
 

@@ -269,6 +269,52 @@ fn a_silent_worker_is_asked_and_then_dismissed() {
 }
 
 #[test]
+fn a_suspect_gets_nothing_new_until_it_gives_a_sign_of_life() {
+    let script = "
+        0 join 1 1
+        0 join 2 1
+        0 frame 1 10x20
+        2000 wake
+        2001 pong 2 1
+        3000 wake
+        3001 done 2 1.1
+        3002 done 2 1.0
+        3003 frame 2 10x20
+        3004 pong 1 0";
+    expect(
+        "static:10",
+        script,
+        "
+        > 0 join 1 1
+        > 0 join 2 1
+        > 0 frame 1 10x20
+        begin 1
+        1: frame 1
+        1: render 1.0, rows 0+10
+        2: frame 1
+        2: render 1.1, rows 10+10
+        > 2000 wake
+        1: ping 0
+        2: ping 1
+        > 2001 pong 2 1
+        > 3000 wake
+        > 3001 done 2 1.1
+        2: render 1.0 (attempt 1), rows 0+10
+        > 3002 done 2 1.0
+        1: cancel before 2
+        finished 1 after 3002 ms, 2 rays
+        > 3003 frame 2 10x20
+        begin 2
+        2: frame 2
+        2: render 2.0, rows 0+10
+        2: render 2.1, rows 10+10
+        > 3004 pong 1 0
+        1: frame 2
+        1: render 2.0 (attempt 1), rows 0+10",
+    );
+}
+
+#[test]
 fn nobody_is_dismissed_for_the_masters_own_absence() {
     let log = transcript("static:10", "0 join 1 1\n0 frame 1 10x10\n60000 wake\n60100 done 1 1.0");
     assert!(!log.contains("goodbye") && log.contains("finished 1"), "{log}");

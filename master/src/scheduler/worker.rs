@@ -9,6 +9,8 @@ use super::{Cost, FrameId, Lease};
 pub(super) const PING_EVERY: Duration = Duration::from_secs(2);
 /// A worker that has given no sign of life for this long is lost.
 pub(super) const SILENCE_LIMIT: Duration = Duration::from_secs(10);
+/// A worker that leaves a ping unanswered for this long gets no more leases until it gives a sign of life.
+const SUSPICION: Duration = Duration::from_secs(1);
 /// The first rest of a worker that cannot render a frame; doubled with each failure in a row.
 const FIRST_REST: Duration = Duration::from_secs(1);
 /// The longest rest.
@@ -43,6 +45,8 @@ pub(super) struct Worker {
     last_heard: Duration,
     pinged_at: Duration,
     open_ping: Option<u64>,
+    /// Since when it has been asked for a sign of life without giving one.
+    unanswered_since: Option<Duration>,
     last_done_at: Duration,
     resting_until: Option<Duration>,
     failures: u32,
@@ -91,6 +95,7 @@ impl Worker {
             last_heard: now,
             pinged_at: now,
             open_ping: None,
+            unanswered_since: None,
             last_done_at: now,
             resting_until: None,
             failures: 0,
@@ -99,7 +104,17 @@ impl Worker {
 
     /// Whether it may be given leases.
     pub(super) fn is_ready(&self, now: Duration) -> bool {
-        !self.draining && self.resting_until.is_none_or(|until| until <= now)
+        !self.draining && !self.is_suspect(now) && self.resting_until.is_none_or(|until| until <= now)
+    }
+
+    /// Whether it may have died without a word.
+    pub(super) fn is_suspect(&self, now: Duration) -> bool {
+        self.unanswered_since.is_some_and(|since| since + SUSPICION <= now)
+    }
+
+    /// When it becomes suspect, if it stays silent and is not suspect already.
+    pub(super) fn suspect_at(&self, now: Duration) -> Option<Duration> {
+        self.unanswered_since.map(|since| since + SUSPICION).filter(|&at| at > now)
     }
 
     /// Whether it has yet to be told what `frame` shows; from now on it has been.
@@ -147,6 +162,7 @@ impl Worker {
 
     pub(super) fn heard(&mut self, now: Duration) {
         self.last_heard = now;
+        self.unanswered_since = None;
     }
 
     pub(super) fn pong(&mut self, now: Duration, nonce: u64) {
@@ -164,6 +180,7 @@ impl Worker {
 
     pub(super) fn pinged(&mut self, now: Duration, nonce: u64) {
         (self.pinged_at, self.open_ping) = (now, Some(nonce));
+        self.unanswered_since.get_or_insert(now);
     }
 
     /// When it is lost, if it stays silent.
