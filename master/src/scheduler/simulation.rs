@@ -95,6 +95,7 @@ impl Farm {
 
     /// Lives until a time, or until the agenda and the scheduler have nothing more to do.
     fn run(&mut self, until_us: u64) {
+        let mut steps_at_once = 0;
         loop {
             let wake_us = self.scheduler.poll_timeout().map(|at| at.as_micros() as u64 + 1);
             let planned_us = self.agenda.first_key_value().map(|((at, _), _)| *at);
@@ -103,6 +104,11 @@ impl Farm {
                 self.now_us = until_us;
                 return;
             };
+            steps_at_once = if next_us > self.now_us { 0 } else { steps_at_once + 1 };
+            assert!(
+                steps_at_once < 10_000,
+                "the scheduler wants to be woken again and again at {next_us} us"
+            );
             self.now_us = self.now_us.max(next_us);
             match planned_us.filter(|&at| at == next_us).and_then(|_| self.agenda.pop_first()) {
                 Some((_, happening)) => self.happen(happening),
