@@ -26,8 +26,8 @@ pub const MAX_CHUNK_BYTES: usize = 256 << 10;
 /// Pixel bytes of one segment (32 MiB: a whole 3840 x 2160 frame fits). See [`max_lease_rows`].
 pub const MAX_PIXELS_BYTES: usize = 32 << 20;
 
-/// The longest value that [`crate::codec`] decodes (64 MiB): a scene body of some 800,000 single triangles.
-pub const MAX_DECODE_BYTES: usize = 64 << 20;
+/// The longest value that [`crate::codec`] decodes (256 MiB): a scene body with a million single triangles and spheres.
+pub const MAX_DECODE_BYTES: usize = 256 << 20;
 
 /// Control messages that wait for the writer of a session.
 pub const CONTROL_QUEUE: usize = 256;

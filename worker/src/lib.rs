@@ -1,1 +1,33 @@
-//! Skeleton.
+//! A render node: connects to a master, fetches what it lacks, and traces the rows it is told to with all its cores.
+//!
+//! The way of a frame through this crate:
+//!
+//! 1. `client` connects, introduces itself, and comes back when the connection fails.
+//! 2. `desk` takes the master's messages and decides what they lead to. It is pure: no socket, no thread, no clock.
+//! 3. `scene_loader` fetches a scene by hash (`transfer`), and keeps it (`asset_store`); `frames` holds the leases of a
+//!    frame until it is ready.
+//! 4. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads, hands out leases.
+//! 5. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
+//!
+//! What is drawn, and how, is behind [`Renderer`]; the real one is [`TracerRenderer`].
+
+mod asset_store;
+pub mod cli;
+mod client;
+mod desk;
+mod duty;
+mod error;
+mod frames;
+mod guard;
+mod job_queue;
+mod pause;
+mod render_pool;
+mod renderer;
+mod scene_loader;
+mod tracer;
+mod transfer;
+
+pub use client::{WorkerOptions, run, run_with};
+pub use error::WorkerError;
+pub use renderer::{Cancelled, Counts, Renderer};
+pub use tracer::TracerRenderer;

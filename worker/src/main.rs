@@ -1,2 +1,7 @@
-//! Skeleton.
-fn main() {}
+//! `rayfarm-worker`: a render node.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    rayfarm_worker::cli::main_from(std::env::args_os())
+}

@@ -1,0 +1,195 @@
+//! The worker's command line, shared by its own binary and by the master, which runs itself again as a local worker.
+
+use std::ffi::OsString;
+use std::io::Read;
+use std::process::ExitCode;
+
+use clap::{Args, Parser};
+use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+
+use crate::client::{WorkerOptions, run};
+
+/// A render node of rayfarm: traces segments for a master, with all its cores.
+#[derive(Debug, Parser)]
+#[command(name = "rayfarm-worker", version)]
+struct Cli {
+    #[command(flatten)]
+    worker: WorkerArgs,
+}
+
+/// What a worker can be told. Flatten it into another command line to offer a worker there.
+#[derive(Clone, Debug, Args)]
+pub struct WorkerArgs {
+    /// Where the master listens
+    #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
+    pub master: String,
+
+    /// Render threads [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+
+    /// What the master calls this worker [default: the name of this machine]
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+
+    /// Memory for scenes and meshes; what was not used for longest is dropped first
+    #[arg(long, value_name = "MIB", default_value_t = 2048, value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    pub asset_cache: u64,
+
+    /// End when standard input ends: with whoever started this worker
+    #[arg(long)]
+    pub exit_with_stdin: bool,
+
+    /// End with an error when the connection fails, instead of trying again
+    #[arg(long)]
+    pub no_reconnect: bool,
+
+    /// Say more
+    #[arg(long, short, conflicts_with = "quiet")]
+    pub verbose: bool,
+
+    /// Say only what is wrong
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl WorkerArgs {
+    fn options(&self) -> WorkerOptions {
+        WorkerOptions {
+            master: self.master.clone(),
+            threads: self.threads.map(usize::from),
+            name: self.name.clone().unwrap_or_else(machine_name),
+            reconnect: !self.no_reconnect,
+            asset_cache_bytes: self.asset_cache << 20,
+        }
+    }
+}
+
+/// The whole program: parses `args` (the first is the program's name), logs to standard error, works. The exit code is
+/// 0 after a goodbye or a signal, 1 when the worker gave up, 2 on wrong use.
+pub fn main_from<I>(args: I) -> ExitCode
+where
+    I: IntoIterator,
+    I::Item: Into<OsString> + Clone,
+{
+    match Cli::try_parse_from(args) {
+        Ok(cli) => main_with(&cli.worker),
+        Err(error) => {
+            // Nowhere to complain to if this fails.
+            let _ = error.print();
+            u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
+        }
+    }
+}
+
+/// As [`main_from`], with arguments that are parsed already. Installs its own logging unless there is one.
+pub fn main_with(args: &WorkerArgs) -> ExitCode {
+    log_to_stderr(args);
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
+    let runtime = match runtime {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            tracing::error!("cannot start: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let stop = CancellationToken::new();
+    if args.exit_with_stdin {
+        stop_with_stdin(stop.clone());
+    }
+    let result = runtime.block_on(async {
+        tokio::spawn(stop_on_signal(stop.clone()));
+        run(args.options(), stop).await
+    });
+    // A mesh that is still being decoded is not waited for.
+    runtime.shutdown_background();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            tracing::error!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// `RUST_LOG` wins over the flags.
+fn log_to_stderr(args: &WorkerArgs) {
+    let level = match (args.verbose, args.quiet) {
+        (true, _) => "debug",
+        (_, true) => "error",
+        _ => "info",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    // It fails when the program that this is part of has set up its own.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+}
+
+async fn stop_on_signal(stop: CancellationToken) {
+    let name = match wait_for_signal().await {
+        Ok(name) => name,
+        Err(error) => {
+            tracing::warn!("cannot listen for signals: {error}; end this worker through its master");
+            return;
+        }
+    };
+    tracing::info!("{name}: leaving");
+    stop.cancel();
+}
+
+#[cfg(unix)]
+async fn wait_for_signal() -> std::io::Result<&'static str> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    Ok(tokio::select! {
+        _ = terminate.recv() => "terminated",
+        _ = interrupt.recv() => "interrupted",
+    })
+}
+
+#[cfg(not(unix))]
+async fn wait_for_signal() -> std::io::Result<&'static str> {
+    tokio::signal::ctrl_c().await.map(|()| "interrupted")
+}
+
+/// Whoever started us holds the other end, and need not do anything for us to end with it: not even live.
+fn stop_with_stdin(stop: CancellationToken) {
+    let wait = move || {
+        let mut stdin = std::io::stdin().lock();
+        let mut sink = [0; 256];
+        while matches!(stdin.read(&mut sink), Ok(more) if more > 0) {}
+        tracing::debug!("standard input has ended: leaving");
+        stop.cancel();
+    };
+    if let Err(error) = std::thread::Builder::new().name("stdin".to_owned()).spawn(wait) {
+        tracing::warn!("cannot watch standard input: {error}");
+    }
+}
+
+/// Checks the form; whether the host is known shows when connecting.
+fn host_and_port(text: &str) -> Result<String, String> {
+    let form = "expected HOST:PORT, as in farm.local:7117 or [::1]:7117";
+    let (host, port) = text.rsplit_once(':').ok_or(form)?;
+    let bare_v6 = host.contains(':') && !(host.starts_with('[') && host.ends_with(']'));
+    if host.is_empty() || bare_v6 {
+        return Err(form.to_owned());
+    }
+    match port.parse::<u16>() {
+        Ok(1..) => Ok(text.to_owned()),
+        _ => Err(format!("{port:?} is no port from 1 to 65535; {form}")),
+    }
+}
+
+fn machine_name() -> String {
+    let file = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let command = || {
+        let output = std::process::Command::new("hostname").output().ok()?;
+        String::from_utf8(output.stdout).ok()
+    };
+    let name = file.or_else(command).unwrap_or_default();
+    match name.trim() {
+        "" => "unnamed".to_owned(),
+        name => name.to_owned(),
+    }
+}

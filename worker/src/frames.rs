@@ -1,0 +1,152 @@
+//! The frames that the master has announced and not cancelled, and the leases that wait for them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, pixels};
+
+/// Frames that are held at a time. A master has two in flight; older ones give way.
+const MAX_FRAMES: usize = 8;
+
+/// Leases of one frame that wait for it to get ready.
+const MAX_WAITING: usize = 4096;
+
+/// How far a frame is.
+enum State<F> {
+    /// Its scene is being loaded.
+    Loading,
+    /// It is being prepared on a blocking thread.
+    Preparing,
+    /// Leases can be rendered.
+    Ready(Arc<F>),
+    /// None will be; the master knows.
+    Failed,
+}
+
+struct Held<F> {
+    announce: FrameAnnounce,
+    state: State<F>,
+    waiting: Vec<Lease>,
+}
+
+/// What to do with a lease.
+#[derive(Debug)]
+pub(crate) enum Verdict<F> {
+    /// Render these rows.
+    Render(Range<u32>, Arc<F>),
+    /// Nothing now: it waits, or is stale, or its frame has failed.
+    Nothing,
+    /// It can never be rendered, and the master must be told.
+    Refuse(String),
+}
+
+/// Announced frames by number.
+pub(crate) struct Frames<F> {
+    held: BTreeMap<FrameId, Held<F>>,
+    /// Nothing before this one is wanted.
+    before: FrameId,
+}
+
+impl<F> Frames<F> {
+    pub(crate) fn new() -> Self {
+        Self { held: BTreeMap::new(), before: FrameId(0) }
+    }
+
+    /// Takes a new frame in; `false` when it is stale or known. At most one older frame gives way and is returned.
+    pub(crate) fn announce(&mut self, announce: FrameAnnounce) -> (bool, Option<FrameId>) {
+        let frame = announce.frame;
+        if frame < self.before || self.held.contains_key(&frame) {
+            return (false, None);
+        }
+        self.held.insert(frame, Held { announce, state: State::Loading, waiting: Vec::new() });
+        let dropped = if self.held.len() > MAX_FRAMES { self.held.pop_first() } else { None };
+        (true, dropped.map(|(frame, _)| frame))
+    }
+
+    /// The scenes of all frames held.
+    pub(crate) fn scenes(&self) -> BTreeSet<AssetId> {
+        self.held.values().map(|held| held.announce.scene).collect()
+    }
+
+    pub(crate) fn cancel(&mut self, before: FrameId) {
+        self.before = self.before.max(before);
+        self.held = self.held.split_off(&self.before);
+    }
+
+    /// The scene is there: the frames that waited for it are to be prepared.
+    pub(crate) fn scene_ready(&mut self, scene: AssetId) -> Vec<FrameAnnounce> {
+        let waiting = self.loading(scene);
+        waiting
+            .map(|held| {
+                held.state = State::Preparing;
+                held.announce.clone()
+            })
+            .collect()
+    }
+
+    /// The scene will not be there: these frames have failed.
+    pub(crate) fn scene_failed(&mut self, scene: AssetId) -> Vec<FrameId> {
+        self.loading(scene).map(|held| held.fail()).collect()
+    }
+
+    fn loading(&mut self, scene: AssetId) -> impl Iterator<Item = &mut Held<F>> {
+        let is_hit =
+            move |held: &&mut Held<F>| held.announce.scene == scene && matches!(held.state, State::Loading);
+        self.held.values_mut().filter(is_hit)
+    }
+
+    /// A frame is ready: the leases that waited for it.
+    pub(crate) fn ready(&mut self, frame: FrameId, ready: F) -> Vec<Lease> {
+        let Some(held) = self.held.get_mut(&frame) else { return Vec::new() };
+        held.state = State::Ready(Arc::new(ready));
+        std::mem::take(&mut held.waiting)
+    }
+
+    /// A frame has failed; `true` when the master does not know yet.
+    pub(crate) fn failed(&mut self, frame: FrameId) -> bool {
+        let held = self.held.get_mut(&frame);
+        held.filter(|held| !matches!(held.state, State::Failed)).map(|held| held.fail()).is_some()
+    }
+
+    /// Decides on a lease.
+    pub(crate) fn lease(&mut self, lease: Lease) -> Verdict<F> {
+        let Some(held) = self.held.get_mut(&lease.frame) else {
+            if lease.frame < self.before {
+                return Verdict::Nothing;
+            }
+            return Verdict::Refuse(format!("{lease} is of a frame that this worker does not hold"));
+        };
+        let FrameAnnounce { width, height, .. } = held.announce;
+        let Some(rows) = lease.rows().filter(|rows| rows.end <= height) else {
+            return Verdict::Refuse(format!("{lease} lies outside a frame of {height} rows"));
+        };
+        if pixels::raw_bytes(width, lease.row_count).is_none() {
+            return Verdict::Refuse(format!("{lease} has more pixels than fit into one message"));
+        }
+        match &held.state {
+            State::Ready(frame) => Verdict::Render(rows, Arc::clone(frame)),
+            State::Failed => Verdict::Nothing,
+            State::Loading | State::Preparing if held.waiting.len() >= MAX_WAITING => {
+                Verdict::Refuse(format!("more than {MAX_WAITING} leases wait for frame {}", lease.frame))
+            }
+            State::Loading | State::Preparing => {
+                held.waiting.push(lease);
+                Verdict::Nothing
+            }
+        }
+    }
+
+    /// Whether any lease waits for its frame.
+    pub(crate) fn has_waiting(&self) -> bool {
+        self.held.values().any(|held| !held.waiting.is_empty())
+    }
+}
+
+impl<F> Held<F> {
+    fn fail(&mut self) -> FrameId {
+        self.state = State::Failed;
+        self.waiting.clear();
+        self.announce.frame
+    }
+}

@@ -1,0 +1,318 @@
+//! From the hash of a scene to a scene that can be rendered: ask for its body, decode it, ask for the meshes it names,
+//! compile. Pure: what has to be done comes out as [`Step`]s, and what became of it goes in again.
+
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use rayfarm_protocol::{AssetId, limits};
+
+use crate::asset_store::AssetStore;
+use crate::renderer::Renderer;
+use crate::transfer::{Transfer, TransferError};
+
+/// Assets that are asked for at a time: the next one is on its way while one is decoded.
+const MAX_ASKED: usize = 4;
+
+/// Failed scenes that are remembered, so that they are not fetched again for every frame.
+const MAX_REFUSED: usize = 64;
+
+/// Something to be done, or known.
+pub(crate) enum Step<R: Renderer> {
+    /// Ask the master for an asset.
+    Ask(AssetId),
+    /// Do this on a blocking thread.
+    Work(SceneWork<R>),
+    /// Frames of this scene can be prepared.
+    Ready(AssetId, Arc<R::Scene>),
+    /// Frames of this scene cannot be rendered here.
+    Failed(AssetId, String),
+}
+
+/// Work that takes its time.
+pub(crate) enum SceneWork<R: Renderer> {
+    DecodeScene { id: AssetId, body: Vec<u8> },
+    DecodeMesh { id: AssetId, bytes: Vec<u8> },
+    Compile { id: AssetId, draft: R::Draft, meshes: Vec<Arc<R::Mesh>> },
+}
+
+/// What became of it.
+pub(crate) enum SceneDone<R: Renderer> {
+    SceneDecoded { id: AssetId, result: Result<(R::Draft, Vec<AssetId>), String> },
+    MeshDecoded { id: AssetId, result: Result<R::Mesh, String> },
+    Compiled { id: AssetId, result: Result<R::Scene, String> },
+}
+
+enum Stored<R: Renderer> {
+    Mesh(Arc<R::Mesh>),
+    Scene { scene: Arc<R::Scene>, meshes: BTreeSet<AssetId> },
+}
+
+/// An asset between the wish for it and its place in the store.
+enum Incoming {
+    Wished,
+    Asked,
+    Arriving(Transfer),
+    Decoding,
+}
+
+/// A scene that is being put together.
+struct Load<R: Renderer> {
+    body_bytes: u64,
+    draft: Option<R::Draft>,
+    meshes: BTreeSet<AssetId>,
+}
+
+/// Fetches scenes and keeps them. The store outlives sessions; the rest begins anew with each.
+pub(crate) struct SceneLoader<R: Renderer> {
+    store: AssetStore<Stored<R>>,
+    /// With the bytes reserved for each.
+    incoming: BTreeMap<AssetId, (Incoming, u64)>,
+    wishes: VecDeque<AssetId>,
+    loads: BTreeMap<AssetId, Load<R>>,
+    refused: BTreeMap<AssetId, String>,
+    current: BTreeSet<AssetId>,
+    steps: VecDeque<Step<R>>,
+}
+
+impl<R: Renderer> SceneLoader<R> {
+    pub(crate) fn new(cache_bytes: u64) -> Self {
+        Self {
+            store: AssetStore::new(cache_bytes),
+            incoming: BTreeMap::new(),
+            wishes: VecDeque::new(),
+            loads: BTreeMap::new(),
+            refused: BTreeMap::new(),
+            current: BTreeSet::new(),
+            steps: VecDeque::new(),
+        }
+    }
+
+    /// A new session: nothing is on its way any more, and what failed may succeed.
+    pub(crate) fn reset(&mut self) {
+        self.incoming.clear();
+        self.wishes.clear();
+        self.loads.clear();
+        self.refused.clear();
+        self.steps.clear();
+    }
+
+    pub(crate) fn poll_step(&mut self) -> Option<Step<R>> {
+        self.steps.pop_front()
+    }
+
+    /// These scenes are in use, and nothing of theirs may be evicted; loads of others are given up.
+    pub(crate) fn set_current(&mut self, scenes: BTreeSet<AssetId>) {
+        self.loads.retain(|id, _| scenes.contains(id));
+        self.current = scenes;
+        let needed = self.in_use();
+        self.wishes.retain(|id| needed.contains(id));
+        self.incoming.retain(|id, (state, _)| !matches!(state, Incoming::Wished) || needed.contains(id));
+    }
+
+    /// Begins to load a scene unless that is under way. Ends in a [`Step::Ready`] or [`Step::Failed`], soon or at once.
+    pub(crate) fn want(&mut self, scene: AssetId) {
+        if let Some(found) = self.cached(scene) {
+            self.steps.push_back(Step::Ready(scene, found));
+        } else if let Some(reason) = self.refused.get(&scene) {
+            self.steps.push_back(Step::Failed(scene, reason.clone()));
+        } else if let Entry::Vacant(entry) = self.loads.entry(scene) {
+            entry.insert(Load { body_bytes: 0, draft: None, meshes: BTreeSet::new() });
+            self.wish(scene);
+        }
+    }
+
+    /// Marks the scene and all its meshes as just used: a scene never outlives its meshes in the store.
+    fn cached(&mut self, id: AssetId) -> Option<Arc<R::Scene>> {
+        let Some(Stored::Scene { scene, meshes }) = self.store.get(id) else { return None };
+        let (scene, meshes) = (Arc::clone(scene), meshes.clone());
+        for mesh in meshes {
+            self.store.get(mesh);
+        }
+        Some(scene)
+    }
+
+    fn wish(&mut self, id: AssetId) {
+        if let Entry::Vacant(entry) = self.incoming.entry(id) {
+            entry.insert((Incoming::Wished, 0));
+            self.wishes.push_back(id);
+        }
+        self.ask();
+    }
+
+    fn ask(&mut self) {
+        let is_asked = |state: &Incoming| matches!(state, Incoming::Asked | Incoming::Arriving(_));
+        let mut asked = self.incoming.values().filter(|(state, _)| is_asked(state)).count();
+        while asked < MAX_ASKED
+            && let Some(id) = self.wishes.pop_front()
+        {
+            self.incoming.insert(id, (Incoming::Asked, 0));
+            self.steps.push_back(Step::Ask(id));
+            asked += 1;
+        }
+    }
+
+    /// The master announces an asset.
+    pub(crate) fn begin(&mut self, id: AssetId, size: u64) {
+        if !matches!(self.incoming.get(&id), Some((Incoming::Asked, _))) {
+            tracing::warn!("the master sends asset {id}, which was not asked for; it is not kept");
+            return;
+        }
+        match self.admit(id, size) {
+            Ok(transfer) => {
+                self.incoming.insert(id, (Incoming::Arriving(transfer), size));
+                self.complete(id);
+            }
+            Err(reason) => self.fail(id, &reason),
+        }
+    }
+
+    fn admit(&mut self, id: AssetId, size: u64) -> Result<Transfer, String> {
+        if self.loads.contains_key(&id) && size > limits::MAX_DECODE_BYTES as u64 {
+            let limit = limits::MAX_DECODE_BYTES;
+            return Err(format!("the scene body has {size} bytes, at most {limit} are decoded"));
+        }
+        let reserved: u64 = self.incoming.values().map(|(_, bytes)| bytes).sum();
+        let needed = self.in_use();
+        if !self.store.make_room(size, reserved, &needed) {
+            let limit_mib = self.store.limit_bytes() >> 20;
+            return Err(format!(
+                "the scene's assets need more than the {limit_mib} MiB that this worker keeps; \
+                 start it with a larger --asset-cache"
+            ));
+        }
+        Transfer::begin(id, size).map_err(|error| error.to_string())
+    }
+
+    /// A part of an asset. Parts of what was given up meanwhile are dropped.
+    pub(crate) fn chunk(&mut self, id: AssetId, offset: u64, bytes: &[u8]) {
+        let Some((Incoming::Arriving(transfer), _)) = self.incoming.get_mut(&id) else { return };
+        match transfer.chunk(offset, bytes) {
+            Ok(()) => self.complete(id),
+            Err(error) => self.fail(id, &error.to_string()),
+        }
+    }
+
+    /// The master does not have an asset.
+    pub(crate) fn unknown(&mut self, id: AssetId) {
+        if self.incoming.contains_key(&id) {
+            self.fail(id, &format!("the master does not have asset {id}"));
+        }
+    }
+
+    /// Hands a complete asset to be decoded; its bytes stay reserved until that is done.
+    fn complete(&mut self, id: AssetId) {
+        let Some((state, _)) = self.incoming.get_mut(&id) else { return };
+        if !matches!(state, Incoming::Arriving(transfer) if transfer.is_complete()) {
+            return;
+        }
+        let Incoming::Arriving(transfer) = std::mem::replace(state, Incoming::Decoding) else { return };
+        match (transfer.finish(), self.loads.contains_key(&id)) {
+            (Ok(body), true) => self.steps.push_back(Step::Work(SceneWork::DecodeScene { id, body })),
+            (Ok(bytes), false) => self.steps.push_back(Step::Work(SceneWork::DecodeMesh { id, bytes })),
+            (Err(error @ TransferError::Damaged { .. }), _) => {
+                self.fail(id, &format!("{error}; the master's memory or its software is at fault"));
+            }
+            (Err(error), _) => self.fail(id, &error.to_string()),
+        }
+        self.ask();
+    }
+
+    /// Takes the result of a [`Step::Work`].
+    pub(crate) fn done(&mut self, done: SceneDone<R>) {
+        match done {
+            SceneDone::SceneDecoded { id, result } => match (self.arrived(id), result) {
+                (bytes, Ok((draft, meshes))) => self.scene_decoded(id, bytes, draft, meshes),
+                (_, Err(reason)) => self.fail(id, &reason),
+            },
+            SceneDone::MeshDecoded { id, result } => match (self.arrived(id), result) {
+                (bytes, Ok(mesh)) => self.mesh_decoded(id, bytes, mesh),
+                (_, Err(reason)) => self.fail(id, &reason),
+            },
+            SceneDone::Compiled { id, result } => match result {
+                Ok(scene) => self.compiled(id, scene),
+                Err(reason) => self.fail(id, &reason),
+            },
+        }
+    }
+
+    fn arrived(&mut self, id: AssetId) -> u64 {
+        self.incoming.remove(&id).map_or(0, |(_, bytes)| bytes)
+    }
+
+    fn scene_decoded(&mut self, id: AssetId, body_bytes: u64, draft: R::Draft, meshes: Vec<AssetId>) {
+        let Some(load) = self.loads.get_mut(&id) else { return };
+        let meshes: BTreeSet<AssetId> = meshes.into_iter().collect();
+        *load = Load { body_bytes, draft: Some(draft), meshes: meshes.clone() };
+        for mesh in meshes {
+            if self.store.get(mesh).is_none() {
+                self.wish(mesh);
+            }
+        }
+        self.compile_if_complete(id);
+    }
+
+    fn mesh_decoded(&mut self, id: AssetId, bytes: u64, mesh: R::Mesh) {
+        self.store.insert(id, Stored::Mesh(Arc::new(mesh)), bytes);
+        let waiting = self.loads.iter().filter(|(_, load)| load.meshes.contains(&id));
+        for scene in waiting.map(|(scene, _)| *scene).collect::<Vec<_>>() {
+            self.compile_if_complete(scene);
+        }
+    }
+
+    fn compile_if_complete(&mut self, id: AssetId) {
+        let Some(load) = self.loads.get_mut(&id) else { return };
+        let mesh_of = |mesh: &AssetId| match self.store.get(*mesh) {
+            Some(Stored::Mesh(mesh)) => Some(Arc::clone(mesh)),
+            _ => None,
+        };
+        let Some(meshes) = load.meshes.iter().map(mesh_of).collect::<Option<Vec<_>>>() else { return };
+        if let Some(draft) = load.draft.take() {
+            self.steps.push_back(Step::Work(SceneWork::Compile { id, draft, meshes }));
+        }
+    }
+
+    fn compiled(&mut self, id: AssetId, scene: R::Scene) {
+        let Some(Load { body_bytes, meshes, .. }) = self.loads.remove(&id) else { return };
+        let scene = Arc::new(scene);
+        let reserved: u64 = self.incoming.values().map(|(_, bytes)| bytes).sum();
+        let mut needed = self.in_use();
+        needed.extend(&meshes);
+        // Without room it is used all the same, and only not kept.
+        if self.store.make_room(body_bytes, reserved, &needed) {
+            self.store.insert(id, Stored::Scene { scene: Arc::clone(&scene), meshes }, body_bytes);
+        }
+        self.steps.push_back(Step::Ready(id, scene));
+    }
+
+    /// The asset will not come, or is worth nothing: neither are the scenes that need it.
+    fn fail(&mut self, asset: AssetId, reason: &str) {
+        self.incoming.remove(&asset);
+        self.wishes.retain(|wish| *wish != asset);
+        let hit = self.loads.iter().filter(|(id, load)| **id == asset || load.meshes.contains(&asset));
+        for scene in hit.map(|(id, _)| *id).collect::<Vec<_>>() {
+            self.loads.remove(&scene);
+            if self.refused.len() >= MAX_REFUSED {
+                self.refused.clear();
+            }
+            self.refused.insert(scene, reason.to_owned());
+            self.steps.push_back(Step::Failed(scene, reason.to_owned()));
+        }
+        self.ask();
+    }
+
+    /// Current scenes, scenes being loaded, and the meshes of both.
+    fn in_use(&self) -> BTreeSet<AssetId> {
+        let mut ids = self.current.clone();
+        for (id, load) in &self.loads {
+            ids.insert(*id);
+            ids.extend(&load.meshes);
+        }
+        for scene in &self.current {
+            if let Some(Stored::Scene { meshes, .. }) = self.store.peek(*scene) {
+                ids.extend(meshes);
+            }
+        }
+        ids
+    }
+}

@@ -1,0 +1,71 @@
+//! The real renderer.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayfarm_protocol::limits::{MAX_DECODE_BYTES, MAX_VIEW_BYTES};
+use rayfarm_protocol::{AssetId, FrameAnnounce, codec};
+use rayfarm_tracer::mesh::CompiledMesh;
+use rayfarm_tracer::scene::{FrameView, Scene};
+use rayfarm_tracer::{CompiledScene, PreparedFrame, TILE_SIZE, render_rows};
+
+use crate::renderer::{Cancelled, Counts, Renderer};
+
+/// `rayfarm_tracer`, fed with bytes: scene bodies and views as the codec writes [`Scene`] and [`FrameView`], meshes as
+/// [`CompiledMesh::bytes`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TracerRenderer;
+
+impl Renderer for TracerRenderer {
+    type Draft = Scene;
+    type Mesh = CompiledMesh;
+    type Scene = CompiledScene;
+    type Frame = PreparedFrame;
+
+    fn simd(&self) -> String {
+        // One code path so far, compiled for the target's baseline.
+        format!("baseline {}", std::env::consts::ARCH)
+    }
+
+    fn band_rows(&self) -> u32 {
+        TILE_SIZE
+    }
+
+    fn decode_scene(&self, body: &[u8]) -> Result<(Scene, Vec<AssetId>), String> {
+        let scene: Scene = codec::decode(body, MAX_DECODE_BYTES)
+            .map_err(|error| format!("the scene does not decode: {error}"))?;
+        scene.validate().map_err(|error| format!("the scene is not valid: {error}"))?;
+        let meshes = scene.mesh_ids().into_iter().map(|id| AssetId(id.0)).collect();
+        Ok((scene, meshes))
+    }
+
+    fn decode_mesh(&self, bytes: &[u8]) -> Result<CompiledMesh, String> {
+        CompiledMesh::from_bytes(bytes).map_err(|error| format!("a mesh is not valid: {error}"))
+    }
+
+    fn compile(&self, scene: Scene, meshes: Vec<Arc<CompiledMesh>>) -> Result<CompiledScene, String> {
+        CompiledScene::new(scene, meshes).map_err(|error| format!("the scene does not compile: {error}"))
+    }
+
+    fn prepare(&self, scene: Arc<CompiledScene>, announce: &FrameAnnounce) -> Result<PreparedFrame, String> {
+        let view: FrameView = codec::decode(&announce.view, MAX_VIEW_BYTES)
+            .map_err(|error| format!("the frame's view does not decode: {error}"))?;
+        let (width, height) = (announce.width, announce.height);
+        if (view.width, view.height) != (width, height) {
+            let (w, h) = (view.width, view.height);
+            return Err(format!("the frame is announced as {width} x {height}, its view says {w} x {h}"));
+        }
+        PreparedFrame::new(scene, &view).map_err(|error| format!("the frame cannot be prepared: {error}"))
+    }
+
+    fn render(
+        &self,
+        frame: &PreparedFrame,
+        rows: Range<u32>,
+        out: &mut [u8],
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<Counts, Cancelled> {
+        let counts = render_rows(frame, rows, out, cancelled).map_err(|_| Cancelled)?;
+        Ok(Counts { primary: counts.primary, shadow: counts.shadow, secondary: counts.secondary })
+    }
+}
