@@ -1,7 +1,7 @@
 //! The worker's command line, shared by its own binary and by the master, which runs itself again as a local worker.
 
 use std::ffi::OsString;
-use std::io::Read;
+use std::io::{IsTerminal, Read};
 use std::process::ExitCode;
 
 use clap::{Args, Parser};
@@ -121,8 +121,10 @@ fn log_to_stderr(args: &WorkerArgs) {
         _ => "info",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let log = log.with_target(false).with_ansi(std::io::stderr().is_terminal());
     // It fails when the program that this is part of has set up its own.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let _ = log.try_init();
 }
 
 async fn stop_on_signal(stop: CancellationToken) {
