@@ -25,6 +25,9 @@ use crate::report::{
 const OPEN_REQUESTS: u64 = 2;
 /// How often the progress display looks at the farm.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
+/// How long local workers may take to come before the run begins without them, and how often that is looked at.
+const MUSTER: Duration = Duration::from_secs(5);
+const MUSTER_LOOK: Duration = Duration::from_millis(2);
 
 /// Renders all frames and writes them.
 ///
@@ -81,6 +84,8 @@ impl Run {
         let local_workers = options.local_workers;
         let mut farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
         let mut progress = Progress::new(self.frames, farm.address(), local_workers);
+        muster(&farm, local_workers, &interrupted).await;
+        self.totals.begin();
         let rendered = self.render(&mut farm, &mut progress, &interrupted).await;
         let written = self.writer.finish().await;
         progress.finish(self.writer.written());
@@ -129,6 +134,20 @@ impl Run {
     }
 }
 
+/// Waits until the local workers are there, so that figures are of the number of workers that was asked for and do not
+/// tell how fast processes start. One that does not come is not waited for long.
+async fn muster(farm: &Farm, local_workers: u32, interrupted: &CancellationToken) {
+    let all_there = async {
+        while farm.status().workers.len() < local_workers as usize {
+            tokio::time::sleep(MUSTER_LOOK).await;
+        }
+    };
+    tokio::select! {
+        () = interrupted.cancelled() => {}
+        _ = tokio::time::timeout(MUSTER, all_there) => {}
+    }
+}
+
 /// Sums over the frames of a run.
 struct Totals {
     started: Instant,
@@ -161,6 +180,11 @@ impl Totals {
             rate: FrameRate::default(),
             log,
         }
+    }
+
+    /// The first frame is asked for now.
+    fn begin(&mut self) {
+        self.started = Instant::now();
     }
 
     fn add(&mut self, frame: &FinishedFrame) -> Result<(), CommandError> {

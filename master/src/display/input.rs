@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use minifb::{InputCallback, Key, MouseButton, MouseMode, Window};
+use raw_window_handle::{HasWindowHandle, RawWindowHandle};
 
 use crate::camera_control::{Held, Input};
 
@@ -28,6 +29,7 @@ pub(super) struct Controls {
     edges: Edges,
     keyboard: Keyboard,
     mouse: Mouse,
+    notches_per_unit: f64,
 }
 
 /// What happened since the last look.
@@ -48,7 +50,13 @@ impl Controls {
     pub(super) fn of(window: &mut Window) -> Self {
         let edges = Edges::default();
         window.set_input_callback(Box::new(Listener(Rc::clone(&edges))));
-        Self { edges, keyboard: Keyboard::default(), mouse: Mouse::default() }
+        let system = window.window_handle().map(|handle| handle.as_raw());
+        Self {
+            edges,
+            keyboard: Keyboard::default(),
+            mouse: Mouse::default(),
+            notches_per_unit: system.map_or(1.0, notches_per_unit),
+        }
     }
 
     /// What happened since the last look; once per update of the window.
@@ -58,7 +66,8 @@ impl Controls {
         let at = window.get_unscaled_mouse_pos(MouseMode::Pass);
         let pressed = window.get_mouse_down(MouseButton::Left);
         let drag = self.mouse.drag(at, pressed, window.get_size().1);
-        let wheel = window.get_scroll_wheel().map_or(0.0, |(_, notches)| f64::from(notches));
+        let wheel =
+            window.get_scroll_wheel().map_or(0.0, |(_, units)| f64::from(units) * self.notches_per_unit);
         Happened {
             camera: Input {
                 held: held(&strokes.held),
@@ -70,6 +79,16 @@ impl Controls {
             toggle_figures: strokes.toggled(Key::O),
             end: strokes.pressed.contains(&Key::Escape),
         }
+    }
+}
+
+/// minifb hands on what each window system calls a notch of the wheel away from the user: X and macOS 1, Windows 12,
+/// Wayland -10 (its axis points downwards, and compositors count ten to fifteen units a notch).
+fn notches_per_unit(system: RawWindowHandle) -> f64 {
+    match system {
+        RawWindowHandle::Wayland(_) => -1.0 / 10.0,
+        RawWindowHandle::Win32(_) => 1.0 / 12.0,
+        _ => 1.0,
     }
 }
 
