@@ -106,8 +106,11 @@ impl Nursery {
             let born = Instant::now();
             let end = match self.spawn() {
                 Ok(mut child) => {
+                    // Waiting for a child closes its standard input, and with that would end it: hold it elsewhere.
+                    let stdin = child.stdin.take();
                     tokio::select! {
                         () = stop.cancelled() => {
+                            drop(stdin);
                             end(&mut child, self.number).await;
                             return None;
                         }
@@ -142,9 +145,8 @@ impl Nursery {
     }
 }
 
-/// Asks a worker to end by closing its standard input, and kills it if it does not.
+/// Waits for a worker that has been asked to end, and kills it if it does not.
 async fn end(child: &mut Child, number: u32) {
-    drop(child.stdin.take());
     if tokio::time::timeout(ENDING, child.wait()).await.is_err() {
         tracing::warn!("local worker {number} does not end within {} s and is killed", ENDING.as_secs());
         // It fails only for a process that has ended meanwhile.
@@ -193,10 +195,18 @@ mod tests {
     async fn a_worker_ends_with_its_standard_input() {
         let tasks = TaskTracker::new();
         let stop = CancellationToken::new();
-        let cat = Nursery { number: 1, program: "cat".into(), args: Vec::new() };
+        let folder = tempfile::tempdir().unwrap();
+        let ended = folder.path().join("ended");
+        let script = format!("cat; touch {}", ended.display());
+        let args = ["-c".into(), script.into()].to_vec();
+        let shell = Nursery { number: 1, program: "sh".into(), args };
         let stopped = stop.clone();
-        let task = tasks.spawn(async move { cat.run(&stopped).await });
+        let task = tasks.spawn(async move { shell.run(&stopped).await });
+        // Its standard input is open for as long as it is wanted.
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        assert!(!ended.exists());
         stop.cancel();
         assert_eq!(task.await.unwrap(), None);
+        assert!(ended.exists());
     }
 }
