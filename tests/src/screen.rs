@@ -5,16 +5,21 @@ use std::process::{Child, Command, Stdio};
 
 use crate::wait_until;
 
-/// A virtual X11 screen of 1280x1024 pixels at 24 bit, gone when dropped.
+/// A virtual X11 screen of 1280x1024 pixels, gone when dropped.
 pub struct Screen {
     server: Child,
     display: String,
 }
 
 impl Screen {
-    /// Starts one. Where `Xvfb`, `xdotool` or ImageMagick's `import` is missing it says so and returns `None`, unless
+    /// Starts one of 24 bits. Where `Xvfb`, `xdotool` or ImageMagick's `import` is missing it says so and returns `None`, unless
     /// `RAYFARM_REQUIRE_WINDOW` is set: then the test fails.
     pub fn start() -> Option<Self> {
+        Self::of_depth(24)
+    }
+
+    /// Starts one whose pixels have `depth` bits; otherwise as [`Screen::start`].
+    pub fn of_depth(depth: u32) -> Option<Self> {
         let missing: Vec<&str> =
             ["Xvfb", "xdotool", "import"].into_iter().filter(|program| !is_installed(program)).collect();
         if !missing.is_empty() {
@@ -27,17 +32,18 @@ impl Screen {
         }
         // Process ids are unique, so the display number is, up to its range; a taken one is passed over.
         let first = 100 + std::process::id() % 20_000;
-        (first..first + 50).find_map(Self::on)
+        (first..first + 50).find_map(|number| Self::on(number, depth))
     }
 
-    fn on(number: u32) -> Option<Self> {
+    fn on(number: u32, depth: u32) -> Option<Self> {
         let socket = format!("/tmp/.X11-unix/X{number}");
         if Path::new(&socket).exists() {
             return None;
         }
         let display = format!(":{number}");
+        // Without -noreset a server that its last client leaves starts anew and refuses clients meanwhile.
         let server = Command::new("Xvfb")
-            .args([&display, "-screen", "0", "1280x1024x24", "-nolisten", "tcp"])
+            .args([&display, "-noreset", "-nolisten", "tcp", "-screen", "0", &format!("1280x1024x{depth}")])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()

@@ -131,16 +131,16 @@ fn bands(height: u32) -> impl Iterator<Item = Range<u32>> {
 fn print_table(report: &BenchReport) -> Result<(), CommandError> {
     let BenchReport { ms_per_frame: ms, rays_per_frame: rays, .. } = report;
     let text = format!(
-        "{} of {} x {}, {}, {} triangles, {}\n\
+        "{} of {} x {}, {}, {}, {}\n\
          ms per frame: {:.2} median, {:.2} min, {:.2} p95, {:.2} max ({:.1} FPS)\n\
          rays per frame: {} primary, {} shadow, {} secondary; {:.1} million per second\n\
          read and built in {:.0} ms; pixels {}",
-        counted(report.frames as usize, "frame"),
+        counted(report.frames.into(), "frame"),
         report.width,
         report.height,
-        counted(report.samples as usize, "sample"),
-        grouped(report.triangles),
-        counted(report.threads, "thread"),
+        counted(report.samples.into(), "sample"),
+        counted(report.triangles, "triangle"),
+        counted(report.threads as u64, "thread"),
         ms.median,
         ms.min,
         ms.p95,

@@ -8,7 +8,7 @@ use std::time::Instant;
 use rayfarm_tracer::scene;
 
 use crate::cli::CompileArgs;
-use crate::display::overlay::grouped;
+use crate::display::overlay::counted;
 use crate::error::CommandError;
 use crate::output::check_writable;
 
@@ -27,10 +27,10 @@ pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     write_whole(&args.output, mesh.bytes())
         .map_err(|error| CommandError::Failed(format!("{}: {error}", args.output.display())))?;
     let line = format!(
-        "{}: {} triangles, {} bytes, read and built in {seconds:.2} s",
+        "{}: {}, {}, read and built in {seconds:.2} s",
         args.output.display(),
-        grouped(mesh.triangle_count() as u64),
-        grouped(mesh.bytes().len() as u64),
+        counted(mesh.triangle_count() as u64, "triangle"),
+        counted(mesh.bytes().len() as u64, "byte"),
     );
     writeln!(io::stdout().lock(), "{line}")
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))

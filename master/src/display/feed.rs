@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::frame_rate::FrameRate;
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmStatus, FinishedFrame, FrameId};
+use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame, FrameId};
 use crate::orbit::Animation;
 use crate::report::{BytesPerFrame, FpsLog, FrameLine, RaysPerFrame};
 
@@ -46,6 +46,7 @@ pub(crate) struct News {
     rate: FrameRate,
     completed: u64,
     last_completed: Duration,
+    trouble: Option<String>,
 }
 
 /// The window's end of [`News`].
@@ -62,6 +63,7 @@ impl NewsDesk {
             rate: FrameRate::default(),
             completed: 0,
             last_completed: Duration::ZERO,
+            trouble: None,
         })))
     }
 
@@ -90,6 +92,25 @@ impl NewsDesk {
     pub(crate) fn since_last_frame(&self) -> Duration {
         let news = self.lock();
         news.started.elapsed().saturating_sub(news.last_completed)
+    }
+
+    /// What keeps frames from coming, if that is known.
+    pub(crate) fn trouble(&self) -> Option<String> {
+        self.lock().trouble.clone()
+    }
+
+    /// A farm without workers is no reason to close the window: it says so, and somebody may start one.
+    fn frame_or_trouble(
+        &self,
+        frame: Result<FinishedFrame, FarmError>,
+    ) -> Result<Option<FinishedFrame>, CommandError> {
+        let (frame, trouble) = match frame {
+            Ok(frame) => (Some(frame), None),
+            Err(FarmError::NoWorkers { reason, .. }) => (None, Some(reason)),
+            Err(error) => return Err(CommandError::failed(error)),
+        };
+        self.lock().trouble = trouble;
+        Ok(frame)
     }
 
     /// Notes a finished frame and returns its line for the log.
@@ -157,7 +178,7 @@ async fn drive(
             biased;
             () = stop.cancelled() => return Ok(()),
             frame = farm.finished() => {
-                let frame = frame.map_err(CommandError::failed)?;
+                let Some(frame) = desk.frame_or_trouble(frame)? else { continue };
                 requests.finished(frame.frame);
                 let line = desk.completed_frame(frame);
                 if let Some(log) = &mut log {

@@ -53,10 +53,10 @@ impl Figures {
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
         lines.push(format!(
             "{}, {}",
-            counted(self.workers, "worker"),
-            counted(self.threads as usize, "thread")
+            counted(self.workers as u64, "worker"),
+            counted(self.threads.into(), "thread")
         ));
-        lines.push(format!("{} triangles", grouped(self.triangles)));
+        lines.push(counted(self.triangles, "triangle"));
         if let Some(progress) = self.progress {
             lines.push(format!("next frame: {:.0} %", progress.clamp(0.0, 1.0) * 100.0));
         }
@@ -91,12 +91,17 @@ pub(super) fn draw_message(canvas: &mut Canvas, lines: &[String]) {
     draw_centred(canvas, lines, 1);
 }
 
-/// What the window says while there is no worker.
-pub(super) fn waiting_for_workers(address: SocketAddr, local_workers: u32) -> Vec<String> {
-    let first = match local_workers {
-        0 => "Waiting for a worker.".to_owned(),
-        1 => "Waiting for this machine's worker.".to_owned(),
-        n => format!("Waiting for this machine's {n} workers."),
+/// What the window says while there is no worker. `trouble` is what became of this machine's own.
+pub(super) fn waiting_for_workers(
+    address: SocketAddr,
+    local_workers: u32,
+    trouble: Option<&str>,
+) -> Vec<String> {
+    let first = match (trouble, local_workers) {
+        (Some(trouble), _) => format!("Waiting for a worker: {trouble}."),
+        (None, 0) => "Waiting for a worker.".to_owned(),
+        (None, 1) => "Waiting for this machine's worker.".to_owned(),
+        (None, n) => format!("Waiting for this machine's {n} workers."),
     };
     let where_to = if address.ip().is_loopback() { "on this machine" } else { "on any machine" };
     vec![first, String::new(), format!("To start one {where_to}:"), worker_command(address)]
@@ -198,10 +203,10 @@ fn broken(line: &str, columns: usize) -> Vec<String> {
     pieces
 }
 
-/// `1 worker`, `2 workers`.
-pub(crate) fn counted(count: usize, what: &str) -> String {
+/// `1 worker`, `2 workers`, `99,938 triangles`.
+pub(crate) fn counted(count: u64, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
+    format!("{} {what}{plural}", grouped(count))
 }
 
 /// `1234567` as `1,234,567`.

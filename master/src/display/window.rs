@@ -23,6 +23,8 @@ const REDRAW_EVERY: Duration = Duration::from_millis(200);
 const TITLE_EVERY: Duration = Duration::from_millis(500);
 /// A frame that takes longer than this is told how far it is.
 const PATIENCE: Duration = Duration::from_millis(700);
+/// Workers whose trouble is told before the first picture.
+const MAX_TROUBLES: usize = 4;
 /// What is seen before the first picture.
 const GROUND: u32 = 0x0020_2428;
 
@@ -153,10 +155,12 @@ impl Display {
         if self.show_help {
             overlay::draw_help(&mut self.canvas);
         } else if status.workers.is_empty() {
-            let message = overlay::waiting_for_workers(link.address, self.about.local_workers);
+            let trouble = link.desk.trouble();
+            let message =
+                overlay::waiting_for_workers(link.address, self.about.local_workers, trouble.as_deref());
             overlay::draw_message(&mut self.canvas, &message);
         } else if self.picture.is_none() {
-            overlay::draw_message(&mut self.canvas, &[first_picture(&status)]);
+            overlay::draw_message(&mut self.canvas, &first_picture(&status));
         }
     }
 
@@ -187,11 +191,16 @@ impl Display {
     }
 }
 
-fn first_picture(status: &FarmStatus) -> String {
-    match progress(status) {
+fn first_picture(status: &FarmStatus) -> Vec<String> {
+    let first = match progress(status) {
         done if done > 0.0 => format!("Rendering the first picture: {:.0} %", done * 100.0),
         _ => "Sending the scene to the workers.".to_owned(),
-    }
+    };
+    let troubles = status.workers.iter().filter_map(|worker| {
+        let trouble = worker.trouble.as_ref()?;
+        Some(format!("{} cannot render it: {trouble}", worker.name))
+    });
+    std::iter::once(first).chain(troubles.take(MAX_TROUBLES)).collect()
 }
 
 /// How much of the frame being rendered is done: 0..=1.

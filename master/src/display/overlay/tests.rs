@@ -55,7 +55,8 @@ fn figures_can_be_read_off_the_canvas() {
 
 #[test]
 fn every_window_size_can_be_drawn_on() {
-    let message = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 1);
+    let message =
+        waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 1, Some("it ended, 5 times in a row"));
     for width in [0, 1, 2, 7, 16, 40, 100, 333, 1024, 5000] {
         for height in [0, 1, 2, 9, 30, 90, 240, 2200] {
             let mut canvas = canvas(width, height);
@@ -104,7 +105,7 @@ fn long_lines_are_broken_at_spaces_and_long_words_are_cut() {
 
 #[test]
 fn the_waiting_message_says_how_to_start_a_worker() {
-    let local = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 0);
+    let local = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 0, None);
     assert_eq!(
         local,
         [
@@ -114,7 +115,7 @@ fn the_waiting_message_says_how_to_start_a_worker() {
             "rayfarm-worker --master 127.0.0.1:7117"
         ]
     );
-    let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2);
+    let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2, None);
     assert_eq!(elsewhere[2], "To start one on any machine:");
     assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
 }
