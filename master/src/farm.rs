@@ -66,6 +66,7 @@ pub struct Farm {
     driver: Arc<Driver>,
     sessions: TaskTracker,
     processes: TaskTracker,
+    stop_processes: CancellationToken,
     stop: DropGuard,
 }
 
@@ -212,12 +213,13 @@ impl Farm {
             listening: address,
         };
         let bereaved = driver.clone();
-        local.start(&processes, &stop, move |reason| {
+        let stop_processes = stop.child_token();
+        local.start(&processes, &stop_processes, move |reason| {
             if bereaved.worker_count() == 0 {
                 bereaved.report(FarmError::NoWorkers { reason, address });
             }
         });
-        Ok(Farm { address, driver, sessions, processes, stop: stop.drop_guard() })
+        Ok(Farm { address, driver, sessions, processes, stop_processes, stop: stop.drop_guard() })
     }
 
     /// Where workers connect.
@@ -248,6 +250,8 @@ impl Farm {
 
     /// Says goodbye to all workers and waits, not for long, until the local ones have ended; kills what has not.
     pub async fn shut_down(self) {
+        // First of all, so that nobody starts a worker again that ends because it was told goodbye.
+        self.stop_processes.cancel();
         self.driver.part("the master ends").await;
         let stop = self.stop.disarm();
         stop.cancel();

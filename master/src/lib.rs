@@ -41,8 +41,8 @@ use cli::Invocation;
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let (command, log) = match Invocation::parse(args) {
         Ok(Invocation::LocalWorker(args)) => {
-            eprintln!("error: this build has no local worker to run with {args:?}");
-            return ExitCode::FAILURE;
+            let name = OsString::from("rayfarm-worker");
+            return rayfarm_worker::cli::main_from(std::iter::once(name).chain(args));
         }
         Ok(Invocation::Command(command, log)) => (command, log),
         Err(error) => {

@@ -109,6 +109,7 @@ impl Nursery {
                     // Waiting for a child closes its standard input, and with that would end it: hold it elsewhere.
                     let stdin = child.stdin.take();
                     tokio::select! {
+                        biased;
                         () = stop.cancelled() => {
                             drop(stdin);
                             end(&mut child, self.number).await;
