@@ -23,7 +23,7 @@ pub(crate) const LOCAL_WORKER: &str = "local-worker";
 /// What one command line asks for.
 #[derive(Debug)]
 pub(crate) enum Invocation {
-    /// Be a render node of a master on this machine; the arguments are the worker's.
+    /// Be a render node of a master on this machine; the arguments are the worker's, the first in place of its name.
     LocalWorker(Vec<OsString>),
     /// Do one of the commands.
     Command(Command, LogArgs),
@@ -37,7 +37,7 @@ impl Invocation {
     pub(crate) fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
         let args: Vec<OsString> = args.into_iter().collect();
         if args.get(1).is_some_and(|word| word == LOCAL_WORKER) {
-            return Ok(Self::LocalWorker(args.into_iter().skip(2).collect()));
+            return Ok(Self::LocalWorker(args.into_iter().skip(1).collect()));
         }
         let matches = Cli::command().try_get_matches_from(args)?;
         refuse_options_before_the_command(&matches)?;

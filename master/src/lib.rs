@@ -40,10 +40,7 @@ use cli::Invocation;
 /// Exit status: 0 done; 2 wrong use or wrong input; 1 anything else. What is wrong is told on standard error.
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let (command, log) = match Invocation::parse(args) {
-        Ok(Invocation::LocalWorker(args)) => {
-            let name = OsString::from("rayfarm-worker");
-            return rayfarm_worker::cli::main_from(std::iter::once(name).chain(args));
-        }
+        Ok(Invocation::LocalWorker(args)) => return rayfarm_worker::cli::main_from(args),
         Ok(Invocation::Command(command, log)) => (command, log),
         Err(error) => {
             let _ = error.print(); // there is nowhere left to say that it could not be said

@@ -158,17 +158,21 @@ impl FrameWriter {
         Self { pattern, pending: VecDeque::new(), written: 0 }
     }
 
-    /// Takes frame `index`; waits only while too many frames are still on their way to the disk.
+    /// Waits until another frame can be taken. Safe to drop half-way, as `select!` does.
     ///
     /// # Errors
-    /// What went wrong with this frame or an earlier one.
-    pub(crate) async fn write(&mut self, index: u64, picture: RgbImage) -> Result<(), CommandError> {
+    /// What went wrong with an earlier frame.
+    pub(crate) async fn ready(&mut self) -> Result<(), CommandError> {
         while self.pending.len() >= MAX_PENDING {
             self.finish_one().await?;
         }
+        Ok(())
+    }
+
+    /// Takes frame `index`; at most one for each time that the writer was ready.
+    pub(crate) fn write(&mut self, index: u64, picture: RgbImage) {
         let path = self.pattern.path(index);
         self.pending.push_back(tokio::task::spawn_blocking(move || image::save(&path, &picture)));
-        Ok(())
     }
 
     /// Waits until everything taken is on the disk.
@@ -190,10 +194,11 @@ impl FrameWriter {
     }
 
     async fn finish_one(&mut self) -> Result<(), CommandError> {
-        if let Some(save) = self.pending.pop_front() {
-            save.await.map_err(CommandError::failed)?.map_err(CommandError::failed)?;
-            self.written += 1;
-        }
+        let Some(save) = self.pending.front_mut() else { return Ok(()) };
+        let saved = save.await;
+        self.pending.pop_front();
+        saved.map_err(CommandError::failed)?.map_err(CommandError::failed)?;
+        self.written += 1;
         Ok(())
     }
 }
@@ -273,7 +278,8 @@ mod tests {
         let mut writer = FrameWriter::new(pattern);
         for index in 0..5u8 {
             let picture = RgbImage { width: 2, height: 1, pixels: vec![index; 6] };
-            writer.write(u64::from(index), picture).await.unwrap();
+            writer.ready().await.unwrap();
+            writer.write(u64::from(index), picture);
         }
         writer.finish().await.unwrap();
         assert_eq!(writer.written(), 5);
@@ -288,7 +294,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let pattern = OutputPattern::parse(&folder.path().join("gone/f%d.ppm"), 2).unwrap();
         let mut writer = FrameWriter::new(pattern);
-        writer.write(0, RgbImage { width: 1, height: 1, pixels: vec![0; 3] }).await.unwrap();
+        writer.write(0, RgbImage { width: 1, height: 1, pixels: vec![0; 3] });
         assert!(writer.finish().await.is_err());
         assert_eq!(writer.written(), 0);
     }

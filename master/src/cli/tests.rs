@@ -90,7 +90,9 @@ fn no_local_workers_is_none() {
 #[test]
 fn the_local_worker_gets_its_arguments_untouched() {
     match parse("rayfarm-master local-worker --master 127.0.0.1:1 --help") {
-        Ok(Invocation::LocalWorker(args)) => assert_eq!(args, ["--master", "127.0.0.1:1", "--help"]),
+        Ok(Invocation::LocalWorker(args)) => {
+            assert_eq!(args, [LOCAL_WORKER, "--master", "127.0.0.1:1", "--help"])
+        }
         other => panic!("{other:?}"),
     }
 }

@@ -1,5 +1,6 @@
 //! `render`: frames to files, no display needed.
 
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::BufWriter;
 use std::time::{Duration, Instant};
@@ -23,6 +24,8 @@ use crate::report::{
 
 /// The frame being rendered and the one after it, so that workers never run dry between two frames.
 const OPEN_REQUESTS: u64 = 2;
+/// With so many pictures waiting for the disk, no more are asked for.
+const MAX_UNWRITTEN: usize = 2;
 /// How often the progress display looks at the farm.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 /// How long local workers may take to come before the run begins without them, and how often that is looked at.
@@ -52,6 +55,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         animation: animation(&args.picture, args.frames),
         frames: u64::from(args.frames),
         requested: 0,
+        unwritten: VecDeque::new(),
         writer: FrameWriter::new(pattern),
         totals: Totals::new(triangles, log),
     };
@@ -69,6 +73,8 @@ struct Run {
     animation: Animation,
     frames: u64,
     requested: u64,
+    /// Pictures that the writer has no room for yet.
+    unwritten: VecDeque<(u64, RgbImage)>,
     writer: FrameWriter,
     totals: Totals,
 }
@@ -107,23 +113,43 @@ impl Run {
         interrupted: &CancellationToken,
     ) -> Result<(), CommandError> {
         let mut look = tokio::time::interval(LOOK_EVERY);
-        self.request_up_to(OPEN_REQUESTS, farm);
-        for index in 0..self.frames {
-            let frame = loop {
-                tokio::select! {
-                    biased;
-                    () = interrupted.cancelled() => return Err(CommandError::Interrupted(String::new())),
-                    frame = farm.finished() => break frame.map_err(CommandError::failed)?,
-                    _ = look.tick() => progress.look(&farm.status()),
+        let mut arrived = 0;
+        while arrived < self.frames || !self.unwritten.is_empty() {
+            if self.unwritten.len() < MAX_UNWRITTEN {
+                self.request_up_to(arrived + OPEN_REQUESTS, farm);
+            }
+            tokio::select! {
+                biased;
+                () = interrupted.cancelled() => return Err(CommandError::Interrupted(String::new())),
+                ready = self.writer.ready(), if !self.unwritten.is_empty() => {
+                    ready?;
+                    self.write_next();
                 }
-            };
-            self.request_up_to(index + 1 + OPEN_REQUESTS, farm);
-            self.totals.add(&frame)?;
-            progress.completed(index + 1, self.totals.fps());
-            let FrameView { width, height, .. } = frame.view;
-            self.writer.write(index, RgbImage { width, height, pixels: frame.pixels.into_vec() }).await?;
+                frame = farm.finished(), if arrived < self.frames => {
+                    self.take(arrived, frame.map_err(CommandError::failed)?)?;
+                    arrived += 1;
+                    progress.completed(arrived, self.totals.fps());
+                }
+                _ = look.tick() => progress.look(&farm.status()),
+            }
         }
         Ok(())
+    }
+
+    fn take(&mut self, index: u64, frame: FinishedFrame) -> Result<(), CommandError> {
+        self.totals.add(&frame)?;
+        if index + 1 == self.frames {
+            self.totals.hash = blake3::hash(&frame.pixels);
+        }
+        let FrameView { width, height, .. } = frame.view;
+        self.unwritten.push_back((index, RgbImage { width, height, pixels: frame.pixels.into_vec() }));
+        Ok(())
+    }
+
+    fn write_next(&mut self) {
+        if let Some((index, picture)) = self.unwritten.pop_front() {
+            self.writer.write(index, picture);
+        }
     }
 
     fn request_up_to(&mut self, count: u64, farm: &Farm) {
@@ -159,6 +185,7 @@ struct Totals {
     workers: u32,
     threads: u32,
     triangles: u64,
+    /// Of the last frame's pixels.
     hash: blake3::Hash,
     rate: FrameRate,
     log: Option<FpsLog<BufWriter<File>>>,
@@ -212,7 +239,6 @@ impl Totals {
         self.bytes.add(bytes);
         self.scene_bytes += frame.scene_bytes;
         (self.workers, self.threads) = (frame.workers, frame.threads);
-        self.hash = blake3::hash(&frame.pixels);
         self.log.as_mut().map_or(Ok(()), |log| log.add(&line))
     }
 
