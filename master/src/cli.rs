@@ -66,7 +66,7 @@ fn refuse_options_before_the_command(matches: &ArgMatches) -> Result<(), clap::E
 ///
 /// Without a command it opens a window: rayfarm-master [SCENE] is rayfarm-master view [SCENE].
 #[derive(Debug, Parser)]
-#[command(name = "rayfarm-master", version, max_term_width = 100)]
+#[command(name = "rayfarm-master", version, args_override_self = true, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,

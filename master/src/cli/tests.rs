@@ -82,6 +82,12 @@ fn the_other_commands_are_read() {
 }
 
 #[test]
+fn the_last_of_two_equal_options_counts() {
+    assert_eq!(render("rayfarm-master render a.toml -o b.png --frames 2 --frames 3").frames, 3);
+    assert_eq!(view("rayfarm-master --samples 4 --samples 9").picture.samples, Some(9));
+}
+
+#[test]
 fn no_local_workers_is_none() {
     assert_eq!(view("rayfarm-master --no-local-workers").farm.local_workers(), 0);
     assert_eq!(view("rayfarm-master --local-workers 0").farm.local_workers(), 0);
