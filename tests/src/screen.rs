@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::wait_until;
 
@@ -30,9 +31,13 @@ impl Screen {
             eprintln!("skipped: {missing:?} not installed (apt-get install xvfb xdotool imagemagick)");
             return None;
         }
-        // Process ids are unique, so the display number is, up to its range; a taken one is passed over.
-        let first = 100 + std::process::id() % 20_000;
-        (first..first + 50).find_map(|number| Self::on(number, depth))
+        // Process ids are unique, and so are the numbers within a process; what another program has taken is passed
+        // over.
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let first = 100 + std::process::id() % 2_000 * 20;
+        (0..20)
+            .map(|_| first + NEXT.fetch_add(1, Ordering::Relaxed))
+            .find_map(|number| Self::on(number, depth))
     }
 
     fn on(number: u32, depth: u32) -> Option<Self> {
