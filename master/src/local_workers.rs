@@ -65,7 +65,8 @@ impl LocalWorkers {
         let master = reachable(self.listening).to_string();
         let name = format!("local-{}", number + 1);
         let mut args = vec![LOCAL_WORKER.to_owned(), "--master".into(), master, "--exit-with-stdin".into()];
-        args.extend(["--name".into(), name]);
+        // What becomes of it, the master tells; only what is wrong it tells itself.
+        args.extend(["--quiet".into(), "--name".into(), name]);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         if let Some(threads) = self.threads.or_else(|| share(cores, self.count, number)) {
             args.extend(["--threads".into(), threads.to_string()]);
