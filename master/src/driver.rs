@@ -215,7 +215,7 @@ impl Driver {
     /// A session has ended; its worker is told why, where it still listens.
     pub(crate) fn leave(&self, worker: WorkerId, reason: &str) {
         let mut inner = self.lock();
-        inner.end_session(worker, reason);
+        inner.end_session(worker, reason, true);
         self.drive(&mut inner, Event::WorkerLeft { worker });
     }
 
@@ -285,7 +285,7 @@ impl Driver {
             let ids: Vec<WorkerId> = inner.sessions.keys().copied().collect();
             ids.into_iter()
                 .filter_map(|worker| {
-                    let farewell = inner.end_session(worker, reason);
+                    let farewell = inner.end_session(worker, reason, false);
                     self.drive(&mut inner, Event::WorkerLeft { worker });
                     farewell
                 })
@@ -341,7 +341,7 @@ impl Driver {
             Action::Ping { worker, nonce } => return inner.send(worker, ToWorker::Ping { nonce }),
             Action::Dismiss { worker, reason } => {
                 inner.log_dismissal(worker, &reason);
-                inner.end_session(worker, &reason);
+                inner.end_session(worker, &reason, true);
             }
         }
         None
@@ -391,7 +391,7 @@ impl Inner {
         let session = self.sessions.get(&worker)?;
         let error = session.sender.try_send(message).err()?;
         self.log_dismissal(worker, &format!("cannot send to it: {error}"));
-        self.end_session(worker, "you do not read what you are sent");
+        self.end_session(worker, "you do not read what you are sent", true);
         Some(Event::WorkerLeft { worker })
     }
 
@@ -402,10 +402,16 @@ impl Inner {
     }
 
     /// Forgets a session and sees it off in the background: a last word, if there is room for it, then the end.
-    fn end_session(&mut self, worker: WorkerId, reason: &str) -> Option<tokio::task::JoinHandle<()>> {
+    /// `again` lets the worker come back: it is this session that has failed, not the farm that ends.
+    fn end_session(
+        &mut self,
+        worker: WorkerId,
+        reason: &str,
+        again: bool,
+    ) -> Option<tokio::task::JoinHandle<()>> {
         let Session { sender, traffic, .. } = self.sessions.remove(&worker)?;
         self.ended.add(&traffic);
-        let goodbye = ToWorker::Goodbye { reason: reason.to_owned() };
+        let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), again };
         Some(tokio::spawn(async move {
             let last_words = async {
                 // A session that has ended already needs none.

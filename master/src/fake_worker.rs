@@ -88,7 +88,7 @@ async fn live(stream: TcpStream, mut script: Script) -> Outcome {
                 answer(&sender, &mut script, lease, &view).await;
             }
             ToWorker::Ping { nonce } => sender.send(ToMaster::Pong { nonce }).await.unwrap(),
-            ToWorker::Goodbye { reason } => outcome.goodbye = Some(reason),
+            ToWorker::Goodbye { reason, .. } => outcome.goodbye = Some(reason),
             ToWorker::Cancel { .. } | ToWorker::Drain => {}
             ToWorker::AssetBegin { .. } | ToWorker::AssetChunk { .. } | ToWorker::AssetUnknown { .. } => {
                 unreachable!("a fake worker asks for no assets")

@@ -60,7 +60,8 @@ async fn to_worker() {
     golden(ToWorker::AssetUnknown { id: ID }, &[&[32, 0, 0, 0, 0x15, 0, 0, 0], &ID.0]).await;
     golden(ToWorker::Ping { nonce: 5 }, &[&[8, 0, 0, 0, 0x30, 0, 0, 0], &number]).await;
     golden(ToWorker::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
-    golden(ToWorker::Goodbye { reason: "hé".into() }, &[&[3, 0, 0, 0, 0x33, 0, 0, 0], b"h\xc3\xa9"]).await;
+    let goodbye = ToWorker::Goodbye { reason: "hé".into(), again: true };
+    golden(goodbye, &[&[4, 0, 0, 0, 0x33, 0, 0, 0], &[1], b"h\xc3\xa9"]).await;
 }
 
 #[tokio::test]

@@ -53,7 +53,7 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     }
     tokio::task::yield_now().await;
     out.send(ToWorker::Cancel { before: FrameId(9) }).await.unwrap();
-    out.send(ToWorker::Goodbye { reason: "done".into() }).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
 
     let (_out, mut received, _) = spawn::<_, ToMaster, ToWorker>(theirs);
     let mut order = Vec::new();
@@ -64,7 +64,7 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     assert_eq!(at(&ToWorker::Ping { nonce: 1 }), 0);
     assert!(at(&ToWorker::Cancel { before: FrameId(9) }) < at(&chunk(1000, 20_000)));
     assert!(at(&chunk(1000, 20_000)) < at(&chunk(2000, 20_000)));
-    assert_eq!(order.last(), Some(&ToWorker::Goodbye { reason: "done".into() }));
+    assert_eq!(order.last(), Some(&ToWorker::Goodbye { reason: "done".into(), again: false }));
     assert_eq!(order.len(), 7);
 }
 
@@ -83,8 +83,11 @@ async fn a_goodbye_is_flushed_and_closes() {
     );
     assert!(master_in.recv().await.is_none());
     // The other direction is still open: the master can answer, then close.
-    master_out.send(ToWorker::Goodbye { reason: "bye".into() }).await.unwrap();
-    assert_eq!(worker_in.recv().await.unwrap().unwrap(), ToWorker::Goodbye { reason: "bye".into() });
+    master_out.send(ToWorker::Goodbye { reason: "bye".into(), again: false }).await.unwrap();
+    assert_eq!(
+        worker_in.recv().await.unwrap().unwrap(),
+        ToWorker::Goodbye { reason: "bye".into(), again: false }
+    );
     assert!(worker_in.recv().await.is_none());
 }
 
@@ -194,10 +197,16 @@ async fn a_peer_that_does_not_read_is_given_up() {
 async fn the_last_word_is_heard_though_the_writer_has_failed() {
     let (ours, mut theirs) = duplex(1 << 16);
     let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
-    theirs.write_all(&wire(&ToWorker::Goodbye { reason: "kicked".into() }).await).await.unwrap();
+    theirs
+        .write_all(&wire(&ToWorker::Goodbye { reason: "kicked".into(), again: false }).await)
+        .await
+        .unwrap();
     drop(theirs);
     let _ = out.send(ToMaster::Drain).await;
-    assert_eq!(received.recv().await.unwrap().unwrap(), ToWorker::Goodbye { reason: "kicked".into() });
+    assert_eq!(
+        received.recv().await.unwrap().unwrap(),
+        ToWorker::Goodbye { reason: "kicked".into(), again: false }
+    );
 }
 
 #[tokio::test]
@@ -227,7 +236,7 @@ async fn traffic_counts_whole_envelopes() {
     let mut b = b;
     out.send(ToWorker::Ping { nonce: 1 }).await.unwrap();
     out.send(chunk(0, 1000)).await.unwrap();
-    out.send(ToWorker::Goodbye { reason: "end".into() }).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "end".into(), again: false }).await.unwrap();
     let mut all = Vec::new();
     b.read_to_end(&mut all).await.unwrap();
     assert_eq!(traffic.sent_bytes(), all.len() as u64);

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rayfarm_protocol::{Hello, Welcome, handshake};
 use tokio::net::TcpStream;
@@ -18,6 +18,9 @@ use crate::tracer::TracerRenderer;
 
 /// How long a host may take to accept a connection.
 const CONNECT_LIMIT: Duration = Duration::from_secs(10);
+
+/// A session that lasts longer was a good one: after it, the pauses begin anew.
+const LASTING_SESSION: Duration = Duration::from_secs(10);
 
 /// What a worker is to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,8 +77,13 @@ pub async fn run_with<R: Renderer>(
         };
         let error = match connected {
             Ok(stream) => {
-                pauses.reset();
-                match serve(stream, &mut keep, &stop).await {
+                let begun = Instant::now();
+                let end = serve(stream, &mut keep, &stop).await;
+                // One that ends as soon as it has begun is no success.
+                if begun.elapsed() > LASTING_SESSION {
+                    pauses.reset();
+                }
+                match end {
                     End::Lost(why) => WorkerError::Lost { master: options.master.clone(), why },
                     end => {
                         report(&end);

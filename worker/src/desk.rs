@@ -25,7 +25,7 @@ pub(crate) enum Effect<R: Renderer> {
     /// Leave when everything that was leased is done.
     Drain,
     /// The master has said goodbye.
-    End(String),
+    End { reason: String, again: bool },
 }
 
 /// Work that takes its time.
@@ -77,7 +77,7 @@ impl<'a, R: Renderer> Desk<'a, R> {
             ToWorker::AssetUnknown { id } => self.loader.unknown(id),
             ToWorker::Ping { nonce } => self.effects.push_back(Effect::Say(ToMaster::Pong { nonce })),
             ToWorker::Drain => self.effects.push_back(Effect::Drain),
-            ToWorker::Goodbye { reason } => self.effects.push_back(Effect::End(reason)),
+            ToWorker::Goodbye { reason, again } => self.effects.push_back(Effect::End { reason, again }),
         }
         self.take_steps();
     }

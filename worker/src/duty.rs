@@ -39,13 +39,13 @@ pub(crate) struct Keep<R: Renderer> {
 /// How a session ended.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// The master said goodbye, and why.
+    /// The master said goodbye for good, and why.
     Goodbye(String),
     /// All leases are done and no more will come.
     Drained,
     /// We were told to stop.
     Stopped,
-    /// Without a goodbye.
+    /// Without a goodbye, or with one that asks us to come back.
     Lost(String),
 }
 
@@ -103,7 +103,10 @@ impl<R: Renderer> Duty<'_, R> {
             while let Some(effect) = self.desk.poll_effect() {
                 match effect {
                     Effect::Drain => draining = true,
-                    Effect::End(reason) => return End::Goodbye(reason),
+                    Effect::End { reason, again: true } => {
+                        return End::Lost(format!("it ends this session: {reason}"));
+                    }
+                    Effect::End { reason, again: false } => return End::Goodbye(reason),
                     Effect::Say(message) => self.say(message).await,
                     effect => {
                         if let Err(why) = self.perform(effect, answers.as_ref()) {
@@ -151,7 +154,7 @@ impl<R: Renderer> Duty<'_, R> {
             Effect::CancelBefore(before) => self.pool.cancel(|frame| frame < before),
             Effect::CancelFrame(stale) => self.pool.cancel(|frame| frame == stale),
             // Dealt with by the caller.
-            Effect::Say(_) | Effect::Drain | Effect::End(_) => {}
+            Effect::Say(_) | Effect::Drain | Effect::End { .. } => {}
         }
         Ok(())
     }

@@ -52,6 +52,8 @@ pub enum ToWorker {
     Goodbye {
         /// Why.
         reason: String,
+        /// Whether the worker may connect again: this session has failed, the master goes on.
+        again: bool,
     },
 }
 
@@ -80,7 +82,7 @@ impl Message for ToWorker {
             Self::AssetUnknown { id } => encode_control(Kind::AssetUnknown, id),
             Self::Ping { nonce } => encode_control(Kind::Ping, nonce),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
-            Self::Goodbye { reason } => encode_reason(Kind::Goodbye, &[], reason),
+            Self::Goodbye { reason, again } => encode_reason(Kind::Goodbye, &[u8::from(*again)], reason),
         }
     }
 
@@ -97,7 +99,7 @@ impl Message for ToWorker {
             Kind::AssetUnknown => Self::AssetUnknown { id: decode_control(kind, &body)? },
             Kind::Ping => Self::Ping { nonce: decode_control(kind, &body)? },
             Kind::Drain => nothing(kind, &body).map(|()| Self::Drain)?,
-            Kind::Goodbye => Self::Goodbye { reason: decode_reason(&body) },
+            Kind::Goodbye => decode_goodbye(body)?,
             Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => return Err(unexpected(kind)),
         })
@@ -156,6 +158,17 @@ fn checked_frame(announce: &FrameAnnounce) -> Result<&FrameAnnounce, ProtocolErr
         return Err(ProtocolError::malformed(Kind::Frame, why));
     }
     Ok(announce)
+}
+
+fn decode_goodbye(mut body: Bytes) -> Result<ToWorker, ProtocolError> {
+    let again = match split_head::<1>(Kind::Goodbye, &mut body)? {
+        [0] => false,
+        [1] => true,
+        [other] => {
+            return Err(ProtocolError::malformed(Kind::Goodbye, format!("{other} is neither yes nor no")));
+        }
+    };
+    Ok(ToWorker::Goodbye { reason: decode_reason(&body), again })
 }
 
 fn encode_chunk(id: AssetId, offset: u64, bytes: &Bytes) -> Result<Envelope, ProtocolError> {
