@@ -4,14 +4,12 @@
 //! anything: messages to workers go into bounded queues, and a worker whose queue is full is let go.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
-use rayfarm_protocol::session::{Sender, Traffic};
-use rayfarm_protocol::{FrameAnnounce, FrameId, Hello, Lease, ToWorker, codec};
+use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, ToWorker, codec};
 use rayfarm_tracer::scene::FrameView;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
@@ -19,13 +17,12 @@ use tokio_util::sync::CancellationToken;
 use crate::assets::Assets;
 use crate::farm::{FarmError, FarmStatus, FinishedFrame, WorkerStatus};
 use crate::framebuffer::{Framebuffers, Misfit, Written};
-use crate::lease_book::{LeaseBook, Standing};
+use crate::lease_book::Standing;
+use crate::roster::{ByteCount, Return, Roster, Session, Unreachable};
 use crate::scheduler::{Action, Cost, Event, Scheduler, SegmentPolicy, WorkerId};
 
 /// Finished frames that wait to be fetched. Beyond that, the oldest is thrown away.
 const MAX_UNFETCHED: usize = 8;
-/// How long a worker's last messages may take.
-const FAREWELL: Duration = Duration::from_secs(1);
 
 /// The farm's state and its clock.
 pub(crate) struct Driver {
@@ -41,35 +38,15 @@ pub(crate) struct Driver {
 
 struct Inner {
     scheduler: Scheduler,
-    sessions: BTreeMap<WorkerId, Session>,
+    roster: Roster,
     /// What the frames that wait or are in flight show.
     views: BTreeMap<FrameId, (FrameView, FrameAnnounce)>,
     unfetched: VecDeque<Result<FinishedFrame, FarmError>>,
     last_frame: u64,
     last_worker: u64,
-    /// Traffic of sessions that have ended.
-    ended: Bytecount,
     /// All traffic up to the frame before.
-    counted: Bytecount,
+    counted: ByteCount,
     armed_for: Option<Duration>,
-}
-
-/// A connected worker.
-struct Session {
-    hello: Hello,
-    address: SocketAddr,
-    sender: Sender<ToWorker>,
-    traffic: Arc<Traffic>,
-    leases: LeaseBook,
-    trouble: Option<String>,
-}
-
-/// Bytes that went over the wire.
-#[derive(Clone, Copy, Debug, Default)]
-struct Bytecount {
-    sent: u64,
-    received: u64,
-    scene: u64,
 }
 
 /// Why an answer ends its session.
@@ -87,13 +64,12 @@ impl Driver {
     pub(crate) fn new(policy: SegmentPolicy, assets: Assets) -> Self {
         let inner = Inner {
             scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64),
-            sessions: BTreeMap::new(),
+            roster: Roster::default(),
             views: BTreeMap::new(),
             unfetched: VecDeque::new(),
             last_frame: 0,
             last_worker: 0,
-            ended: Bytecount::default(),
-            counted: Bytecount::default(),
+            counted: ByteCount::default(),
             armed_for: None,
         };
         Self {
@@ -180,12 +156,12 @@ impl Driver {
 
     /// How many workers are connected.
     pub(crate) fn worker_count(&self) -> usize {
-        self.lock().sessions.len()
+        self.lock().roster.len()
     }
 
     /// Whether a session is still wanted.
     pub(crate) fn knows(&self, worker: WorkerId) -> bool {
-        self.lock().sessions.contains_key(&worker)
+        self.lock().roster.get(worker).is_some()
     }
 
     /// A number for a new worker.
@@ -196,26 +172,17 @@ impl Driver {
     }
 
     /// A session has begun.
-    pub(crate) fn join(
-        &self,
-        worker: WorkerId,
-        hello: Hello,
-        address: SocketAddr,
-        sender: Sender<ToWorker>,
-        traffic: Arc<Traffic>,
-    ) {
-        let threads = hello.threads;
-        let session =
-            Session { hello, address, sender, traffic, leases: LeaseBook::default(), trouble: None };
+    pub(crate) fn join(&self, worker: WorkerId, session: Session) {
+        let threads = session.hello.threads;
         let mut inner = self.lock();
-        inner.sessions.insert(worker, session);
+        inner.roster.add(worker, session);
         self.drive(&mut inner, Event::WorkerJoined { worker, threads });
     }
 
     /// A session has ended; its worker is told why, where it still listens.
     pub(crate) fn leave(&self, worker: WorkerId, reason: &str) {
         let mut inner = self.lock();
-        inner.end_session(worker, reason, true);
+        inner.roster.end(worker, reason, Return::Welcome);
         self.drive(&mut inner, Event::WorkerLeft { worker });
     }
 
@@ -228,7 +195,7 @@ impl Driver {
         cost: Cost,
         bytes: &[u8],
     ) -> Result<(), AnswerError> {
-        let standing = match self.lock().sessions.get_mut(&worker) {
+        let standing = match self.lock().roster.get_mut(worker) {
             Some(session) => session.leases.answer(&lease),
             None => Standing::Revoked,
         };
@@ -246,7 +213,7 @@ impl Driver {
     /// A worker cannot render a frame.
     pub(crate) fn failed(&self, worker: WorkerId, frame: FrameId, reason: String) {
         let mut inner = self.lock();
-        if let Some(session) = inner.sessions.get_mut(&worker) {
+        if let Some(session) = inner.roster.get_mut(worker) {
             session.leases.fail(frame);
             tracing::warn!("{worker} ({}) cannot render frame {frame}: {reason}", session.hello.name);
             session.trouble = Some(reason);
@@ -258,7 +225,7 @@ impl Driver {
     pub(crate) fn status(&self) -> FarmStatus {
         let inner = self.lock();
         let workers = inner.scheduler.workers().filter_map(|record| {
-            let session = inner.sessions.get(&record.worker)?;
+            let session = inner.roster.get(record.worker)?;
             Some(WorkerStatus {
                 id: record.worker.0,
                 name: session.hello.name.clone(),
@@ -278,18 +245,16 @@ impl Driver {
         }
     }
 
-    /// Says goodbye to everybody and waits until they have heard it, for [`FAREWELL`] at most.
+    /// Says goodbye to everybody and waits, not for long, until they have heard it.
     pub(crate) async fn part(&self, reason: &str) {
         let farewells: Vec<_> = {
             let mut inner = self.lock();
-            let ids: Vec<WorkerId> = inner.sessions.keys().copied().collect();
-            ids.into_iter()
-                .filter_map(|worker| {
-                    let farewell = inner.end_session(worker, reason, false);
-                    self.drive(&mut inner, Event::WorkerLeft { worker });
-                    farewell
-                })
-                .collect()
+            let farewells = inner.roster.ids().into_iter().map(|worker| {
+                let farewell = inner.roster.end(worker, reason, Return::Useless);
+                self.drive(&mut inner, Event::WorkerLeft { worker });
+                farewell
+            });
+            farewells.flatten().collect()
         };
         for farewell in farewells {
             // It bounds itself, and cannot fail.
@@ -328,20 +293,20 @@ impl Driver {
             }
             Action::Announce { worker, frame } => {
                 let announce = inner.views.get(&frame).map(|(_, announce)| announce.clone())?;
-                return inner.send(worker, ToWorker::Frame(announce));
+                return send(inner, worker, ToWorker::Frame(announce));
             }
             Action::Grant { worker, lease } => {
-                inner.sessions.get_mut(&worker)?.leases.grant(lease);
-                return inner.send(worker, ToWorker::Segment(lease));
+                inner.roster.get_mut(worker)?.leases.grant(lease);
+                return send(inner, worker, ToWorker::Segment(lease));
             }
             Action::Cancel { worker, before } => {
-                inner.sessions.get_mut(&worker)?.leases.cancel(before);
-                return inner.send(worker, ToWorker::Cancel { before });
+                inner.roster.get_mut(worker)?.leases.cancel(before);
+                return send(inner, worker, ToWorker::Cancel { before });
             }
-            Action::Ping { worker, nonce } => return inner.send(worker, ToWorker::Ping { nonce }),
+            Action::Ping { worker, nonce } => return send(inner, worker, ToWorker::Ping { nonce }),
             Action::Dismiss { worker, reason } => {
-                inner.log_dismissal(worker, &reason);
-                inner.end_session(worker, &reason, true);
+                inner.roster.log_dismissal(worker, &reason);
+                inner.roster.end(worker, &reason, Return::Welcome);
             }
         }
         None
@@ -353,19 +318,19 @@ impl Driver {
             debug_assert!(false, "frame {frame} was done without all of its pixels");
             return;
         };
-        let now = inner.bytecount();
-        let before = std::mem::replace(&mut inner.counted, now);
+        let now = inner.roster.byte_count();
+        let bytes = now.since(std::mem::replace(&mut inner.counted, now));
         let finished = FinishedFrame {
             frame,
             view,
             pixels,
             counts: cost,
             elapsed,
-            workers: inner.sessions.len() as u32,
-            threads: inner.sessions.values().map(|session| session.hello.threads).sum(),
-            sent_bytes: now.sent.saturating_sub(before.sent),
-            received_bytes: now.received.saturating_sub(before.received),
-            scene_bytes: now.scene.saturating_sub(before.scene),
+            workers: u32::try_from(inner.roster.len()).unwrap_or(u32::MAX),
+            threads: inner.roster.threads(),
+            sent_bytes: bytes.sent,
+            received_bytes: bytes.received,
+            scene_bytes: bytes.scene,
         };
         self.hand_out(inner, Ok(finished));
     }
@@ -385,56 +350,7 @@ impl Driver {
     }
 }
 
-impl Inner {
-    /// Queues a message. A worker that lets its queue fill up does not read: it is as good as gone.
-    fn send(&mut self, worker: WorkerId, message: ToWorker) -> Option<Event> {
-        let session = self.sessions.get(&worker)?;
-        let error = session.sender.try_send(message).err()?;
-        self.log_dismissal(worker, &format!("cannot send to it: {error}"));
-        self.end_session(worker, "you do not read what you are sent", true);
-        Some(Event::WorkerLeft { worker })
-    }
-
-    fn log_dismissal(&self, worker: WorkerId, reason: &str) {
-        if let Some(Session { hello, address, .. }) = self.sessions.get(&worker) {
-            tracing::warn!("{worker} ({}, {address}) is dismissed: {reason}", hello.name);
-        }
-    }
-
-    /// Forgets a session and sees it off in the background: a last word, if there is room for it, then the end.
-    /// `again` lets the worker come back: it is this session that has failed, not the farm that ends.
-    fn end_session(
-        &mut self,
-        worker: WorkerId,
-        reason: &str,
-        again: bool,
-    ) -> Option<tokio::task::JoinHandle<()>> {
-        let Session { sender, traffic, .. } = self.sessions.remove(&worker)?;
-        self.ended.add(&traffic);
-        let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), again };
-        Some(tokio::spawn(async move {
-            let last_words = async {
-                // A session that has ended already needs none.
-                if sender.send(goodbye).await.is_ok() {
-                    sender.closed().await;
-                }
-            };
-            let _ = tokio::time::timeout(FAREWELL, last_words).await;
-            sender.abort();
-        }))
-    }
-
-    fn bytecount(&self) -> Bytecount {
-        let mut sum = self.ended;
-        self.sessions.values().for_each(|session| sum.add(&session.traffic));
-        sum
-    }
-}
-
-impl Bytecount {
-    fn add(&mut self, traffic: &Traffic) {
-        self.sent += traffic.sent_bytes();
-        self.received += traffic.received_bytes();
-        self.scene += traffic.scene_sent_bytes();
-    }
+/// Queues a message; what comes of it when it cannot be.
+fn send(inner: &mut Inner, worker: WorkerId, message: ToWorker) -> Option<Event> {
+    inner.roster.send(worker, message).err().map(|Unreachable| Event::WorkerLeft { worker })
 }

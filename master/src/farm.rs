@@ -9,8 +9,9 @@
 //!
 //! A frame begins when no earlier one stands in its way, and a frame that has begun is always finished: callers
 //! that keep at most two requests open (the one being rendered and the one after it) get every frame they asked
-//! for, in order. A third open request replaces the second as long as that one has not begun, so a moving camera never queues up.
-//! A request of another picture size gives up all earlier ones, begun or not: nobody can show them any more.
+//! for, in order. A third open request replaces the second as long as that one has not begun, so a moving camera
+//! never queues up. A request of another picture size gives up all earlier ones, begun or not: nobody can show them
+//! any more.
 
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr};

@@ -20,6 +20,7 @@ mod orbit;
 mod output;
 mod progress;
 mod report;
+mod roster;
 pub mod scheduler;
 mod server;
 

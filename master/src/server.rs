@@ -14,6 +14,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::driver::{AnswerError, Driver};
+use crate::roster::Session;
 use crate::scheduler::{Event, WorkerId};
 
 /// Workers that are let in.
@@ -90,15 +91,15 @@ async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> O
     if let Err(error) = stream.set_nodelay(true) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
-    let worker = driver.next_worker();
+    let mut number = None;
     let decide = |_: &Hello| match driver.worker_count() {
         count if count >= MAX_WORKERS => {
             Err(format!("this master has {count} workers already, the most it takes"))
         }
-        _ => Ok(Welcome { worker: worker.0 }),
+        _ => Ok(Welcome { worker: number.insert(driver.next_worker()).0 }),
     };
     match handshake::as_master(&mut stream, decide).await {
-        Ok(hello) => Some(Newcomer { worker, hello, stream }),
+        Ok(hello) => number.map(|worker| Newcomer { worker, hello, stream }),
         Err(error) => {
             tracing::warn!("{address} was not let in: {error}");
             None
@@ -113,7 +114,7 @@ async fn serve(driver: &Driver, newcomer: Newcomer, address: SocketAddr) {
     tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
     let (sender, receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
     let (want, wanted) = mpsc::channel(MAX_WANTED_ASSETS);
-    driver.join(worker, hello, address, sender.clone(), traffic);
+    driver.join(worker, Session::new(hello, address, sender.clone(), traffic));
     let ended = tokio::select! {
         ended = listen(driver, worker, receiver, want) => ended,
         () = send_assets(driver, worker, &sender, wanted) => Err(SessionError::Closed),

@@ -172,7 +172,8 @@ impl Scheduler {
     }
 
     /// From when on it pays to render a segment once more: at once, if that is predicted to finish it earlier (or
-    /// if nothing can be predicted, or under the seed's policies); otherwise when its holder is late by as much as it takes.
+    /// if nothing can be predicted, or under the seed's policies); otherwise when its holder is late by as much as
+    /// it takes.
     fn worth_copying_at(
         &self,
         now: Duration,

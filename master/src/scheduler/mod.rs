@@ -19,6 +19,10 @@ mod worker;
 mod scenarios;
 #[cfg(test)]
 mod simulation;
+#[cfg(test)]
+mod sizes_tests;
+#[cfg(test)]
+mod transcript;
 
 pub use action::Action;
 pub use event::{Event, WorkerId};

@@ -1,0 +1,153 @@
+//! Who is connected: their senders, what they were granted, and the bytes that went to and fro.
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rayfarm_protocol::session::{Sender, Traffic};
+use rayfarm_protocol::{Hello, ToWorker};
+use tokio::task::JoinHandle;
+
+use crate::lease_book::LeaseBook;
+use crate::scheduler::WorkerId;
+
+/// How long a worker's last messages may take.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// The sessions that are wanted.
+#[derive(Default)]
+pub(crate) struct Roster {
+    sessions: BTreeMap<WorkerId, Session>,
+    /// Traffic of sessions that have ended.
+    ended: ByteCount,
+}
+
+/// A connected worker.
+pub(crate) struct Session {
+    pub(crate) hello: Hello,
+    pub(crate) address: SocketAddr,
+    pub(crate) leases: LeaseBook,
+    /// Why it could not render, the last time it could not.
+    pub(crate) trouble: Option<String>,
+    sender: Sender<ToWorker>,
+    traffic: Arc<Traffic>,
+}
+
+/// Bytes that went over the wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ByteCount {
+    pub(crate) sent: u64,
+    pub(crate) received: u64,
+    /// The part of `sent` that says what to draw.
+    pub(crate) scene: u64,
+}
+
+/// A worker lets its queue fill up, or its session has ended without anybody knowing yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Unreachable;
+
+/// Whether a worker that is sent away may come back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Return {
+    /// It is this session that has failed: a worker that was suspended is welcome when it wakes.
+    Welcome,
+    /// The farm itself ends.
+    Useless,
+}
+
+impl Session {
+    /// A session that has shaken hands.
+    pub(crate) fn new(
+        hello: Hello,
+        address: SocketAddr,
+        sender: Sender<ToWorker>,
+        traffic: Arc<Traffic>,
+    ) -> Self {
+        Self { hello, address, leases: LeaseBook::default(), trouble: None, sender, traffic }
+    }
+}
+
+impl Roster {
+    pub(crate) fn add(&mut self, worker: WorkerId, session: Session) {
+        self.sessions.insert(worker, session);
+    }
+
+    pub(crate) fn get(&self, worker: WorkerId) -> Option<&Session> {
+        self.sessions.get(&worker)
+    }
+
+    pub(crate) fn get_mut(&mut self, worker: WorkerId) -> Option<&mut Session> {
+        self.sessions.get_mut(&worker)
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.sessions.len()
+    }
+
+    pub(crate) fn ids(&self) -> Vec<WorkerId> {
+        self.sessions.keys().copied().collect()
+    }
+
+    /// Render threads of all workers.
+    pub(crate) fn threads(&self) -> u32 {
+        self.sessions.values().fold(0, |sum, session| sum.saturating_add(session.hello.threads))
+    }
+
+    /// Queues a message. A worker that does not read what it is sent is dismissed: it is as good as gone.
+    pub(crate) fn send(&mut self, worker: WorkerId, message: ToWorker) -> Result<(), Unreachable> {
+        let Some(session) = self.sessions.get(&worker) else { return Ok(()) };
+        let Err(error) = session.sender.try_send(message) else { return Ok(()) };
+        self.log_dismissal(worker, &format!("cannot send to it: {error}"));
+        self.end(worker, "you do not read what you are sent", Return::Welcome);
+        Err(Unreachable)
+    }
+
+    /// Says in the log that the master itself ends a session, and why.
+    pub(crate) fn log_dismissal(&self, worker: WorkerId, reason: &str) {
+        if let Some(Session { hello, address, .. }) = self.sessions.get(&worker) {
+            tracing::warn!("{worker} ({}, {address}) is dismissed: {reason}", hello.name);
+        }
+    }
+
+    /// Forgets a session and sees it off in the background: a last word, if there is room for it, then the end.
+    pub(crate) fn end(&mut self, worker: WorkerId, reason: &str, again: Return) -> Option<JoinHandle<()>> {
+        let Session { sender, traffic, .. } = self.sessions.remove(&worker)?;
+        self.ended.add(&traffic);
+        let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), again: again == Return::Welcome };
+        Some(tokio::spawn(async move {
+            let last_words = async {
+                // A session that has ended already needs none.
+                if sender.send(goodbye).await.is_ok() {
+                    sender.closed().await;
+                }
+            };
+            let _ = tokio::time::timeout(FAREWELL, last_words).await;
+            sender.abort();
+        }))
+    }
+
+    /// All bytes up to now.
+    pub(crate) fn byte_count(&self) -> ByteCount {
+        let mut sum = self.ended;
+        self.sessions.values().for_each(|session| sum.add(&session.traffic));
+        sum
+    }
+}
+
+impl ByteCount {
+    fn add(&mut self, traffic: &Traffic) {
+        self.sent += traffic.sent_bytes();
+        self.received += traffic.received_bytes();
+        self.scene += traffic.scene_sent_bytes();
+    }
+
+    /// What came after an earlier count.
+    pub(crate) fn since(self, earlier: Self) -> Self {
+        Self {
+            sent: self.sent.saturating_sub(earlier.sent),
+            received: self.received.saturating_sub(earlier.received),
+            scene: self.scene.saturating_sub(earlier.scene),
+        }
+    }
+}

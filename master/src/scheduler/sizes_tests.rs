@@ -1,0 +1,73 @@
+//! How many rows whom: in proportion to speed, on tile boundaries, within what a message holds.
+
+use std::time::Duration;
+
+use super::{Action, Cost, Event, FrameId, Lease, Scheduler, SegmentPolicy, WorkerId};
+
+#[test]
+fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
+    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
+    let rows = drive_two(&mut scheduler, [1, 4], 6);
+    let last: Vec<u32> = rows.last().copied().unwrap().into();
+    assert!(last[1] > 2 * last[0], "rows of the worker and of one four times as fast, by frame: {rows:?}");
+}
+
+/// Renders frames of 512 rows with two workers whose speeds, in rows a millisecond, are given. Returns the rows
+/// that each did, by frame.
+fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u32; 2]> {
+    for worker in [0, 1] {
+        scheduler.handle(Duration::ZERO, Event::WorkerJoined { worker: WorkerId(worker), threads: 1 });
+    }
+    let mut now_us = 0;
+    let mut rows = Vec::new();
+    for frame in 1..=frames {
+        let mut done = [0; 2];
+        let mut queues: [Vec<Lease>; 2] = Default::default();
+        let mut busy_until_us = [now_us; 2];
+        let request = Event::FrameRequested { frame: FrameId(frame), width: 64, height: 512 };
+        scheduler.handle(Duration::from_micros(now_us), request);
+        'frame: loop {
+            while let Some(action) = scheduler.poll_action() {
+                match action {
+                    Action::Grant { worker, lease } => {
+                        assert!(lease.first_row % 8 == 0 && lease.row_count % 8 == 0, "{lease:?}");
+                        queues[worker.0 as usize].push(lease);
+                    }
+                    Action::FrameDone { .. } => break 'frame,
+                    _ => {}
+                }
+            }
+            let ends_us = |w: usize| {
+                queues[w]
+                    .first()
+                    .map(|lease| busy_until_us[w] + u64::from(lease.row_count * 1000 / speeds[w]))
+            };
+            let next = [0, 1].into_iter().filter_map(|w| Some((ends_us(w)?, w))).min();
+            let (at_us, w) = next.expect("rows are left and nobody renders");
+            let lease = queues[w].remove(0);
+            (now_us, busy_until_us[w]) = (at_us, at_us);
+            done[w] += lease.row_count;
+            let cost =
+                Cost { trace_ns: u64::from(lease.row_count * 1_000_000 / speeds[w]), ..Cost::default() };
+            let event = Event::SegmentDone { worker: WorkerId(w as u64), lease, cost };
+            scheduler.handle(Duration::from_micros(now_us), event);
+        }
+        rows.push(done);
+    }
+    rows
+}
+
+#[test]
+fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
+    for policy in ["static:1000", "smart:1000", "adaptive"] {
+        let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000);
+        scheduler.handle(Duration::ZERO, Event::WorkerJoined { worker: WorkerId(1), threads: 1 });
+        let request = Event::FrameRequested { frame: FrameId(1), width: 300, height: 100 };
+        scheduler.handle(Duration::ZERO, request);
+        while let Some(action) = scheduler.poll_action() {
+            if let Action::Grant { lease, .. } = action {
+                assert!(lease.row_count <= 3, "{policy}: {lease:?}");
+            }
+        }
+    }
+}

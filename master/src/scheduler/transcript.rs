@@ -1,0 +1,82 @@
+//! Scripts and transcripts: what is told to the scheduler (`>`), and exactly what it answers.
+//!
+//! A line of a script is `MILLISECONDS COMMAND`: `frame N WxH`, `join W THREADS`, `leave W`, `drain W`,
+//! `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use super::{Action, Cost, Event, FrameId, Lease, Scheduler, WorkerId};
+
+/// Runs a script and writes the transcript.
+pub(super) fn transcript(policy: &str, script: &str) -> String {
+    let mut scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20);
+    let mut granted = BTreeMap::new();
+    let mut log = String::new();
+    for line in script.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        writeln!(log, "> {line}").unwrap();
+        let (at_ms, command) = line.split_once(' ').unwrap();
+        let now = Duration::from_millis(at_ms.parse().unwrap());
+        scheduler.handle(now, event(command, &granted));
+        while let Some(action) = scheduler.poll_action() {
+            if let Action::Grant { worker, lease } = &action {
+                granted.insert((*worker, lease.frame, lease.segment), *lease);
+            }
+            writeln!(log, "{}", spoken(&action)).unwrap();
+        }
+    }
+    log
+}
+
+fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> Event {
+    let words: Vec<&str> = command.split(' ').collect();
+    let number = |word: &str| word.parse::<u64>().unwrap();
+    let pair = |word: &str, by| word.split_once(by).map(|(a, b)| (number(a), number(b) as u32)).unwrap();
+    let worker = WorkerId(words.get(1).map_or(0, |word| number(word)));
+    match words[..] {
+        ["frame", frame, size] => {
+            let (width, height) = pair(size, 'x');
+            Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height }
+        }
+        ["join", _, threads] => Event::WorkerJoined { worker, threads: number(threads) as u32 },
+        ["leave", _] => Event::WorkerLeft { worker },
+        ["drain", _] => Event::WorkerDrains { worker },
+        ["done", _, segment] => {
+            let (frame, segment) = pair(segment, '.');
+            let lease = granted[&(worker, FrameId(frame), segment)];
+            Event::SegmentDone { worker, lease, cost: Cost { primary: 1, ..Cost::default() } }
+        }
+        ["fail", _, frame] => Event::WorkerFailed { worker, frame: FrameId(number(frame)) },
+        ["pong", _, nonce] => Event::Pong { worker, nonce: number(nonce) },
+        ["wake"] => Event::Woken,
+        _ => panic!("no such command: {command}"),
+    }
+}
+
+fn spoken(action: &Action) -> String {
+    match action {
+        Action::BeginFrame { frame } => format!("begin {}", frame.0),
+        Action::FrameDone { frame, cost, elapsed } => {
+            format!("finished {} after {} ms, {} rays", frame.0, elapsed.as_millis(), cost.primary)
+        }
+        Action::FrameDropped { frame } => format!("forget {}", frame.0),
+        Action::Announce { worker, frame } => format!("{}: frame {}", worker.0, frame.0),
+        Action::Grant { worker, lease } => {
+            let Lease { frame, segment, attempt, first_row, row_count } = lease;
+            let again = if *attempt > 0 { format!(" (attempt {attempt})") } else { String::new() };
+            format!("{}: render {}.{segment}{again}, rows {first_row}+{row_count}", worker.0, frame.0)
+        }
+        Action::Cancel { worker, before } => format!("{}: cancel before {}", worker.0, before.0),
+        Action::Ping { worker, nonce } => format!("{}: ping {nonce}", worker.0),
+        Action::Dismiss { worker, reason } => format!("{}: goodbye, {reason}", worker.0),
+    }
+}
+
+/// Compares without regard to indentation.
+#[track_caller]
+pub(super) fn expect(policy: &str, script: &str, expected: &str) {
+    let expected: String = expected.trim().lines().map(|line| format!("{}\n", line.trim())).collect();
+    let actual = transcript(policy, script);
+    assert_eq!(actual, expected, "\nthe transcript was:\n{actual}");
+}
