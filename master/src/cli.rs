@@ -12,7 +12,7 @@ use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
-use crate::scheduler::policy::SegmentPolicy;
+use crate::farm::{FarmOptions, SegmentPolicy};
 use values::{Size, degrees, frame_count, listen_address, sample_count, size, thread_count, worker_count};
 
 mod values;
@@ -162,7 +162,7 @@ pub(crate) struct BenchArgs {
 pub(crate) struct FarmArgs {
     /// Where workers connect, for workers on other machines [default: 127.0.0.1:7117].
     #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address)]
-    pub(crate) listen: Option<SocketAddr>,
+    listen: Option<SocketAddr>,
     /// Worker processes on this machine that the master starts and ends.
     #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
     local_workers: u32,
@@ -171,16 +171,26 @@ pub(crate) struct FarmArgs {
     no_local_workers: bool,
     /// Render threads of each local worker; without it, they share all cores.
     #[arg(long, value_name = "N", value_parser = thread_count)]
-    pub(crate) threads: Option<usize>,
+    threads: Option<usize>,
     /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
     #[arg(long, value_name = "POLICY", default_value = "adaptive")]
-    pub(crate) segment: SegmentPolicy,
+    segment: SegmentPolicy,
 }
 
 impl FarmArgs {
     /// Local workers to start.
     pub(crate) fn local_workers(&self) -> u32 {
         if self.no_local_workers { 0 } else { self.local_workers }
+    }
+
+    /// As the farm wants it.
+    pub(crate) fn options(&self) -> FarmOptions {
+        FarmOptions {
+            listen: self.listen,
+            local_workers: self.local_workers(),
+            threads: self.threads,
+            policy: self.segment,
+        }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::farm::FarmStatus;
 
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
-/// How long no worker may be there before that is told, and told again. A local worker needs a moment to start.
+/// How long no worker may be there before that is told, where a local one needs a moment to start, and told again.
 const PATIENCE: Duration = Duration::from_secs(3);
 const REMIND_EVERY: Duration = Duration::from_secs(30);
 
@@ -55,7 +55,7 @@ impl Progress {
             address,
             local_workers,
             alone_since: None,
-            next_reminder: PATIENCE,
+            next_reminder: patience(local_workers),
             started: now,
             last_line: now,
             quiet,
@@ -89,7 +89,7 @@ impl Progress {
     fn remind_of_workers(&mut self, alone: bool) {
         if !alone {
             self.alone_since = None;
-            self.next_reminder = PATIENCE;
+            self.next_reminder = patience(self.local_workers);
             return;
         }
         let since = *self.alone_since.get_or_insert_with(Instant::now);
@@ -107,6 +107,10 @@ impl Progress {
         };
         format!("{} of {} frames{left}; {}", self.done, self.frames, message(status, self.fps))
     }
+}
+
+fn patience(local_workers: u32) -> Duration {
+    if local_workers == 0 { Duration::ZERO } else { PATIENCE }
 }
 
 fn style() -> ProgressStyle {

@@ -8,6 +8,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::error::CommandError;
+use crate::farm::FinishedFrame;
 
 /// What a `render` run did; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -185,6 +186,27 @@ pub(crate) struct FrameLine {
     pub(crate) rays: RaysPerFrame,
     /// Bytes on the wire for the frame.
     pub(crate) bytes: BytesPerFrame,
+}
+
+impl FrameLine {
+    /// Of a finished frame, the `index`th, that came `at` and is said to have taken `elapsed`.
+    pub(crate) fn of(frame: &FinishedFrame, index: u64, at: Duration, elapsed: Duration, fps: f64) -> Self {
+        let counts = &frame.counts;
+        Self {
+            frame: index,
+            at,
+            elapsed,
+            fps,
+            workers: frame.workers,
+            threads: frame.threads,
+            rays: RaysPerFrame {
+                primary: counts.primary,
+                shadow: counts.shadow,
+                secondary: counts.secondary,
+            },
+            bytes: BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes },
+        }
+    }
 }
 
 /// `--fps-log`: a CSV file with a line per frame, each on the disk as soon as it is known.

@@ -44,12 +44,6 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let view = source.view(&args.picture)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
-    let options = FarmOptions {
-        listen: args.farm.listen,
-        local_workers: args.farm.local_workers(),
-        threads: args.farm.threads,
-        policy: args.farm.segment,
-    };
     let run = Run {
         view,
         animation: animation(&args.picture, args.frames),
@@ -60,7 +54,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         totals: Totals::new(triangles, log),
     };
     let scene = FarmScene { scene: source.scene, meshes: source.meshes };
-    let report = super::runtime()?.block_on(run.carry_out(options, scene))?;
+    let report = super::runtime()?.block_on(run.carry_out(args.farm.options(), scene))?;
     if args.json {
         print_json(&report)?;
     }
@@ -220,23 +214,10 @@ impl Totals {
         let elapsed = frame.elapsed.min(at - self.previous);
         self.previous = at;
         self.rate.completed(at, elapsed);
-        let counts = frame.counts;
-        let rays =
-            RaysPerFrame { primary: counts.primary, shadow: counts.shadow, secondary: counts.secondary };
-        let bytes = BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes };
-        let line = FrameLine {
-            frame: self.times.len() as u64,
-            at,
-            elapsed,
-            fps: self.rate.fps(at),
-            workers: frame.workers,
-            threads: frame.threads,
-            rays,
-            bytes,
-        };
+        let line = FrameLine::of(frame, self.times.len() as u64, at, elapsed, self.rate.fps(at));
         self.times.push(elapsed);
-        self.rays.add(rays);
-        self.bytes.add(bytes);
+        self.rays.add(line.rays);
+        self.bytes.add(line.bytes);
         self.scene_bytes += frame.scene_bytes;
         (self.workers, self.threads) = (frame.workers, frame.threads);
         self.log.as_mut().map_or(Ok(()), |log| log.add(&line))

@@ -12,7 +12,7 @@ use crate::cli::ViewArgs;
 use crate::display::feed::{self, NewsDesk, Orders};
 use crate::display::window::{About, Display, Link};
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmOptions, FarmScene};
+use crate::farm::{Farm, FarmScene};
 use crate::report::FpsLog;
 
 /// `--orbit` without `--frames` goes round over this many frames, and on.
@@ -65,14 +65,8 @@ async fn start(
     orders: Orders,
     stop: CancellationToken,
 ) -> Result<(Link, JoinHandle<Result<(), CommandError>>), CommandError> {
-    let options = FarmOptions {
-        listen: args.farm.listen,
-        local_workers: args.farm.local_workers(),
-        threads: args.farm.threads,
-        policy: args.farm.segment,
-    };
     let scene = FarmScene { scene: source.scene, meshes: source.meshes };
-    let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
+    let farm = Farm::start(args.farm.options(), scene).await.map_err(CommandError::failed)?;
     let link = Link { wanted, desk: NewsDesk::new(), address: farm.address(), stop };
     let task = tokio::spawn(feed::run(farm, orders, link.desk.clone(), link.stop.clone()));
     Ok((link, task))

@@ -17,7 +17,7 @@ use super::frame_rate::FrameRate;
 use crate::error::CommandError;
 use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame, FrameId};
 use crate::orbit::Animation;
-use crate::report::{BytesPerFrame, FpsLog, FrameLine, RaysPerFrame};
+use crate::report::{FpsLog, FrameLine};
 
 /// How often the window learns of workers that come and go.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
@@ -118,21 +118,7 @@ impl NewsDesk {
         let mut news = self.lock();
         let at = news.started.elapsed();
         news.rate.completed(at, frame.elapsed);
-        let counts = frame.counts;
-        let line = FrameLine {
-            frame: news.completed,
-            at,
-            elapsed: frame.elapsed,
-            fps: news.rate.fps(at),
-            workers: frame.workers,
-            threads: frame.threads,
-            rays: RaysPerFrame {
-                primary: counts.primary,
-                shadow: counts.shadow,
-                secondary: counts.secondary,
-            },
-            bytes: BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes },
-        };
+        let line = FrameLine::of(&frame, news.completed, at, frame.elapsed, news.rate.fps(at));
         news.completed += 1;
         news.last_completed = at;
         news.latest = Some(frame);

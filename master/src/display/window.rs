@@ -167,7 +167,7 @@ impl Display {
     fn figures(&self, status: &FarmStatus, link: &Link) -> Figures {
         let (fps, frame_time) = link.desk.rate();
         let view = *link.wanted.borrow();
-        let slow = link.desk.since_last_frame() > PATIENCE && !status.workers.is_empty();
+        let slow = frame_time.max(link.desk.since_last_frame()) > PATIENCE && !status.workers.is_empty();
         Figures {
             fps,
             frame_time,
