@@ -68,27 +68,57 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     assert_eq!(order.len(), 7);
 }
 
-#[tokio::test]
+#[tokio::test(start_paused = true)]
 async fn a_goodbye_is_flushed_and_closes() {
     let ((master_out, mut master_in), (worker_out, mut worker_in)) = pair(1 << 16);
     worker_out.send(pixels(3, 5000)).await.unwrap();
     worker_out.send(ToMaster::Goodbye { reason: "shutting down".into() }).await.unwrap();
-    worker_out.closed().await;
-    assert!(matches!(worker_out.send(ToMaster::Drain).await, Err(SendError::Closed)));
-    assert!(matches!(worker_out.try_send(ToMaster::Drain), Err(TrySendError::Closed)));
     assert_eq!(master_in.recv().await.unwrap().unwrap(), pixels(3, 5000));
     assert_eq!(
         master_in.recv().await.unwrap().unwrap(),
         ToMaster::Goodbye { reason: "shutting down".into() }
     );
     assert!(master_in.recv().await.is_none());
-    // The other direction is still open: the master can answer, then close.
+    // The other direction is open for a moment: the master can answer, and close.
     master_out.send(ToWorker::Goodbye { reason: "bye".into(), again: false }).await.unwrap();
     assert_eq!(
         worker_in.recv().await.unwrap().unwrap(),
         ToWorker::Goodbye { reason: "bye".into(), again: false }
     );
     assert!(worker_in.recv().await.is_none());
+    worker_out.closed().await;
+    assert!(matches!(worker_out.send(ToMaster::Drain).await, Err(SendError::Closed)));
+    assert!(matches!(worker_out.try_send(ToMaster::Drain), Err(TrySendError::Closed)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn after_a_goodbye_a_peer_that_does_not_close_is_not_waited_for() {
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
+    let begun = tokio::time::Instant::now();
+    out.send(ToMaster::Goodbye { reason: "enough".into() }).await.unwrap();
+    out.closed().await;
+    assert_eq!(begun.elapsed(), limits::LAST_WORD_GRACE);
+    assert!(received.recv().await.is_none());
+    assert!(theirs.write_all(&[0]).await.is_err());
+}
+
+#[tokio::test]
+async fn a_goodbye_survives_though_nobody_reads_what_the_peer_still_sends() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let connecting = tokio::net::TcpStream::connect(listener.local_addr().unwrap());
+    let (ours, theirs) = tokio::join!(connecting, listener.accept());
+    let (out, received, _) = spawn::<_, ToWorker, ToMaster>(ours.unwrap());
+    let (worker_out, mut worker_in, _) = spawn::<_, ToMaster, ToWorker>(theirs.unwrap().0);
+    drop(received);
+    let busy = tokio::spawn(async move { while worker_out.send(pixels(1, 100_000)).await.is_ok() {} });
+    out.send(ToWorker::Goodbye { reason: "the end".into(), again: false }).await.unwrap();
+    out.closed().await;
+    // Only now does the worker look: the connection is gone, its last word is not.
+    let heard = worker_in.recv().await.unwrap().unwrap();
+    assert_eq!(heard, ToWorker::Goodbye { reason: "the end".into(), again: false });
+    drop(worker_in);
+    busy.await.unwrap();
 }
 
 #[tokio::test]

@@ -27,7 +27,7 @@ const MAX_WORK: usize = 64;
 const MAX_LEASES: usize = 4096;
 
 /// How long the master may take to hear our goodbye.
-const FAREWELL: Duration = Duration::from_millis(500);
+const FAREWELL: Duration = Duration::from_millis(800);
 
 /// What a worker keeps from session to session.
 pub(crate) struct Keep<R: Renderer> {

@@ -16,6 +16,8 @@ pub mod cli;
 mod client;
 mod desk;
 mod duty;
+#[cfg(test)]
+mod duty_tests;
 mod error;
 mod frames;
 mod guard;
@@ -24,6 +26,8 @@ mod pause;
 mod render_pool;
 mod renderer;
 mod scene_loader;
+#[cfg(test)]
+mod testing;
 mod tracer;
 mod transfer;
 

@@ -3,7 +3,8 @@
 //! Control messages overtake bulk ones (chunks, pixels) in the writer, so that a cancel never waits behind a scene.
 //! The order that holds: a bulk message is written after every control message that was sent before it, control
 //! messages keep their order, bulk messages keep theirs. [`Goodbye`](crate::ToWorker::Goodbye) counts as bulk: it is
-//! the last word, so everything sent before it goes first; then the writer flushes, closes, and takes nothing more.
+//! the last word, so everything sent before it goes first; then the writer flushes, closes its direction, and waits a
+//! moment for the peer to close the other: a connection closed over unread bytes is reset, and takes the goodbye with it.
 //!
 //! ```text
 //! Sender --control queue--> writer --> transport --> reader --inbox--> Receiver
@@ -48,11 +49,18 @@ where
     let (inbox, messages) = mpsc::channel(INBOX_QUEUE);
     let traffic = Arc::new(Traffic::default());
     let abort = CancellationToken::new();
+    let (reading, unheard) = (CancellationToken::new(), CancellationToken::new());
 
     // Weak: the inbox ends with the reader, though the writer may wait for messages for ever.
     let failures = inbox.downgrade();
-    tokio::spawn(reader::run(read_half, inbox, traffic.clone(), abort.clone()));
-    let writer = writer::Writer::new(write_half, control_queue, bulk_queue, traffic.clone());
+    let reader_ends = reading.clone().drop_guard();
+    let reader = reader::Reader { io: read_half, inbox, traffic: traffic.clone(), unheard: unheard.clone() };
+    let reader_abort = abort.clone();
+    tokio::spawn(async move {
+        let _reader_ends = reader_ends;
+        reader_abort.run_until_cancelled(reader.run()).await;
+    });
+    let mut writer = writer::Writer::new(write_half, control_queue, bulk_queue, traffic.clone());
     let writer_abort = abort.clone();
     tokio::spawn(async move {
         let result = tokio::select! {
@@ -60,8 +68,18 @@ where
             () = writer_abort.cancelled() => return,
             result = writer.run() => result,
         };
-        if let Err(error) = result {
-            report(failures, error, writer_abort).await;
+        match result {
+            Err(error) => report(failures, error, writer_abort).await,
+            Ok(()) => {
+                if !writer.has_said_goodbye() {
+                    tokio::select! {
+                        () = unheard.cancelled() => {}
+                        () = reading.cancelled() => {}
+                    }
+                }
+                let _ = tokio::time::timeout(LAST_WORD_GRACE, reading.cancelled()).await;
+                writer_abort.cancel();
+            }
         }
     });
 

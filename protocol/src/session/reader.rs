@@ -43,35 +43,42 @@ impl<In: Message> Receiver<In> {
     }
 }
 
-/// Reads until the peer closes, fails, or nobody listens any more.
-pub(super) async fn run<S, In>(
-    io: ReadHalf<S>,
-    inbox: mpsc::Sender<Delivery<In>>,
-    traffic: Arc<Traffic>,
-    abort: CancellationToken,
-) where
-    S: AsyncRead,
-    In: Message,
-{
-    let mut io = BufReader::new(io);
-    let room = Arc::new(Semaphore::new(INBOX_BYTES));
-    loop {
-        let delivery = tokio::select! {
-            biased;
-            () = abort.cancelled() => return,
-            () = inbox.closed() => return,
-            read = read_message(&mut io, &room, &traffic) => match read {
-                Ok(None) => return,
-                Ok(Some(delivery)) => delivery,
-                Err(error) => Delivery { message: Err(error), _room: None },
-            },
+/// What the reading task works with.
+pub(super) struct Reader<S, In> {
+    pub(super) io: ReadHalf<S>,
+    pub(super) inbox: mpsc::Sender<Delivery<In>>,
+    pub(super) traffic: Arc<Traffic>,
+    /// Cancelled when nobody listens any more.
+    pub(super) unheard: CancellationToken,
+}
+
+impl<S: AsyncRead, In: Message> Reader<S, In> {
+    /// Reads until the peer closes or an error, which is delivered. When nobody listens any more, what comes is thrown
+    /// away: bytes left unread would turn our closing into a reset.
+    pub(super) async fn run(self) {
+        let mut io = BufReader::new(self.io);
+        let room = Arc::new(Semaphore::new(INBOX_BYTES));
+        let listening = async {
+            loop {
+                let delivery = match read_message(&mut io, &room, &self.traffic).await {
+                    Ok(None) => return,
+                    Ok(Some(delivery)) => delivery,
+                    Err(error) => Delivery { message: Err(error), _room: None },
+                };
+                let failed = delivery.message.is_err();
+                if self.inbox.send(delivery).await.is_err() || failed {
+                    return;
+                }
+            }
         };
-        let failed = delivery.message.is_err();
         tokio::select! {
             biased;
-            () = abort.cancelled() => return,
-            sent = inbox.send(delivery) => if failed || sent.is_err() { return },
+            () = self.inbox.closed() => {}
+            () = listening => if !self.inbox.is_closed() { return },
         }
+        self.unheard.cancel();
+        // It ends with the peer, or with the session.
+        let _ = tokio::io::copy(&mut io, &mut tokio::io::sink()).await;
     }
 }
 

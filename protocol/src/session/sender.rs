@@ -72,7 +72,8 @@ impl<Out: Message> Sender<Out> {
 }
 
 impl<Out> Sender<Out> {
-    /// Waits until the writer takes no more: after a goodbye this means that everything was flushed.
+    /// Waits until the session takes no more. After a goodbye this means that everything was written, and that the peer
+    /// has closed too or has had [`crate::limits::LAST_WORD_GRACE`] to do so.
     pub async fn closed(&self) {
         self.control.closed().await;
     }

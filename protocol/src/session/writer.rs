@@ -21,6 +21,7 @@ pub(super) struct Writer<W> {
     /// A bulk message taken from its queue that lets control go first once more.
     held: Option<Envelope>,
     traffic: Arc<Traffic>,
+    said_goodbye: bool,
 }
 
 impl<W: AsyncWrite + Unpin> Writer<W> {
@@ -30,19 +31,32 @@ impl<W: AsyncWrite + Unpin> Writer<W> {
         bulk: mpsc::Receiver<Envelope>,
         traffic: Arc<Traffic>,
     ) -> Self {
-        Self { io: BufWriter::with_capacity(BUFFER_BYTES, io), control, bulk, held: None, traffic }
+        Self {
+            io: BufWriter::with_capacity(BUFFER_BYTES, io),
+            control,
+            bulk,
+            held: None,
+            traffic,
+            said_goodbye: false,
+        }
     }
 
     /// Writes until a goodbye was written or every sender is gone.
-    pub(super) async fn run(mut self) -> Result<(), ProtocolError> {
+    pub(super) async fn run(&mut self) -> Result<(), ProtocolError> {
         while let Some(envelope) = self.next().await? {
             envelope.write(&mut self.io).await?;
             self.traffic.count_sent(&envelope);
             if envelope.kind() == Kind::Goodbye {
+                self.said_goodbye = true;
                 break;
             }
         }
         self.finish("taking the last message", true).await
+    }
+
+    /// Whether [`run`](Self::run) ended with a goodbye, and not for want of senders.
+    pub(super) fn has_said_goodbye(&self) -> bool {
+        self.said_goodbye
     }
 
     async fn next(&mut self) -> Result<Option<Envelope>, ProtocolError> {
