@@ -1,8 +1,9 @@
 //! From pixels to rays.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use crate::scene::{Camera, FrameView};
+use crate::tile::Lens;
 
 /// A pinhole camera, ready to make rays. All rays start in the origin of eye space.
 #[derive(Clone, Copy, Debug)]
@@ -32,18 +33,34 @@ impl PinholeRays {
         }
     }
 
-    /// Rays per pixel.
-    pub(crate) fn samples(&self) -> u32 {
-        self.grid * self.grid
+    /// Samples along a side of a pixel.
+    pub(crate) fn grid(&self) -> u32 {
+        self.grid
     }
 
-    /// Direction, not normalised, of sample `index` of pixel (x, y): at ((i + 0.5) / n, (j + 0.5) / n) of the pixel.
+    /// Direction of a sample, counted over the whole picture: its depth along the view axis is 1. Sample i of n along a
+    /// side of its pixel stands at (i + 0.5) / n, so samples are a regular grid over the picture.
     #[inline(always)]
-    pub(crate) fn direction(&self, x: u32, y: u32, index: u32) -> DVec3 {
+    pub(crate) fn of_sample(&self, column: u32, row: u32) -> DVec3 {
         let n = f64::from(self.grid);
-        let across = f64::from(x) + (f64::from(index % self.grid) + 0.5) / n;
-        let along = f64::from(y) + (f64::from(index / self.grid) + 0.5) / n;
+        self.through((f64::from(column) + 0.5) / n, (f64::from(row) + 0.5) / n)
+    }
+
+    /// Direction through a place in the picture, in pixels from its top left corner.
+    pub(crate) fn through(&self, across: f64, along: f64) -> DVec3 {
         self.corner + self.right * across + self.down * along
+    }
+
+    /// A lens that sees the samples around a place in the picture, at distances of 1.
+    pub(crate) fn lens(&self, across: f64, along: f64) -> Lens {
+        let n = f64::from(self.grid);
+        let columns = DMat3::from_cols(self.right / n, self.down / n, self.through(across, along));
+        Lens::new(columns.inverse(), DVec3::ZERO, 1.0)
+    }
+
+    /// From one sample to the next in its row, and from one row of samples to the next.
+    pub(crate) fn steps(&self) -> [DVec3; 2] {
+        [self.right, self.down].map(|step| step / f64::from(self.grid))
     }
 }
 
@@ -87,26 +104,38 @@ mod tests {
     fn the_picture_spans_the_field_of_view() {
         let rays = PinholeRays::new(&view(4, 2, 1));
         // Pixel centres at 1/4 of the half height: the plane reaches from y = +1 to -1.
-        let top_left = rays.direction(0, 0, 0);
+        let top_left = rays.of_sample(0, 0);
         assert!((top_left - DVec3::new(-1.5, 0.5, -1.0)).length() < 1e-12, "{top_left}");
-        let bottom_right = rays.direction(3, 1, 0);
+        let bottom_right = rays.of_sample(3, 1);
         assert!((bottom_right - DVec3::new(1.5, -0.5, -1.0)).length() < 1e-12, "{bottom_right}");
     }
 
     #[test]
     fn samples_lie_on_a_grid_whose_mean_is_the_centre() {
         let (one, nine) = (PinholeRays::new(&view(64, 64, 1)), PinholeRays::new(&view(64, 64, 9)));
-        let mean = (0..9).map(|i| nine.direction(10, 20, i)).sum::<DVec3>() / 9.0;
-        assert!((mean - one.direction(10, 20, 0)).length() < 1e-12);
-        let first = nine.direction(10, 20, 0) - nine.corner;
+        let inside = |i: u32| nine.of_sample(30 + i % 3, 60 + i / 3);
+        let mean = (0..9).map(inside).sum::<DVec3>() / 9.0;
+        assert!((mean - one.of_sample(10, 20)).length() < 1e-12);
+        let first = inside(0) - nine.corner;
         assert!((first - nine.right * (10.0 + 0.5 / 3.0) - nine.down * (20.0 + 0.5 / 3.0)).length() < 1e-12);
+    }
+
+    #[test]
+    fn the_lens_sees_samples_where_they_are() {
+        let rays = PinholeRays::new(&view(64, 48, 4));
+        let lens = rays.lens(20.0, 30.0);
+        let [a, b, g] = lens.exact_point(rays.of_sample(43, 57) * 7.0).to_array();
+        assert!(
+            (g - 7.0).abs() < 1e-9 && (a / g - 3.5).abs() < 1e-9 && (b / g + 2.5).abs() < 1e-9,
+            "{a} {b} {g}"
+        );
     }
 
     #[test]
     fn zoom_divides_the_view_plane() {
         let mut zoomed = view(4, 2, 1);
         zoomed.camera.zoom = 2.0;
-        let direction = PinholeRays::new(&zoomed).direction(0, 0, 0);
+        let direction = PinholeRays::new(&zoomed).of_sample(0, 0);
         assert!((direction - DVec3::new(-0.75, 0.25, -1.0)).length() < 1e-12, "{direction}");
     }
 

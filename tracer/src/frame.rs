@@ -15,6 +15,7 @@ use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
 use crate::scene::{Camera, FrameView, Model, NormalMode, Scene};
+use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
 
 /// Longest side of a frame in pixels.
@@ -39,6 +40,8 @@ pub struct PreparedFrame {
     pub(crate) planes: Vec<EyePlane>,
     pub(crate) lights: Vec<EyeLight>,
     pub(crate) nodes: Vec<Node>,
+    /// Which lanes it is traced with.
+    pub(crate) level: Level,
 }
 
 /// A mesh, placed: eye = `linear` * mesh + `translation`.
@@ -58,7 +61,6 @@ pub(crate) struct Instance {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EyeTriangle {
     pub corners: [DVec3; 3],
-    pub rounded: [Vec3; 3],
 }
 
 impl PreparedFrame {
@@ -87,6 +89,7 @@ impl PreparedFrame {
             planes: planes(source, &to_eye),
             lights: source.lights.iter().map(|light| EyeLight::new(light, to_eye, unit)).collect(),
             nodes: Vec::new(),
+            level: simd::best(),
             scene,
         };
         frame.nodes = frame.refitted();
@@ -232,10 +235,7 @@ fn spheres(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<Ey
 }
 
 fn triangles(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3) -> Vec<EyeTriangle> {
-    let place = |triangle: &crate::scene::Triangle| {
-        let corners = triangle.vertices.map(to_eye);
-        EyeTriangle { corners, rounded: corners.map(|corner| corner.as_vec3()) }
-    };
+    let place = |triangle: &crate::scene::Triangle| EyeTriangle { corners: triangle.vertices.map(to_eye) };
     scene.triangles.iter().map(place).collect()
 }
 

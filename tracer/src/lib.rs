@@ -38,8 +38,10 @@ pub mod reference;
 mod render;
 pub mod scene;
 mod shade;
+mod simd;
 mod sphere;
 pub mod srgb;
+mod tile;
 mod trace;
 mod triangle;
 
@@ -47,3 +49,4 @@ pub use camera::Basis;
 pub use compile::{CompileError, CompiledScene};
 pub use frame::{MAX_SAMPLES, MAX_SIDE, PreparedFrame};
 pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows};
+pub use simd::best_name as simd_level;

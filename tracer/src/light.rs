@@ -1,52 +1,51 @@
-//! Lights in eye space: what reaches a point, were nothing in the way.
+//! Lights in eye space: what reaches points, were nothing in the way.
 //!
-//! I_j A_j B_j of the shading equation. Angles are compared by their cosines; `libm` makes them the same everywhere.
+//! I_j A_j B_j of the shading equation, sixteen points at a time.
 
 use glam::{DVec3, Vec3};
 
 use crate::scene::{Attenuation, Light, LightKind};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{Simd, SimdBase, SimdFloat, bits, f32x16, select, splat};
 
 /// Where a shadow ray ends, in shares of the way to the light. A surface that holds the light, up to rounding, does not
 /// hide it.
-const JUST_BEFORE: f64 = 1.0 - 1.0 / (1 << 30) as f64;
+pub(crate) const JUST_BEFORE: f64 = 1.0 - 1.0 / (1 << 18) as f64;
 
 /// A light of one frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EyeLight {
-    emitter: Emitter,
+    pub(crate) emitter: Emitter,
     color: Vec3,
     attenuation: Attenuation,
     /// World units per unit of eye space: attenuation is told in world units.
     unit: f64,
     /// Whether shadow rays are traced to it.
-    pub shadows: bool,
+    pub(crate) shadows: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Emitter {
+pub(crate) enum Emitter {
     Point { position: DVec3 },
-    Spot { position: DVec3, axis: DVec3, cone: Cone },
+    Spot { position: DVec3, axis: Vec3, cone: Cone },
     Directional { to_light: DVec3 },
 }
 
-/// The edge of a beam as cosines of the angle to its axis.
+/// The edge of a beam as 1 - cosine of the angle to its axis, which keeps its digits for narrow beams.
 #[derive(Clone, Copy, Debug)]
-struct Cone {
-    outer: f64,
-    inner: f64,
+pub(crate) struct Cone {
+    outer: f32,
+    inner: f32,
 }
 
-/// What a light does for one point.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Incidence {
-    /// Unit vector to the light.
-    pub direction: Vec3,
-    /// From the point to the light; a direction of any length for directional lights.
-    pub to_light: DVec3,
-    /// Where on the way along `to_light` the light begins: just before 1, or infinitely far for a directional light.
-    pub t_light: f64,
+/// What a light does for sixteen points.
+pub(crate) struct Incidence<S: Simd> {
+    /// Unit vectors to the light.
+    pub(crate) direction: Vec3x16<S>,
     /// I_j A_j B_j, linear RGB.
-    pub radiance: Vec3,
+    pub(crate) radiance: Vec3x16<S>,
+    /// Bits of the points that it reaches: inside the cone, and not in the light's own place.
+    pub(crate) reached: u32,
 }
 
 impl EyeLight {
@@ -56,7 +55,7 @@ impl EyeLight {
             LightKind::Point { position } => Emitter::Point { position: to_eye(position) },
             LightKind::Spot { position, direction, beam_angle, penumbra } => Emitter::Spot {
                 position: to_eye(position),
-                axis: direction.normalize_or_zero(),
+                axis: direction.normalize_or_zero().as_vec3(),
                 cone: Cone::new(beam_angle, penumbra),
             },
             LightKind::Directional { direction } => {
@@ -66,47 +65,53 @@ impl EyeLight {
         Self { emitter, color: light.color, attenuation: light.attenuation, unit, shadows: light.shadows }
     }
 
-    /// What reaches `point`; `None` where nothing does: outside the cone, or in the light's own place.
-    pub(crate) fn incidence(&self, point: DVec3) -> Option<Incidence> {
+    /// What reaches sixteen points.
+    #[inline(always)]
+    pub(crate) fn incidence<S: Simd>(&self, simd: S, points: Vec3x16<S>) -> Incidence<S> {
+        let color = Vec3x16::splat(simd, self.color.to_array());
         let (position, beam) = match self.emitter {
             Emitter::Directional { to_light } => {
-                return Some(Incidence {
-                    direction: to_light.as_vec3(),
-                    to_light,
-                    t_light: f64::INFINITY,
-                    radiance: self.color,
-                });
+                let direction = Vec3x16::splat(simd, to_light.as_vec3().to_array());
+                return Incidence { direction, radiance: color, reached: u32::MAX };
             }
             Emitter::Point { position } => (position, None),
             Emitter::Spot { position, axis, cone } => (position, Some((axis, cone))),
         };
-        let to_light = position - point;
-        let distance = to_light.length();
-        let direction = to_light / distance;
-        if !direction.is_finite() {
-            return None;
+        let to_light = Vec3x16::splat(simd, position.as_vec3().to_array()).sub(points);
+        let size = to_light.size();
+        let direction = to_light.normalize(simd);
+        let share = match beam {
+            None => splat(simd, 1.0),
+            Some((axis, cone)) => cone.share(simd, direction, axis),
+        };
+        let attenuation = match self.attenuation {
+            Attenuation::None => splat(simd, 1.0),
+            weakening => {
+                let scaled = to_light.scale(splat(simd, 1.0) / size);
+                attenuate(simd, weakening, size * scaled.dot(scaled).sqrt() * splat(simd, self.unit as f32))
+            }
+        };
+        let strength = attenuation * share;
+        let reached = size.simd_gt(splat(simd, 0.0)) & strength.simd_gt(splat(simd, 0.0));
+        Incidence {
+            direction,
+            radiance: color.scale(strength),
+            reached: bits(reached & strength.is_finite()),
         }
-        let beam = beam.map_or(1.0, |(axis, cone)| cone.share(-direction.dot(axis)));
-        if beam == 0.0 {
-            return None;
-        }
-        let radiance = self.color * (attenuate(self.attenuation, distance * self.unit) * beam) as f32;
-        radiance.is_finite().then_some(Incidence {
-            direction: direction.as_vec3(),
-            to_light,
-            t_light: JUST_BEFORE,
-            radiance,
-        })
     }
 }
 
-/// A_j at distance r in world units.
-fn attenuate(attenuation: Attenuation, r: f64) -> f64 {
+/// A_j at distances r in world units.
+#[inline(always)]
+fn attenuate<S: Simd>(simd: S, attenuation: Attenuation, r: f32x16<S>) -> f32x16<S> {
+    let one = splat(simd, 1.0);
     match attenuation {
-        Attenuation::None => 1.0,
-        Attenuation::InverseSquare => 1.0 / (r * r),
+        Attenuation::None => one,
+        Attenuation::InverseSquare => one / (r * r),
         Attenuation::Polynomial { constant, linear, quadratic } => {
-            1.0 / (constant + linear * r + quadratic * r * r)
+            let (c, l, q) =
+                (splat(simd, constant as f32), splat(simd, linear as f32), splat(simd, quadratic as f32));
+            one / (c + l * r + q * r * r)
         }
     }
 }
@@ -115,37 +120,53 @@ impl Cone {
     /// `beam_angle` is the full angle in degrees, `penumbra` how many degrees within it fade.
     fn new(beam_angle: f64, penumbra: f64) -> Self {
         let half_angle = beam_angle / 2.0;
-        let cosine = |degrees: f64| libm::cos(degrees.clamp(0.0, 180.0).to_radians());
-        Self { outer: cosine(half_angle), inner: cosine(half_angle - penumbra) }
+        // 1 - cos x = 2 sin^2 (x / 2)
+        let versine = |degrees: f64| {
+            let sine = libm::sin(degrees.clamp(0.0, 180.0).to_radians() / 2.0);
+            (2.0 * sine * sine) as f32
+        };
+        Self { outer: versine(half_angle), inner: versine(half_angle - penumbra) }
     }
 
-    /// B_j: 1 inside, 0 outside, smooth (3s^2 - 2s^3 in the cosine) over the penumbra.
-    fn share(&self, cosine: f64) -> f64 {
-        if cosine <= self.outer {
-            return 0.0;
-        }
-        if cosine >= self.inner {
-            return 1.0;
-        }
-        let s = (cosine - self.outer) / (self.inner - self.outer);
-        s * s * (3.0 - 2.0 * s)
+    /// B_j: 1 inside, 0 outside, smooth (3s^2 - 2s^3 in the cosine) over the penumbra. `direction` points to the light.
+    #[inline(always)]
+    fn share<S: Simd>(&self, simd: S, direction: Vec3x16<S>, axis: Vec3) -> f32x16<S> {
+        // |l - a|^2 / 2 = 1 - l.a for unit vectors.
+        let apart = direction.add(Vec3x16::splat(simd, axis.to_array()));
+        let versine = apart.dot(apart) * splat(simd, 0.5);
+        let (outer, inner) = (splat(simd, self.outer), splat(simd, self.inner));
+        let s = (outer - versine) / (outer - inner);
+        let smooth = s * s * (splat(simd, 3.0) - s - s);
+        let lit = select(versine.simd_le(inner), splat(simd, 1.0), smooth);
+        select(versine.simd_lt(outer), lit, splat(simd, 0.0))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{best, dispatch};
 
     fn light(kind: LightKind, attenuation: Attenuation) -> EyeLight {
         let light = Light { kind, color: Vec3::ONE, attenuation, shadows: true };
         EyeLight::new(&light, |p| p, 1.0)
     }
 
+    #[inline(always)]
+    fn red<S: Simd>(simd: S, light: &EyeLight, point: Vec3) -> f32 {
+        let incidence = light.incidence(simd, Vec3x16::splat(simd, point.to_array()));
+        if incidence.reached & 1 == 1 { incidence.radiance.0[0][0] } else { 0.0 }
+    }
+
+    fn radiance(light: &EyeLight, point: Vec3) -> f32 {
+        dispatch!(best(), simd => red(simd, light, point))
+    }
+
     #[test]
     fn light_weakens_as_its_attenuation_says() {
         let at = |attenuation| {
             let point = LightKind::Point { position: DVec3::new(0.0, 4.0, 0.0) };
-            light(point, attenuation).incidence(DVec3::ZERO).unwrap().radiance.x
+            radiance(&light(point, attenuation), Vec3::ZERO)
         };
         assert_eq!(at(Attenuation::None), 1.0);
         assert_eq!(at(Attenuation::InverseSquare), 1.0 / 16.0);
@@ -160,8 +181,7 @@ mod tests {
             light(LightKind::Spot { position, direction, beam_angle: 60.0, penumbra }, Attenuation::None)
         };
         let at = |light: &EyeLight, degrees: f64| {
-            let x = libm::tan(degrees.to_radians());
-            light.incidence(DVec3::new(x, 0.0, 0.0)).map_or(0.0, |incidence| incidence.radiance.x)
+            radiance(light, Vec3::new(libm::tan(degrees.to_radians()) as f32, 0.0, 0.0))
         };
         let hard = spot(0.0);
         assert_eq!([at(&hard, 0.0), at(&hard, 29.9), at(&hard, 30.1), at(&hard, 80.0)], [1.0, 1.0, 0.0, 0.0]);
@@ -174,6 +194,7 @@ mod tests {
     #[test]
     fn a_point_in_the_light_gets_none_of_it() {
         let point = LightKind::Point { position: DVec3::ONE };
-        assert!(light(point, Attenuation::InverseSquare).incidence(DVec3::ONE).is_none());
+        assert_eq!(radiance(&light(point, Attenuation::InverseSquare), Vec3::ONE), 0.0);
+        assert_eq!(radiance(&light(point, Attenuation::None), Vec3::ONE), 0.0);
     }
 }

@@ -57,7 +57,7 @@ impl Oracle {
             let scale = libm::exp2(f64::from(mesh.exponent()));
             let place = |p: Vec3| linear * (p.as_dvec3() * scale + mesh.center()) + (model.translate - eye);
             let turn_normal = |n: Vec3| linear.inverse().transpose() * n.as_dvec3();
-            for i in 0..mesh.triangle_count() as u32 {
+            for i in mesh.triangles() {
                 let smooth = model.normals == NormalMode::Smooth;
                 let normals = mesh.corner_normals(i).filter(|_| smooth).map(|n| n.map(turn_normal));
                 let shape = Shape::Triangle { corners: mesh.corners(i).map(place), normals };

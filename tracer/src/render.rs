@@ -5,10 +5,14 @@ use std::ops::{AddAssign, Range};
 use glam::Vec3;
 
 use crate::frame::PreparedFrame;
-use crate::{shade, srgb};
+use crate::shade::{self, Colors};
+use crate::simd::{LANES, Simd, dispatch, each_bit, three};
+use crate::srgb;
+use crate::tile::visible::EyeTile;
+use crate::tile::{BLOCKS, Rays, SIDE, place};
 
-/// Rows and columns of a tile. Segments that begin and end on multiples of it waste nothing.
-pub const TILE_SIZE: u32 = 8;
+/// Rows of a tile of a frame with one sample a pixel. Segments that begin and end on multiples of it waste nothing.
+pub const TILE_SIZE: u32 = SIDE as u32;
 
 /// Rays traced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,31 +63,127 @@ pub fn render_rows(
         if cancelled() {
             return Err(Cancelled);
         }
-        let bottom = (top + 1).next_multiple_of(TILE_SIZE).min(rows.end);
+        let bottom = (top + 1).next_multiple_of(tile_pixels(frame)).min(rows.end);
         let start = (top - rows.start) as usize * row_bytes;
         let band = &mut out[start..start + (bottom - top) as usize * row_bytes];
-        render_band(frame, top..bottom, band, &mut counts);
+        let done = dispatch!(frame.level, simd => render_band(simd, frame, top..bottom, band));
+        counts += done;
         top = bottom;
     }
     Ok(counts)
 }
 
-/// A band tile by tile, so that rays that follow each other walk the same nodes.
-fn render_band(frame: &PreparedFrame, rows: Range<u32>, out: &mut [u8], counts: &mut RayCounts) {
-    let width = frame.width();
-    for left in (0..width).step_by(TILE_SIZE as usize) {
-        for y in rows.clone() {
-            for x in left..(left + TILE_SIZE).min(width) {
-                let index = ((y - rows.start) as usize * width as usize + x as usize) * 3;
-                out[index..index + 3].copy_from_slice(&srgb::encode(pixel(frame, x, y, counts)));
-            }
+/// Pixels along a side of a tile: whole pixels, with all their samples.
+fn tile_pixels(frame: &PreparedFrame) -> u32 {
+    (SIDE as u32 / frame.rays.grid()).max(1)
+}
+
+/// Tiles that share a band of rows.
+#[inline(always)]
+fn render_band<S: Simd>(simd: S, frame: &PreparedFrame, rows: Range<u32>, out: &mut [u8]) -> RayCounts {
+    let rays = Rays::grid();
+    let side = tile_pixels(frame);
+    let mut counts = RayCounts::default();
+    for left in (0..frame.width()).step_by(side as usize) {
+        let pixels = Pixels {
+            left,
+            right: (left + side).min(frame.width()),
+            // Tiles stand on a grid of the whole frame, wherever the rows are cut.
+            top: rows.start / side * side,
+            rows: rows.clone(),
+        };
+        render_tile(simd, frame, &rays, &pixels, out, &mut counts);
+    }
+    counts
+}
+
+/// The pixels of a tile that are asked for.
+struct Pixels {
+    left: u32,
+    right: u32,
+    /// First row of the tile; `rows` may begin later.
+    top: u32,
+    rows: Range<u32>,
+}
+
+#[inline(always)]
+fn render_tile<S: Simd>(
+    simd: S,
+    frame: &PreparedFrame,
+    rays: &Rays,
+    pixels: &Pixels,
+    out: &mut [u8],
+    counts: &mut RayCounts,
+) {
+    let grid = frame.rays.grid();
+    let corner = (pixels.left * grid, pixels.top * grid);
+    let lens = frame.rays.lens(
+        f64::from(pixels.left) + SIDE as f64 / 2.0 / f64::from(grid),
+        f64::from(pixels.top) + SIDE as f64 / 2.0 / f64::from(grid),
+    );
+    let tile = EyeTile { frame, rays, lens, live: live_lanes(grid, pixels), corner };
+    counts.primary += tile.live.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
+    let visible = tile.visible(simd);
+    let colors = shade::shade(simd, &tile, &visible, counts);
+    if grid == 1 {
+        write_samples(simd, frame, pixels, &colors, &tile.live, out);
+    } else {
+        write_means(frame, pixels, &colors, out);
+    }
+}
+
+/// Samples of the pixels that are asked for.
+fn live_lanes(grid: u32, pixels: &Pixels) -> [u32; BLOCKS] {
+    let columns = (pixels.right - pixels.left) * grid;
+    let rows = (pixels.rows.start - pixels.top) * grid..(pixels.rows.end - pixels.top) * grid;
+    std::array::from_fn(|block| {
+        (0..LANES).fold(0, |bits, lane| {
+            let (column, row) = place(block, lane);
+            bits | u32::from((column as u32) < columns && rows.contains(&(row as u32))) << lane
+        })
+    })
+}
+
+/// One sample a pixel: encoded lane by lane.
+#[inline(always)]
+fn write_samples<S: Simd>(
+    simd: S,
+    frame: &PreparedFrame,
+    pixels: &Pixels,
+    colors: &Colors,
+    live: &[u32; BLOCKS],
+    out: &mut [u8],
+) {
+    for block in 0..BLOCKS {
+        let codes = three!(channel => srgb::encode_lanes(simd, colors[block][channel].load(simd)));
+        for lane in each_bit(live[block]) {
+            let (column, row) = place(block, lane);
+            let at = offset(frame, pixels, pixels.left + column as u32, pixels.top + row as u32);
+            out[at..at + 3].copy_from_slice(&[codes[0][lane], codes[1][lane], codes[2][lane]]);
         }
     }
 }
 
-/// The mean of a pixel's samples, linear RGB.
-pub(crate) fn pixel(frame: &PreparedFrame, x: u32, y: u32, counts: &mut RayCounts) -> Vec3 {
-    let samples = frame.rays.samples();
-    let sum: Vec3 = (0..samples).map(|i| shade::radiance(frame, frame.rays.direction(x, y, i), counts)).sum();
-    sum / samples as f32
+/// Several samples a pixel: the mean in linear light, summed in the order of the samples.
+fn write_means(frame: &PreparedFrame, pixels: &Pixels, colors: &Colors, out: &mut [u8]) {
+    let grid = frame.rays.grid();
+    let sample = |column: u32, row: u32| {
+        let block = row / 4 * 4 + column / 4;
+        let lane = row % 4 * 4 + column % 4;
+        Vec3::from_array([0, 1, 2].map(|channel| colors[block as usize][channel].0[lane as usize]))
+    };
+    for y in pixels.rows.clone() {
+        for x in pixels.left..pixels.right {
+            let (column, row) = ((x - pixels.left) * grid, (y - pixels.top) * grid);
+            let samples = (0..grid * grid).map(|i| sample(column + i % grid, row + i / grid));
+            let mean = samples.sum::<Vec3>() / (grid * grid) as f32;
+            let at = offset(frame, pixels, x, y);
+            out[at..at + 3].copy_from_slice(&srgb::encode(mean));
+        }
+    }
+}
+
+/// Where a pixel's bytes stand in the bytes of the rows.
+fn offset(frame: &PreparedFrame, pixels: &Pixels, x: u32, y: u32) -> usize {
+    ((y - pixels.rows.start) as usize * frame.width() as usize + x as usize) * 3
 }

@@ -8,6 +8,9 @@ use std::sync::LazyLock;
 
 use glam::Vec3;
 
+use crate::simd::math::srgb255;
+use crate::simd::{LANES, Simd, SimdBase, SimdFloat, f32x16, select, splat};
+
 /// Bits of an `f32` below those that index the table: 8 bits of exponent and 6 of mantissa stay.
 const SHIFT: u32 = 17;
 
@@ -28,6 +31,17 @@ static ENCODER: LazyLock<Encoder> = LazyLock::new(Encoder::new);
 pub fn encode(color: Vec3) -> [u8; 3] {
     let encoder = &*ENCODER;
     color.to_array().map(|linear| encoder.encode(linear))
+}
+
+/// Encodes sixteen linear values; those outside [0, 1] are clamped, NaN becomes 0. By a polynomial: a value within 10^-5 of a
+/// step of a threshold may fall on its other side.
+#[inline(always)]
+pub(crate) fn encode_lanes<S: Simd>(simd: S, linear: f32x16<S>) -> [u8; LANES] {
+    let zero = splat(simd, 0.0);
+    // False for NaN.
+    let positive = select(linear.simd_gt(zero), linear, zero);
+    let codes = srgb255(simd, positive.min(splat(simd, 1.0))).round_ties_even().to_array();
+    codes.map(|code| code as u8)
 }
 
 /// The linear value, 0..1, of an 8-bit sRGB code.

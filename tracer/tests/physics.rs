@@ -6,12 +6,14 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{analytic, empty, instanced, light, point, render};
+use common::{analytic, ball, empty, instanced, light, point, render};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use rayfarm_tracer::image::RgbImage;
+use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{
-    Attenuation, Background, FrameView, LightKind, Material, Plane, Scene, Sphere, Triangle,
+    Attenuation, Background, FrameView, LightKind, Material, Model, NormalMode, Plane, Scene, Sphere,
+    Triangle,
 };
 use rayfarm_tracer::{Cancelled, CompiledScene, PreparedFrame, render_rows, srgb};
 
@@ -26,7 +28,7 @@ fn code(linear: f32) -> u8 {
 }
 
 /// A unit ball seen from z = 4, lit from the camera: N = L = V = H in the middle.
-fn ball(material: Material) -> Scene {
+fn lit_sphere(material: Material) -> Scene {
     let mut scene = empty(1, 1);
     scene.camera.position = DVec3::new(0.0, 0.0, 4.0);
     scene.materials = vec![material];
@@ -39,20 +41,20 @@ fn ball(material: Material) -> Scene {
 #[test]
 fn a_ball_lit_from_the_eye_shows_its_albedo_and_its_highlight() {
     let material = Material { diffuse: Vec3::splat(0.25), specular: Vec3::ZERO, exponent: 1.0 };
-    assert_eq!(middle(&ball(material)), [code(0.25); 3]);
-    assert_eq!(middle(&ball(Material { specular: Vec3::splat(0.5), ..material })), [code(0.75); 3]);
+    assert_eq!(middle(&lit_sphere(material)), [code(0.25); 3]);
+    assert_eq!(middle(&lit_sphere(Material { specular: Vec3::splat(0.5), ..material })), [code(0.75); 3]);
 }
 
 #[test]
 fn inverse_square_divides_by_the_distance_to_the_surface() {
-    let mut scene = ball(Material { diffuse: Vec3::splat(0.9), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.9), specular: Vec3::ZERO, exponent: 1.0 });
     scene.lights[0].attenuation = Attenuation::InverseSquare;
     assert_eq!(middle(&scene), [code(0.1); 3]);
 }
 
 #[test]
 fn ambient_counts_once_whatever_the_number_of_lights() {
-    let mut scene = ball(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
     scene.ambient = Vec3::splat(0.4);
     scene.lights = vec![light(point(0.0, 0.0, -9.0), 1.0, Attenuation::None); 7];
     assert_eq!(middle(&scene), [code(0.2); 3]);
@@ -60,7 +62,7 @@ fn ambient_counts_once_whatever_the_number_of_lights() {
 
 #[test]
 fn a_slanted_plane_follows_the_cosine() {
-    let mut scene = ball(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0 });
     scene.spheres.clear();
     scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, material: 0 }];
     let direction = DVec3::new(0.0, -libm::sqrt(0.75), -0.5);
@@ -70,7 +72,7 @@ fn a_slanted_plane_follows_the_cosine() {
 
 #[test]
 fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
-    let mut scene = ball(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
     scene.lights[0].kind = point(0.0, 6.0, 6.0);
     let lit = middle(&scene);
     scene.spheres.push(Sphere { center: DVec3::new(0.0, 3.0, 3.5), radius: 0.4, material: 0 });
@@ -82,7 +84,7 @@ fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
 
 #[test]
 fn what_stands_behind_a_light_takes_nothing_away() {
-    let mut scene = ball(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
     let lit = middle(&scene);
     scene.spheres.push(Sphere { center: DVec3::new(0.0, 0.0, 9.0), radius: 1.0, material: 0 });
     assert_eq!(middle(&scene), lit);
@@ -131,6 +133,34 @@ fn no_acne_on_planes_spheres_and_coplanar_triangles_at_any_angle() {
         unshadowed = planar.clone();
         unshadowed.lights[0].shadows = false;
         assert!(render(&planar, &[], &view).0 == render(&unshadowed, &[], &view).0, "plane, {elevation}");
+    }
+}
+
+/// The facets of a convex mesh cannot shade each other: those that face the light are lit.
+#[test]
+fn no_acne_on_a_convex_mesh_under_any_light() {
+    let mesh = Arc::new(CompiledMesh::compile(&ball(60, 90)).unwrap().0);
+    for elevation in [80.0, 30.0, 2.0, -40.0_f64] {
+        let mut scene = empty(240, 180);
+        scene.camera.position = DVec3::new(0.0, 0.0, 3.0);
+        let (s, c) = (libm::sin(elevation.to_radians()), libm::cos(elevation.to_radians()));
+        scene.lights = vec![light(point(30.0 * c, 30.0 * s, 3.0), 1.0, Attenuation::None)];
+        scene.models = vec![Model {
+            mesh: mesh.id(),
+            materials: vec![1, 2],
+            normals: NormalMode::Flat,
+            translate: DVec3::ZERO,
+            rotate: DVec3::new(10.0, 20.0, 30.0),
+            scale: DVec3::ONE,
+        }];
+        let mut unshadowed = scene.clone();
+        unshadowed.lights[0].shadows = false;
+        let meshes = [Arc::clone(&mesh)];
+        let view = FrameView::of(&scene);
+        assert!(
+            render(&scene, &meshes, &view).0 == render(&unshadowed, &meshes, &view).0,
+            "{elevation} degrees"
+        );
     }
 }
 

@@ -7,7 +7,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::{Child, MAX_DEPTH, Node};
+use super::wide::{WideTree, widen};
+use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
 
 /// A tree, and the order that it wants its primitives in.
 #[derive(Clone, Debug)]
@@ -19,6 +20,9 @@ pub struct Tree {
     /// Most nodes on the way from the root to a leaf.
     pub depth: u32,
 }
+
+/// Leaves stay single: [`super::widen`] puts them together as it needs them.
+const PARAMS: BvhBuildParams = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
 
 /// Leaves of the median build.
 const MEDIAN_LEAF: usize = 4;
@@ -32,8 +36,15 @@ pub fn build(boxes: Vec<(Vec3, Vec3)>) -> Tree {
     if primitives.is_empty() {
         return Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 };
     }
-    let source = build_bvh2(&primitives, BvhBuildParams::medium_build(), &mut Duration::default());
+    let source = build_bvh2(&primitives, PARAMS, &mut Duration::default());
     lay_out(&source).unwrap_or_else(|| median(&primitives))
+}
+
+/// Builds a tree of sixteen children a node. Where it ends deeper than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
+pub(crate) fn build_wide(boxes: Vec<(Vec3, Vec3)>) -> WideTree {
+    let primitives: Vec<Primitive> = boxes.iter().map(|&(lo, hi)| Primitive { lo, hi }).collect();
+    let wide = widen(&build(boxes));
+    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives)) }
 }
 
 struct Primitive {

@@ -4,9 +4,30 @@
 //! it may come from a peer or from disk.
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{FORMAT_VERSION, MAGIC, MeshError};
+use crate::bvh::{WIDTH, WideNode};
+use crate::simd::Lanes;
+
+/// Source of a lane without a triangle.
+pub(super) const NO_TRIANGLE: u32 = u32::MAX;
+
+/// Sixteen triangles in mesh space, indexed `[corner][axis].0[lane]`. Lanes without a triangle hold NaN, which fails every
+/// comparison.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct TriangleBlock(pub(crate) [[Lanes; 3]; 3]);
+
+const _: () = assert!(size_of::<TriangleBlock>() == 576);
+
+impl TriangleBlock {
+    /// Corners of one triangle.
+    #[inline(always)]
+    pub(crate) fn corners(&self, lane: usize) -> [Vec3; 3] {
+        self.0.map(|[x, y, z]| Vec3::new(x.0[lane], y.0[lane], z.0[lane]))
+    }
+}
 
 /// Alignment of sections, in bytes: one cache line, and what a [`crate::bvh::Node`] wants.
 pub(super) const ALIGN: usize = 64;
@@ -53,11 +74,12 @@ pub(super) struct Header {
     pub center: [f64; 3],
     pub bounds: [[f64; 3]; 2],
     pub node_count: u32,
+    pub block_count: u32,
     pub triangle_count: u32,
     pub normal_count: u32,
     pub material_count: u32,
     pub material_bytes: u32,
-    pub reserved: [u32; 5],
+    pub reserved: [u32; 4],
 }
 
 const _: () = assert!(size_of::<Header>() == 128);
@@ -114,13 +136,14 @@ impl Header {
             end = start.saturating_add((count as usize).saturating_mul(element));
             start
         };
-        let has_normals = if self.normal_count > 0 { self.triangle_count } else { 0 };
+        let slots = self.block_count.saturating_mul(WIDTH as u32);
+        let with_normals = if self.normal_count > 0 { slots } else { 0 };
         Sections {
-            nodes: place(self.node_count, 64),
-            corners: place(self.triangle_count, 36),
-            sources: place(self.triangle_count, 4),
-            slots: place(self.triangle_count, 2),
-            indices: place(has_normals, 12),
+            nodes: place(self.node_count, size_of::<WideNode>()),
+            blocks: place(self.block_count, size_of::<TriangleBlock>()),
+            sources: place(slots, 4),
+            slots: place(slots, 2),
+            indices: place(with_normals, 12),
             normals: place(self.normal_count, 12),
             materials: place(self.material_bytes, 1),
             end,
@@ -131,15 +154,15 @@ impl Header {
 /// Byte offsets of the sections of a compiled mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sections {
-    /// `Node` per inner node, in depth-first order.
+    /// [`WideNode`] each.
     pub nodes: usize,
-    /// Three `Vec3` per triangle, in the order of the tree's leaves.
-    pub corners: usize,
-    /// `u32` per triangle: its position in the source.
+    /// [`TriangleBlock`] each.
+    pub blocks: usize,
+    /// `u32` per lane of the blocks: the triangle's position in the source, or [`NO_TRIANGLE`].
     pub sources: usize,
-    /// `u16` per triangle: its material slot.
+    /// `u16` per lane: its material slot.
     pub slots: usize,
-    /// Three `u32` per triangle, into `normals`; empty without normals.
+    /// Three `u32` per lane, into `normals`; empty without normals.
     pub indices: usize,
     /// `Vec3` per vertex.
     pub normals: usize,

@@ -2,11 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
-use super::blob::{AlignedBytes, Header, Sections};
+use super::blob::{AlignedBytes, Header, NO_TRIANGLE, Sections, TriangleBlock};
 use super::clean::{CleanMesh, clean};
 use super::{Mesh, MeshError, MeshId, NamedMaterial};
-use crate::bvh::{self, Node};
+use crate::bvh::{self, WIDTH, WideNode, WideTree};
 use crate::scene::Material;
+use crate::simd::Lanes;
 
 /// What a compiled mesh should carry.
 #[derive(Clone, Copy, Debug)]
@@ -63,12 +64,13 @@ impl CompiledMesh {
     /// As [`CompiledMesh::compile`].
     pub fn compile_with(mesh: &Mesh, options: CompileOptions) -> Result<(Self, MeshReport), MeshError> {
         let (clean, report) = clean(mesh, options.normals)?;
-        let tree = bvh::build(clean.corners.iter().map(bounds_of_corners).collect());
+        let tree = bvh::build_wide(clean.corners.iter().map(bounds_of_corners).collect());
         let materials = encode_materials(&mesh.materials);
 
         let mut header = Header::new(clean.center, clean.exponent, clean.bounds);
         header.depth = tree.depth;
         header.node_count = tree.nodes.len() as u32;
+        header.block_count = tree.blocks.len() as u32;
         header.triangle_count = clean.corners.len() as u32;
         header.normal_count = clean.normals.len() as u32;
         header.material_count = mesh.materials.len() as u32;
@@ -105,12 +107,16 @@ impl CompiledMesh {
         if self.header.triangle_count == 0 || self.triangle_count() > super::MAX_TRIANGLES {
             return broken(format!("it announces {} triangles", self.header.triangle_count));
         }
-        let depth = bvh::validate(self.nodes(), self.header.triangle_count)
+        let depth = bvh::validate_wide(self.nodes(), self.header.block_count)
             .map_err(|error| MeshError::Format(error.to_string()))?;
         if depth != self.header.depth {
             return broken(format!("its tree is {depth} deep, its header says {}", self.header.depth));
         }
-        if self.all_corners().iter().flatten().any(|corner| !(corner.abs().max_element() <= 1.0)) {
+        if self.triangles().count() != self.triangle_count() {
+            return broken("its blocks do not hold as many triangles as it announces".into());
+        }
+        if self.triangles().any(|i| self.corners(i).iter().any(|corner| !(corner.abs().max_element() <= 1.0)))
+        {
             return broken("a corner lies outside [-1, 1]".into());
         }
         if let Some(slot) = self.slots().iter().find(|&&slot| slot as usize >= self.materials.len()) {
@@ -174,27 +180,31 @@ impl CompiledMesh {
 
     /// Bounds of the tree's root in mesh space.
     pub fn root_bounds(&self) -> (Vec3, Vec3) {
-        self.nodes().first().map_or((Vec3::ZERO, Vec3::ZERO), Node::bounds)
+        self.nodes().first().map_or((Vec3::ZERO, Vec3::ZERO), WideNode::bounds)
     }
 
-    /// The tree; leaves count triangles in the order of [`CompiledMesh::corners`].
-    pub fn nodes(&self) -> &[Node] {
-        self.section(self.sections.nodes, self.header.node_count)
+    pub(crate) fn nodes(&self) -> &[WideNode] {
+        self.section(self.sections.nodes, self.header.node_count as usize)
+    }
+
+    /// The triangles, sixteen by sixteen. Triangle i stands in lane i % 16 of block i / 16.
+    pub(crate) fn blocks(&self) -> &[TriangleBlock] {
+        self.section(self.sections.blocks, self.header.block_count as usize)
+    }
+
+    /// Indices of all triangles: those lanes of the blocks that hold one.
+    pub fn triangles(&self) -> impl Iterator<Item = u32> {
+        (0_u32..).zip(self.sources()).filter(|&(_, &source)| source != NO_TRIANGLE).map(|(i, _)| i)
     }
 
     /// Corners of triangle `i` in mesh space.
     pub fn corners(&self, i: u32) -> [Vec3; 3] {
-        self.all_corners()[i as usize]
-    }
-
-    /// Corners of all triangles in mesh space, in the order of the tree's leaves.
-    pub fn all_corners(&self) -> &[[Vec3; 3]] {
-        self.section(self.sections.corners, self.header.triangle_count)
+        self.blocks()[i as usize / WIDTH].corners(i as usize % WIDTH)
     }
 
     /// Position of triangle `i` in the source file: ties between equal distances are decided by it.
     pub fn source(&self, i: u32) -> u32 {
-        self.section::<u32>(self.sections.sources, self.header.triangle_count)[i as usize]
+        self.sources()[i as usize]
     }
 
     /// Material slot of triangle `i`.
@@ -208,23 +218,30 @@ impl CompiledMesh {
         Some(indices.map(|index| self.normals()[index as usize]))
     }
 
+    fn lanes(&self) -> usize {
+        self.header.block_count as usize * WIDTH
+    }
+
+    fn sources(&self) -> &[u32] {
+        self.section(self.sections.sources, self.lanes())
+    }
+
     fn slots(&self) -> &[u16] {
-        self.section(self.sections.slots, self.header.triangle_count)
+        self.section(self.sections.slots, self.lanes())
     }
 
     fn indices(&self) -> &[[u32; 3]] {
-        let count = if self.has_normals() { self.header.triangle_count } else { 0 };
-        self.section(self.sections.indices, count)
+        self.section(self.sections.indices, if self.has_normals() { self.lanes() } else { 0 })
     }
 
     fn normals(&self) -> &[Vec3] {
-        self.section(self.sections.normals, self.header.normal_count)
+        self.section(self.sections.normals, self.header.normal_count as usize)
     }
 
     /// The section that starts at `start`. `Header::read` made sure that all sections lie inside, and they start on
     /// cache lines, so the cast cannot fail.
-    fn section<T: bytemuck::AnyBitPattern>(&self, start: usize, count: u32) -> &[T] {
-        bytemuck::cast_slice(&self.bytes.as_slice()[start..start + count as usize * size_of::<T>()])
+    fn section<T: bytemuck::AnyBitPattern>(&self, start: usize, count: usize) -> &[T] {
+        bytemuck::cast_slice(&self.bytes.as_slice()[start..start + count * size_of::<T>()])
     }
 }
 
@@ -232,27 +249,47 @@ fn bounds_of_corners([a, b, c]: &[Vec3; 3]) -> (Vec3, Vec3) {
     (a.min(*b).min(*c), a.max(*b).max(*c))
 }
 
-/// Writes the sections, triangles in the order of the leaves.
-fn lay_out(header: &Header, clean: &CleanMesh, tree: &bvh::Tree, materials: &[u8]) -> AlignedBytes {
+/// Writes the sections, triangles in the order of the tree's blocks.
+fn lay_out(header: &Header, clean: &CleanMesh, tree: &WideTree, materials: &[u8]) -> AlignedBytes {
     let sections = header.sections();
     let mut bytes = AlignedBytes::zeroed(sections.end);
     let out = bytes.as_mut_slice();
     out[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(header));
-    let order = &tree.order;
+    let blocks: Vec<TriangleBlock> =
+        tree.blocks.iter().map(|block| block_of(block, &clean.corners)).collect();
     put(out, sections.nodes, &tree.nodes);
-    put(out, sections.corners, &in_order(order, &clean.corners));
-    put(out, sections.sources, &in_order(order, &clean.sources));
-    put(out, sections.slots, &in_order(order, &clean.slots));
+    put(out, sections.blocks, &blocks);
+    put(out, sections.sources, &in_lanes(tree, &clean.sources, NO_TRIANGLE));
+    put(out, sections.slots, &in_lanes(tree, &clean.slots, 0));
     if !clean.normals.is_empty() {
-        put(out, sections.indices, &in_order(order, &clean.indices));
+        put(out, sections.indices, &in_lanes(tree, &clean.indices, [0; 3]));
         put(out, sections.normals, &clean.normals);
     }
     out[sections.materials..sections.materials + materials.len()].copy_from_slice(materials);
     bytes
 }
 
-fn in_order<T: Copy>(order: &[u32], items: &[T]) -> Vec<T> {
-    order.iter().map(|&i| items[i as usize]).collect()
+fn block_of(triangles: &[u32], corners: &[[Vec3; 3]]) -> TriangleBlock {
+    let mut block = TriangleBlock([[Lanes([f32::NAN; WIDTH]); 3]; 3]);
+    for (lane, &triangle) in triangles.iter().enumerate() {
+        for (corner, position) in corners[triangle as usize].iter().enumerate() {
+            for axis in 0..3 {
+                block.0[corner][axis].0[lane] = position[axis];
+            }
+        }
+    }
+    block
+}
+
+/// Sixteen entries a block, filled up with `empty`.
+fn in_lanes<T: Copy>(tree: &WideTree, items: &[T], empty: T) -> Vec<T> {
+    let mut lanes = vec![empty; tree.blocks.len() * WIDTH];
+    for (chunk, block) in lanes.chunks_exact_mut(WIDTH).zip(&tree.blocks) {
+        for (lane, &triangle) in chunk.iter_mut().zip(block) {
+            *lane = items[triangle as usize];
+        }
+    }
+    lanes
 }
 
 fn put<T: bytemuck::NoUninit>(out: &mut [u8], start: usize, items: &[T]) {

@@ -15,16 +15,17 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::scene::Material;
+pub(crate) use blob::TriangleBlock;
 pub use compiled::{CompileOptions, CompiledMesh, MeshReport};
 
 /// First bytes of a compiled mesh, in memory and on disk.
 pub const MAGIC: [u8; 6] = *b"RFMESH";
 
 /// Version of the layout of compiled meshes.
-pub const FORMAT_VERSION: u16 = 1;
+pub const FORMAT_VERSION: u16 = 2;
 
-/// Most triangles that one mesh may have: indices into corners stay inside `u32`.
-pub const MAX_TRIANGLES: usize = 1 << 28;
+/// Most triangles that one mesh may have: they fill at most 2^28 lanes of blocks, and their indices stay inside `u32`.
+pub const MAX_TRIANGLES: usize = 1 << 27;
 
 /// Most material slots that one mesh may have: a slot is a `u16`.
 pub const MAX_MATERIALS: usize = 1 << 16;

@@ -1,19 +1,50 @@
 //! The highlight: Blinn's half vector, Phong's exponent.
 
-use glam::Vec3;
+use crate::simd::math::{exp2, log2};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{LANES, Lanes, Simd, SimdBase, f32x16, select, splat};
 
-use crate::scene::Material;
+/// Up to this exponent the rounding of N.H to `f32` stays below a fifth of a step of the 8-bit picture.
+const SINGLE: f32 = 2000.0;
 
-/// c_s max(0, N.H)^p_r with H = (L + V) / |L + V|.
-///
-/// `libm::pow` is the same code on every platform. In `f64`, because an exponent of 10^6 multiplies the relative error
-/// of N.H by as much.
-pub(super) fn specular(material: &Material, normal: Vec3, to_light: Vec3, to_viewer: Vec3) -> Vec3 {
-    let half = to_light.as_dvec3() + to_viewer.as_dvec3();
-    let n_dot_h = normal.as_dvec3().dot(half) / half.length();
-    if !(n_dot_h > 0.0) {
-        // Only an exponent of zero makes something of nothing: x^0 = 1.
-        return if material.exponent == 0.0 { material.specular } else { Vec3::ZERO };
+/// max(0, N.H)^p with H = (L + V) / |L + V|.
+#[inline(always)]
+pub(super) fn highlight<S: Simd>(
+    simd: S,
+    normals: Vec3x16<S>,
+    to_light: Vec3x16<S>,
+    to_viewer: Vec3x16<S>,
+    exponents: &Lanes,
+) -> f32x16<S> {
+    if exponents.0.iter().any(|&exponent| exponent > SINGLE || exponent == 0.0) {
+        return by_lane(simd, normals, to_light, to_viewer, exponents);
     }
-    material.specular * libm::pow(n_dot_h.min(1.0), f64::from(material.exponent)) as f32
+    let half = to_light.add(to_viewer).normalize(simd);
+    let n_dot_h = normals.dot(half);
+    let positive = n_dot_h.simd_gt(splat(simd, 1e-30));
+    let base = select(positive, n_dot_h, splat(simd, 1.0)).min(splat(simd, 1.0));
+    let power = exp2(simd, (log2(simd, base) * exponents.load(simd)).max(splat(simd, -126.0)));
+    select(positive, power, splat(simd, 0.0))
+}
+
+/// In `f64`: an exponent of 10^6 multiplies the relative error of N.H by as much. `libm` is the same on every platform.
+#[inline(never)]
+fn by_lane<S: Simd>(
+    simd: S,
+    normals: Vec3x16<S>,
+    to_light: Vec3x16<S>,
+    to_viewer: Vec3x16<S>,
+    exponents: &Lanes,
+) -> f32x16<S> {
+    let vector =
+        |v: Vec3x16<S>, lane: usize| glam::Vec3::from_array(v.0.map(|c| c[lane])).as_dvec3().normalize();
+    let of_lane = |lane: usize| {
+        let half = vector(to_light, lane) + vector(to_viewer, lane);
+        let n_dot_h = vector(normals, lane).dot(half) / half.length();
+        // Only an exponent of zero makes something of nothing: x^0 = 1.
+        let power = libm::pow(n_dot_h.clamp(0.0, 1.0), f64::from(exponents.0[lane]));
+        if power.is_nan() { 0.0 } else { power as f32 }
+    };
+    let lanes: [f32; LANES] = std::array::from_fn(of_lane);
+    f32x16::load_array(simd, lanes)
 }

@@ -4,9 +4,9 @@
 //! where it meets the tree's bounds: the digits of an `f32` are then spent near the geometry, however far the ray
 //! comes from.
 
-mod surface;
 #[cfg(test)]
 mod tests;
+mod walk;
 
 use std::ops::ControlFlow::{self, Continue};
 
@@ -15,8 +15,9 @@ use glam::{DVec3, Vec3};
 use crate::bvh::{RaySlabs, traverse};
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
-use crate::triangle::TriangleRay;
-pub(crate) use surface::Surface;
+use crate::simd::{Level, Simd, dispatch};
+use crate::triangle::ShearedRay;
+use walk::{FilterRay, walk};
 
 /// o + t d in eye space; d need not be a unit vector.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +38,6 @@ pub(crate) struct PrimitiveId {
 pub(crate) struct Hit {
     pub t: f64,
     pub primitive: PrimitiveId,
-    /// Barycentric weights of the second and third corner, for triangles.
-    pub uv: (f64, f64),
     /// Of two hits at the same distance the one with the lower rank is seen: item, then position in the source.
     rank: (u32, u32),
 }
@@ -60,7 +59,8 @@ impl Query {
 }
 
 impl PreparedFrame {
-    /// The nearest hit with t > 0.
+    /// The nearest hit with t > 0, for one ray: what tiles are held against.
+    #[cfg(test)]
     pub(crate) fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut best = None;
         let mut limit = f64::INFINITY;
@@ -81,6 +81,34 @@ impl PreparedFrame {
         self.each_hit(query, t_max, visit).is_break()
     }
 
+    /// The hit of one primitive, to the last digit.
+    pub(crate) fn hit_of(
+        &self,
+        ray: &Ray,
+        primitive: PrimitiveId,
+        leaving: Option<PrimitiveId>,
+    ) -> Option<Hit> {
+        let query = Query { ray: *ray, leaving };
+        let PrimitiveId { item, triangle } = primitive;
+        if item >= self.items.first_plane() {
+            let plane = &self.planes[(item - self.items.first_plane()) as usize];
+            let t = plane.intersect(ray.origin, ray.direction).filter(|_| !query.leaves(primitive))?;
+            return Some(Hit::of_item(item, t));
+        }
+        let Item::Model(index) = self.items.get(item) else {
+            return self.item_hit(item, query, &ShearedRay::new(ray.origin, ray.direction));
+        };
+        if query.leaves(primitive) {
+            return None;
+        }
+        let instance = &self.instances[index];
+        let local = instance.to_mesh(ray);
+        let corners = instance.mesh.corners(triangle).map(Vec3::as_dvec3);
+        let t = ShearedRay::new(local.origin, local.direction).intersect(&corners)?;
+        let rank = (item, instance.mesh.source(triangle));
+        Some(Hit { t, primitive, rank })
+    }
+
     /// Offers every hit that may matter to `visit`, which answers with the farthest distance still of interest.
     #[inline(always)]
     fn each_hit(&self, query: Query, t_max: f64, mut visit: impl FnMut(Hit) -> Answer) -> ControlFlow<()> {
@@ -91,13 +119,13 @@ impl PreparedFrame {
         let (lo, hi) = self.nodes[0].bounds();
         let Some(start) = approach(&query.ray, lo, hi) else { return Continue(()) };
         let local = query.ray.from(start);
-        let triangle_ray = TriangleRay::new(local.origin, local.direction);
+        let triangle_ray = ShearedRay::new(query.ray.origin, query.ray.direction);
         traverse(&self.nodes, &local.slabs(), shifted(limit, start), |first, count| {
             for position in first..first + count {
                 let item = self.item_at(position);
                 if let Item::Model(index) = self.items.get(item) {
-                    limit = self.instances[index].each_hit(item, query, limit, &mut visit)?;
-                } else if let Some(hit) = self.item_hit(item, query, &triangle_ray, start) {
+                    limit = self.instances[index].each_hit(self.level, item, query, limit, &mut visit)?;
+                } else if let Some(hit) = self.item_hit(item, query, &triangle_ray) {
                     limit = visit(hit)?.min(limit);
                 }
             }
@@ -108,25 +136,24 @@ impl PreparedFrame {
     fn plane_hits(&self, query: Query) -> impl Iterator<Item = Hit> {
         (self.items.first_plane()..).zip(&self.planes).filter_map(move |(item, plane)| {
             let t = plane.intersect(query.ray.origin, query.ray.direction)?;
-            let hit = Hit::of_item(item, t, (0.0, 0.0));
+            let hit = Hit::of_item(item, t);
             (!query.leaves(hit.primitive)).then_some(hit)
         })
     }
 
-    /// The hit of a sphere or a triangle of the scene file; `triangle_ray` starts at `start`.
-    fn item_hit(&self, item: u32, query: Query, triangle_ray: &TriangleRay, start: f64) -> Option<Hit> {
+    /// The hit of a sphere or a triangle of the scene file.
+    fn item_hit(&self, item: u32, query: Query, triangle_ray: &ShearedRay) -> Option<Hit> {
         let leaves = query.leaves(PrimitiveId { item, triangle: 0 });
         match self.items.get(item) {
             Item::Model(_) => None,
             Item::Sphere(index) => {
                 let t = self.spheres[index].intersect(query.ray.origin, query.ray.direction, leaves)?;
-                Some(Hit::of_item(item, t, (0.0, 0.0)))
+                Some(Hit::of_item(item, t))
             }
             Item::Triangle(_) if leaves => None,
             Item::Triangle(index) => {
-                let triangle = &self.triangles[index];
-                let hit = triangle_ray.intersect_exact(&triangle.rounded, &triangle.corners)?;
-                Some(Hit::of_item(item, hit.t + start, (hit.u, hit.v)))
+                let t = triangle_ray.intersect(&self.triangles[index].corners)?;
+                Some(Hit::of_item(item, t))
             }
         }
     }
@@ -134,31 +161,47 @@ impl PreparedFrame {
 
 impl Instance {
     /// Offers the hits of this model to `visit`. Continues with the farthest distance still of interest.
-    #[inline(always)]
     fn each_hit(
         &self,
+        level: Level,
         item: u32,
+        query: Query,
+        limit: f64,
+        visit: &mut impl FnMut(Hit) -> Answer,
+    ) -> Answer {
+        let ray = self.to_mesh(&query.ray);
+        let (lo, hi) = self.mesh.root_bounds();
+        let Some(start) = approach(&ray, lo, hi).filter(|&start| start <= limit) else {
+            return Continue(limit);
+        };
+        let near = ray.from(start);
+        let filter = FilterRay::new(near.origin, near.direction);
+        let exact = ShearedRay::new(ray.origin, ray.direction);
+        dispatch!(level, simd => self.walk(simd, &filter, &exact, (item, start), query, limit, visit))
+    }
+
+    #[inline(always)]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one call, split off so that it is compiled for each level"
+    )]
+    fn walk<S: Simd>(
+        &self,
+        simd: S,
+        filter: &FilterRay,
+        exact: &ShearedRay,
+        (item, start): (u32, f64),
         query: Query,
         mut limit: f64,
         visit: &mut impl FnMut(Hit) -> Answer,
     ) -> Answer {
-        let mesh = &*self.mesh;
-        let ray = self.to_mesh(&query.ray);
-        let (lo, hi) = mesh.root_bounds();
-        let Some(start) = approach(&ray, lo, hi).filter(|&start| start <= limit) else {
-            return Continue(limit);
-        };
-        let local = ray.from(start);
-        let triangle_ray = TriangleRay::new(local.origin, local.direction);
-        let corners = mesh.all_corners();
-        traverse(mesh.nodes(), &local.slabs(), shifted(limit, start), |first, count| {
-            for triangle in first..first + count {
-                let Some(hit) = triangle_ray.intersect(&corners[triangle as usize]) else { continue };
-                let primitive = PrimitiveId { item, triangle };
-                if !query.leaves(primitive) {
-                    let rank = (item, mesh.source(triangle));
-                    limit = visit(Hit { t: hit.t + start, primitive, uv: (hit.u, hit.v), rank })?.min(limit);
-                }
+        walk(simd, &self.mesh, filter, shifted(limit, start), |triangle| {
+            let primitive = PrimitiveId { item, triangle };
+            if !query.leaves(primitive)
+                && let Some(t) = exact.intersect(&self.mesh.corners(triangle).map(Vec3::as_dvec3))
+            {
+                let rank = (item, self.mesh.source(triangle));
+                limit = visit(Hit { t, primitive, rank })?.min(limit);
             }
             Continue(shifted(limit, start))
         })?;
@@ -174,11 +217,11 @@ impl Instance {
 }
 
 impl Hit {
-    fn of_item(item: u32, t: f64, uv: (f64, f64)) -> Self {
-        Self { t, primitive: PrimitiveId { item, triangle: 0 }, uv, rank: (item, 0) }
+    fn of_item(item: u32, t: f64) -> Self {
+        Self { t, primitive: PrimitiveId { item, triangle: 0 }, rank: (item, 0) }
     }
 
-    fn wins_over(&self, other: &Hit) -> bool {
+    pub(crate) fn wins_over(&self, other: &Hit) -> bool {
         self.t < other.t || (self.t == other.t && self.rank < other.rank)
     }
 }

@@ -92,6 +92,33 @@ pub(crate) fn torus(around: u32, across: u32) -> Mesh {
             [[a, b, c], [a, c, d]]
         })
         .collect();
+    mesh_of(positions, triangles)
+}
+
+/// A ball of the given number of rings and sectors: closed and convex.
+pub(crate) fn ball(rings: u32, sectors: u32) -> Mesh {
+    let mut positions = vec![DVec3::Y, DVec3::NEG_Y];
+    for (ring, sector) in (1..rings).flat_map(|ring| (0..sectors).map(move |sector| (ring, sector))) {
+        let polar = std::f64::consts::PI * f64::from(ring) / f64::from(rings);
+        let around = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors);
+        let (s, c) = (libm::sin(polar), libm::cos(polar));
+        positions.push(DVec3::new(s * libm::cos(around), c, s * libm::sin(around)));
+    }
+    let at = |ring: u32, sector: u32| 2 + (ring - 1) * sectors + sector % sectors;
+    let mut triangles = Vec::new();
+    for sector in 0..sectors {
+        triangles.push([0, at(1, sector + 1), at(1, sector)]);
+        triangles.push([1, at(rings - 1, sector), at(rings - 1, sector + 1)]);
+        for ring in 1..rings - 1 {
+            let (a, b) = (at(ring, sector), at(ring, sector + 1));
+            triangles.push([a, b, at(ring + 1, sector + 1)]);
+            triangles.push([a, at(ring + 1, sector + 1), at(ring + 1, sector)]);
+        }
+    }
+    mesh_of(positions, triangles)
+}
+
+fn mesh_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = (0..triangles.len()).map(|i| (i / 40 % 2) as u16).collect();
     let slot = |name: &str| NamedMaterial { name: name.into(), material: Material::NEUTRAL };
     Mesh { positions, triangles, triangle_materials, materials: vec![slot("a"), slot("b")], normals: vec![] }

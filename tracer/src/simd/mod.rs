@@ -1,0 +1,154 @@
+//! The lane vocabulary: sixteen lanes at a time, on whatever the machine has.
+//!
+//! Algorithms are written once, generic over the level `S`, and compiled for each: AVX-512 does sixteen lanes in one
+//! register, AVX2 in two, SSE and NEON in four, the portable level one by one. The level is chosen once, at run time.
+//!
+//! Two kinds of arithmetic, never mixed up:
+//! - *Filters* decide what is certain and leave the rest to exact code. They may use [`fma`], which is fused on some
+//!   levels and not on others: it never changes a decision, only how often the exact code is asked.
+//! - *Values* that reach a pixel use plain operations only (+, -, *, /, sqrt), which IEEE 754 fixes to the last bit.
+
+pub(crate) mod math;
+pub(crate) mod vector;
+
+use std::sync::LazyLock;
+
+pub(crate) use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
+
+/// Lanes of every vector here.
+pub(crate) const LANES: usize = 16;
+
+/// Sixteen numbers in memory, aligned for a full-width load.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct Lanes(pub(crate) [f32; LANES]);
+
+impl Lanes {
+    pub(crate) const ZERO: Lanes = Lanes([0.0; LANES]);
+
+    #[inline(always)]
+    pub(crate) fn load<S: Simd>(&self, simd: S) -> f32x16<S> {
+        f32x16::load_array_ref(simd, &self.0)
+    }
+
+    #[inline(always)]
+    pub(crate) fn store<S: Simd>(&mut self, value: f32x16<S>) {
+        value.store_array(&mut self.0);
+    }
+}
+
+/// a * b + c, rounded once or twice: for filters only.
+#[inline(always)]
+pub(crate) fn fma<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> f32x16<S> {
+    a.mul_add(b, c)
+}
+
+#[inline(always)]
+pub(crate) fn splat<S: Simd>(simd: S, value: f32) -> f32x16<S> {
+    f32x16::splat(simd, value)
+}
+
+/// `a` where the mask is set, else `b`.
+#[inline(always)]
+pub(crate) fn select<S: Simd>(mask: mask32x16<S>, a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+    mask.select(a, b)
+}
+
+/// The mask of these bits.
+#[inline(always)]
+pub(crate) fn mask_of<S: Simd>(simd: S, bits: u32) -> mask32x16<S> {
+    mask32x16::from_bitmask(simd, u64::from(bits))
+}
+
+/// One bit a lane.
+#[inline(always)]
+pub(crate) fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
+    mask.to_bitmask() as u32
+}
+
+/// Goes through the bits that are set, lowest first.
+#[inline(always)]
+pub(crate) fn each_bit(bits: u32) -> Bits {
+    Bits(bits)
+}
+
+/// See [`each_bit`].
+pub(crate) struct Bits(u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let next = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some(next)
+    }
+}
+
+/// `three!(i => f(i))` is `[f(0), f(1), f(2)]`. A closure would do the same, but code in closures is not compiled for the
+/// level: whatever touches vectors must be inlined, always, up to the dispatch.
+macro_rules! three {
+    ($i:ident => $value:expr) => {
+        [
+            {
+                let $i = 0_usize;
+                $value
+            },
+            {
+                let $i = 1_usize;
+                $value
+            },
+            {
+                let $i = 2_usize;
+                $value
+            },
+        ]
+    };
+}
+pub(crate) use three;
+
+/// The best level of this machine.
+pub(crate) fn best() -> Level {
+    static BEST: LazyLock<Level> = LazyLock::new(Level::new);
+    *BEST
+}
+
+/// Its name, as workers report it.
+pub fn best_name() -> &'static str {
+    name(best())
+}
+
+pub(crate) fn name(level: Level) -> &'static str {
+    dispatch!(level, simd => name_of(simd))
+}
+
+fn name_of<S: Simd>(_: S) -> &'static str {
+    let full = std::any::type_name::<S>();
+    match full.rsplit("::").next() {
+        Some("Avx512") => "AVX-512",
+        Some("Avx2") => "AVX2",
+        Some("Sse4_2") => "SSE4.2",
+        Some("Sse2") => "SSE2",
+        Some("Neon") => "NEON",
+        _ => "portable",
+    }
+}
+
+/// All levels that this machine has, the portable one last: tests hold them against each other.
+#[cfg(test)]
+pub(crate) fn all() -> Vec<Level> {
+    let mut levels = vec![best()];
+    #[cfg(target_arch = "x86_64")]
+    {
+        let best = best();
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(best.as_sse2().map(Level::Sse2));
+    }
+    levels.push(Level::baseline());
+    levels
+}

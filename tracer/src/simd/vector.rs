@@ -1,0 +1,92 @@
+//! Three-vectors of sixteen lanes, made of plain operations.
+
+use fearless_simd::{Simd, SimdBase, SimdFloat, f32x16};
+
+use super::{Lanes, splat, three};
+
+/// a b - c d with both roundings made up for (Kahan).
+#[inline(always)]
+fn difference<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>, d: f32x16<S>) -> f32x16<S> {
+    let cd = c * d;
+    let error = (-c).mul_add_precise(d, cd);
+    a.mul_add_precise(b, -cd) + error
+}
+
+/// x, y and z.
+#[derive(Clone, Copy)]
+pub(crate) struct Vec3x16<S: Simd>(pub(crate) [f32x16<S>; 3]);
+
+impl<S: Simd> Vec3x16<S> {
+    #[inline(always)]
+    pub(crate) fn splat(simd: S, value: [f32; 3]) -> Self {
+        Self(three!(i => splat(simd, value[i])))
+    }
+
+    #[inline(always)]
+    pub(crate) fn load(simd: S, lanes: &[Lanes; 3]) -> Self {
+        Self([lanes[0].load(simd), lanes[1].load(simd), lanes[2].load(simd)])
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self, lanes: &mut [Lanes; 3]) {
+        for (lanes, component) in lanes.iter_mut().zip(self.0) {
+            lanes.store(component);
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(self, other: Self) -> Self {
+        Self(three!(i => self.0[i] + other.0[i]))
+    }
+
+    #[inline(always)]
+    pub(crate) fn sub(self, other: Self) -> Self {
+        Self(three!(i => self.0[i] - other.0[i]))
+    }
+
+    #[inline(always)]
+    pub(crate) fn mul(self, other: Self) -> Self {
+        Self(three!(i => self.0[i] * other.0[i]))
+    }
+
+    #[inline(always)]
+    pub(crate) fn scale(self, factor: f32x16<S>) -> Self {
+        Self(three!(i => self.0[i] * factor))
+    }
+
+    #[inline(always)]
+    pub(crate) fn dot(self, other: Self) -> f32x16<S> {
+        let Self([x, y, z]) = self.mul(other);
+        x + y + z
+    }
+
+    /// Slivers keep their normals.
+    #[inline(always)]
+    pub(crate) fn cross(self, other: Self) -> Self {
+        let ([ax, ay, az], [bx, by, bz]) = (self.0, other.0);
+        Self([difference(ay, bz, az, by), difference(az, bx, ax, bz), difference(ax, by, ay, bx)])
+    }
+
+    /// Largest component in magnitude.
+    #[inline(always)]
+    pub(crate) fn size(self) -> f32x16<S> {
+        let [x, y, z] = self.0;
+        x.abs().max(y.abs()).max(z.abs())
+    }
+
+    /// Unit length; NaN for vectors of no length.
+    #[inline(always)]
+    pub(crate) fn normalize(self, simd: S) -> Self {
+        // First by the largest component: squares of small numbers would vanish.
+        let near_one = self.scale(splat(simd, 1.0) / self.size());
+        near_one.scale(splat(simd, 1.0) / near_one.dot(near_one).sqrt())
+    }
+
+    /// A matrix, given by its columns, times this.
+    #[inline(always)]
+    pub(crate) fn transform(self, simd: S, columns: &[[f32; 3]; 3]) -> Self {
+        let [x, y, z] = self.0;
+        let columns = three!(i => Self::splat(simd, columns[i]));
+        columns[0].scale(x).add(columns[1].scale(y)).add(columns[2].scale(z))
+    }
+}
