@@ -52,7 +52,7 @@ fn mistakes_in_a_scene_are_named_with_line_and_remedy() {
 #[test]
 fn a_mesh_with_a_nan_a_bad_index_or_nothing_in_it_is_named_with_its_line() {
     for (mesh, words) in [
-        ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", &["bumps.obj:2", "nan"][..]),
+        ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", &["bumps.obj:2", "not finite"][..]),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", &["bumps.obj:4", "9"]),
         ("# nothing\n", &["bumps.obj"]),
         ("\0\u{1}\u{2}garbage", &["bumps.obj"]),
@@ -120,9 +120,10 @@ fn strangers_at_the_port_do_not_disturb_the_run() {
     wait_until("a frame is written", || scenes.path("f-000.ppm").exists());
 
     let hello = |version: u16| {
-        let mut bytes = b"RAYFARM\0".to_vec();
+        // Magic, version, role (2: a worker), nothing.
+        let mut bytes = b"RAYFARM\n".to_vec();
         bytes.extend(version.to_le_bytes());
-        bytes.extend([0; 6]);
+        bytes.extend([2, 0]);
         bytes
     };
     let mut huge = hello(1);
@@ -152,7 +153,7 @@ fn a_worker_names_a_master_that_is_none() {
     });
     let mut command = worker();
     command.args(["--master", &format!("127.0.0.1:{port}"), "--no-reconnect"]);
-    Running::start(&mut command).finish().expect_failure(1, &["127.0.0.1", "not a rayfarm"]);
+    Running::start(&mut command).finish().expect_failure(1, &["127.0.0.1", "no rayfarm master"]);
     web_server.join().unwrap();
     let mut wrong = worker();
     wrong.args(["--master", "no port here"]);

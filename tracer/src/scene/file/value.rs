@@ -42,7 +42,11 @@ impl<'t> Value<'t> {
 
     /// A feature of the format that is not built yet.
     pub(super) fn not_yet(&self, what: &str, instead: &str) -> Fault {
-        self.fault(format!("{what} ({self}) is not supported yet; {instead}"))
+        let given = match self.value.get_ref() {
+            DeValue::String(word) => format!(" = \"{word}\""),
+            _ => String::new(),
+        };
+        self.fault(format!("{what} ({self}{given}) is not supported yet; {instead}"))
     }
 
     pub(super) fn table(&self) -> bool {
