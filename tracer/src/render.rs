@@ -117,11 +117,7 @@ fn render_tile<S: Simd>(
 ) {
     let grid = frame.rays.grid();
     let corner = (pixels.left * grid, pixels.top * grid);
-    let lens = frame.rays.lens(
-        f64::from(pixels.left) + SIDE as f64 / 2.0 / f64::from(grid),
-        f64::from(pixels.top) + SIDE as f64 / 2.0 / f64::from(grid),
-    );
-    let tile = EyeTile { frame, rays, lens, live: live_lanes(grid, pixels), corner };
+    let tile = EyeTile::new(frame, rays, live_lanes(grid, pixels), corner);
     counts.primary += tile.live.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
     let visible = tile.visible(simd);
     let colors = shade::shade(simd, &tile, &visible, counts);
@@ -136,6 +132,9 @@ fn render_tile<S: Simd>(
 fn live_lanes(grid: u32, pixels: &Pixels) -> [u32; BLOCKS] {
     let columns = (pixels.right - pixels.left) * grid;
     let rows = (pixels.rows.start - pixels.top) * grid..(pixels.rows.end - pixels.top) * grid;
+    if columns as usize == SIDE && rows == (0..SIDE as u32) {
+        return [0xffff; BLOCKS];
+    }
     std::array::from_fn(|block| {
         (0..LANES).fold(0, |bits, lane| {
             let (column, row) = place(block, lane);

@@ -17,11 +17,10 @@ use crate::frame::PreparedFrame;
 use crate::light::{Emitter, EyeLight, JUST_BEFORE};
 use crate::render::RayCounts;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Lanes, Simd, SimdBase, bits, each_bit, mask_of, select, splat, three};
+use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat, three};
 use crate::tile::BLOCKS;
-use crate::tile::shadow::ShadowTile;
+use crate::tile::shadow::{ShadowTile, Source};
 use crate::tile::visible::{EyeTile, Visible};
-use crate::trace::{PrimitiveId, Ray};
 use material::Materials;
 use surface::Surfaces;
 
@@ -154,24 +153,12 @@ fn dark<S: Simd>(
     points: &[[Lanes; BLOCKS]; 3],
     lit: [u32; BLOCKS],
 ) -> [u32; BLOCKS] {
-    match light.emitter {
+    let (light, t_light) = match light.emitter {
         Emitter::Point { position } | Emitter::Spot { position, .. } => {
-            let (item, triangle) = (&visible.item, &visible.triangle);
-            let tile = ShadowTile { frame, light: position, t_light: JUST_BEFORE, points, item, triangle };
-            tile.dark(simd, lit)
+            (Source::Point(position), JUST_BEFORE)
         }
-        Emitter::Directional { to_light } => {
-            let mut dark = [0; BLOCKS];
-            for block in 0..BLOCKS {
-                for lane in each_bit(lit[block]) {
-                    let origin = glam::Vec3::from_array([0, 1, 2].map(|axis| points[axis][block].0[lane]));
-                    let ray = Ray { origin: origin.as_dvec3(), direction: to_light };
-                    let item = visible.item[block][lane];
-                    let leaving = PrimitiveId { item, triangle: visible.triangle[block][lane] };
-                    dark[block] |= u32::from(frame.occluded(&ray, f64::INFINITY, leaving)) << lane;
-                }
-            }
-            dark
-        }
-    }
+        Emitter::Directional { to_light } => (Source::Parallel(to_light), f64::INFINITY),
+    };
+    let (item, triangle) = (&visible.item, &visible.triangle);
+    ShadowTile { frame, light, t_light, points, item, triangle }.dark(simd, lit)
 }

@@ -289,7 +289,7 @@ struct Space {
 
 impl Space {
     fn of_eye(tile: &EyeTile<'_>) -> Self {
-        let directions = tile.steps().map(|step| step.as_vec3().to_array());
+        let directions = tile.steps.map(|step| step.as_vec3().to_array());
         let normals = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| axis.to_array());
         Self { origin: [0.0; 3], directions, normals, reach: 0.0 }
     }
@@ -300,7 +300,7 @@ impl Space {
         let size = instance.normals.to_cols_array().into_iter().fold(0.0, |size: f64, n| size.max(n.abs()));
         Self {
             origin: single(instance.inverse * -instance.translation),
-            directions: tile.steps().map(|step| single(instance.inverse * step)),
+            directions: tile.steps.map(|step| single(instance.inverse * step)),
             normals: [0, 1, 2].map(|i| single(instance.normals.col(i) / size)),
             reach: instance.translation.abs().max_element() as f32,
         }

@@ -13,7 +13,7 @@ pub(crate) mod vector;
 
 use std::sync::LazyLock;
 
-pub(crate) use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
+pub(crate) use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
 /// Lanes of every vector here.
 pub(crate) const LANES: usize = 16;
@@ -64,6 +64,12 @@ pub(crate) fn mask_of<S: Simd>(simd: S, bits: u32) -> mask32x16<S> {
 #[inline(always)]
 pub(crate) fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
     mask.to_bitmask() as u32
+}
+
+/// Bits of the lanes that hold a number.
+#[inline(always)]
+pub(crate) fn equal<S: Simd>(simd: S, lanes: &[u32; LANES], number: u32) -> u32 {
+    bits(u32x16::load_array_ref(simd, lanes).simd_eq(u32x16::splat(simd, number)))
 }
 
 /// Goes through the bits that are set, lowest first.

@@ -1,15 +1,15 @@
 //! The triangles of a mesh against the rays of a tile, whatever is asked of them.
 
 use super::Rays;
-use super::lens::{Frustum, Lens};
-use super::setup::{Flat, Flats, blocks_touched, flat_exact, through};
-use super::walk::Walk;
+use super::lens::Lens;
+use super::setup::{Flat, Flats, flat_exact, through};
+use super::walk::{Interest, Walk};
 use crate::bvh::WIDTH;
 use crate::mesh::CompiledMesh;
 use crate::simd::{Simd, each_bit};
 
 /// What a tile asks of triangles.
-pub(super) trait Question<S: Simd> {
+pub(super) trait Question<S: Simd>: Interest<S> {
     /// Whether rays stand on a grid with step 1, so that triangles between them can be left out.
     const ON_GRID: bool;
 
@@ -35,9 +35,9 @@ pub(super) fn cover_mesh<S: Simd, Q: Question<S>>(
     rays: &Rays,
     question: &mut Q,
 ) {
-    let mut walk = Walk::new(mesh, Frustum::new(lens, rays.union));
+    let mut walk = Walk::new(mesh, lens, rays.union);
     let mut flats = Flats::EMPTY;
-    while let Some(index) = walk.next(simd, question.least_closeness()) {
+    while let Some(index) = walk.next(simd, question, question.least_closeness()) {
         let block = &mesh.blocks()[index as usize];
         if Q::ON_GRID {
             flats.set_up::<S, true>(simd, block, lens, rays, question.least_closeness());
@@ -48,7 +48,7 @@ pub(super) fn cover_mesh<S: Simd, Q: Question<S>>(
             cover_flat(simd, &flats.get(lane), index * WIDTH as u32 + lane as u32, rays, question);
         }
         for lane in each_bit(flats.crossing) {
-            if let Some(flat) = flat_exact(through(lens, block.corners(lane)), rays) {
+            if let Some(flat) = flat_exact(lens.parallel, through(lens, block.corners(lane)), rays) {
                 cover_flat(simd, &flat, index * WIDTH as u32 + lane as u32, rays, question);
             }
         }
@@ -65,7 +65,7 @@ pub(super) fn cover_flat<S: Simd, Q: Question<S>>(
     rays: &Rays,
     question: &mut Q,
 ) {
-    let blocks = blocks_touched(simd, flat, rays) & question.open_blocks(simd, flat.z_most);
+    let blocks = flat.blocks_touched(simd, rays) & question.open_blocks(simd, flat.z_most);
     for block in each_bit(blocks) {
         question.cover(simd, flat, triangle, block);
     }

@@ -28,7 +28,7 @@ pub(crate) mod shadow;
 pub(crate) mod visible;
 mod walk;
 
-use crate::simd::{LANES, Lanes};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, splat};
 
 pub(crate) use lens::Lens;
 
@@ -100,6 +100,35 @@ impl Rays {
                 }
             }
         }
+    }
+
+    /// Blocks with a ray that may stand in a rectangle.
+    #[inline(always)]
+    pub(crate) fn blocks_in<S: Simd>(&self, simd: S, [x_from, x_to, y_from, y_to]: [f32; 4]) -> u32 {
+        let [x_lo, x_hi, y_lo, y_hi] = &self.bounds;
+        bits(
+            x_lo.load(simd).simd_le(splat(simd, x_to))
+                & x_hi.load(simd).simd_ge(splat(simd, x_from))
+                & y_lo.load(simd).simd_le(splat(simd, y_to))
+                & y_hi.load(simd).simd_ge(splat(simd, y_from)),
+        )
+    }
+
+    /// Rays of a block that stand in a rectangle. Their own error must have been added to it.
+    #[inline(always)]
+    pub(crate) fn rays_in<S: Simd>(
+        &self,
+        simd: S,
+        block: usize,
+        [x_from, x_to, y_from, y_to]: [f32; 4],
+    ) -> u32 {
+        let (x, y) = (self.x[block].load(simd), self.y[block].load(simd));
+        bits(
+            x.simd_le(splat(simd, x_to))
+                & x.simd_ge(splat(simd, x_from))
+                & y.simd_le(splat(simd, y_to))
+                & y.simd_ge(splat(simd, y_from)),
+        )
     }
 
     /// Largest coordinate of any ray that counts.

@@ -96,25 +96,33 @@ impl Flats {
         let g_error = splat(simd, 8.0 * lens.error[1]);
         let g_least = g[0].min(g[1]).min(g[2]);
         let g_most = g[0].max(g[1]).max(g[2]);
-        let before = bits(g_least.simd_gt(g_error));
-        // Lanes without a triangle are NaN, and fail both comparisons.
-        self.crossing = bits(g_least.simd_le(g_error) & g_most.simd_ge(-g_error));
+        // Lanes without a triangle are NaN, and fail all comparisons.
+        let (before, crossing) = if lens.parallel {
+            (bits(g_least.simd_le(g_most)), 0)
+        } else {
+            (bits(g_least.simd_gt(g_error)), bits(g_least.simd_le(g_error) & g_most.simd_ge(-g_error)))
+        };
+        self.crossing = crossing;
 
         let one = splat(simd, 1.0);
-        let z = three!(k => one / g[k]);
-        let x = three!(k => row(simd, lens.rows[0], &block.0[k]) * z[k]);
-        let y = three!(k => row(simd, lens.rows[1], &block.0[k]) * z[k]);
+        let scale = three!(k => if lens.parallel { one } else { one / g[k] });
+        let z = three!(k => if lens.parallel { -g[k] } else { scale[k] });
+        let x = three!(k => row(simd, lens.rows[0], &block.0[k]) * scale[k]);
+        let y = three!(k => row(simd, lens.rows[1], &block.0[k]) * scale[k]);
+        let scale = scale[0].max(scale[1]).max(scale[2]);
         let z_most = z[0].max(z[1]).max(z[2]);
         let (x_lo, x_hi) = (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]));
         let (y_lo, y_hi) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
         // How far a corner may be off in the picture.
         let far = x_lo.abs().max(x_hi.abs()).max(y_lo.abs()).max(y_hi.abs());
-        let off = (splat(simd, lens.error[0]) + far * splat(simd, lens.error[1])) * z_most
-            + far * splat(simd, ROUNDING);
+        let g_off = if lens.parallel { zero } else { splat(simd, lens.error[1]) };
+        let off = (splat(simd, lens.error[0]) + far * g_off) * scale + far * splat(simd, ROUNDING);
         let margin = off + splat(simd, rays.error);
         let (x_lo, x_hi, y_lo, y_hi) = (x_lo - margin, x_hi + margin, y_lo - margin, y_hi + margin);
-        let z_most =
-            z_most * splat(simd, 1.0 + 8.0 * ROUNDING) + z_most * z_most * splat(simd, 2.0 * lens.error[1]);
+        // d(1 / g) = dg / g^2.
+        let z_rounding =
+            scale * scale * splat(simd, 2.0 * lens.error[1]) + z_most.abs() * splat(simd, 8.0 * ROUNDING);
+        let z_most = z_most + z_rounding;
         let mut inside = x_lo.simd_le(splat(simd, rays.union[1]))
             & x_hi.simd_ge(splat(simd, rays.union[0]))
             & y_lo.simd_le(splat(simd, rays.union[3]))
@@ -157,8 +165,6 @@ impl Flats {
         let extent = (x_hi - x_lo) + (y_hi - y_lo);
         let distance = x[0].abs() + y[0].abs() + local;
         let by_place = steep * fma(distance, near_zero, margin * splat(simd, 4.0));
-        let z_rounding =
-            z_most * z_most * splat(simd, 2.0 * lens.error[1]) + z_most * splat(simd, 8.0 * ROUNDING);
         let by_slope = extent * extent * (steep * margin + z_rounding) * inverse.abs() * splat(simd, 4.0);
         let z_error = by_place + z_rounding + by_slope;
         self.z[0].store(z[0] - fma(zx, x[0], zy * y[0]));
@@ -188,8 +194,10 @@ fn line<S: Simd>(simd: S, flat: &Flat, edge: usize, x: f32x16<S>, y: f32x16<S>) 
 
 /// The long way for a triangle that reaches behind the lens, or has more digits than a mesh: in `f64`, with lines from
 /// the cross products of (a, b, g), which need no division. `None` if it has no area in the picture, or lies beside it.
-pub(super) fn flat_exact(corners: [DVec3; 3], rays: &Rays) -> Option<Flat> {
-    let [a, b, c] = corners;
+pub(super) fn flat_exact(parallel: bool, corners: [DVec3; 3], rays: &Rays) -> Option<Flat> {
+    // z g at the corners, with g = 1 for parallel rays.
+    let closeness = corners.map(|corner| if parallel { -corner.z } else { 1.0 });
+    let [a, b, c] = corners.map(|corner| if parallel { corner.with_z(1.0) } else { corner });
     let normals = [b.cross(c), c.cross(a), a.cross(b)];
     let determinant = a.dot(normals[0]);
     let scale = normals.iter().map(|n| n.abs().max_element()).fold(0.0, f64::max);
@@ -200,7 +208,7 @@ pub(super) fn flat_exact(corners: [DVec3; 3], rays: &Rays) -> Option<Flat> {
     let reach = rays.reach();
     let size = |[e, ex, ey]: [f32; 3]| e.abs() + reach * (ex.abs() + ey.abs());
     let lines = normals.map(|n| n * (determinant.signum() / scale));
-    let z = (normals[0] + normals[1] + normals[2]) / determinant;
+    let z = (normals[0] * closeness[0] + normals[1] * closeness[1] + normals[2] * closeness[2]) / determinant;
     let [zx, zy, z0] = z.as_vec3().to_array();
     let mut flat = Flat {
         e: [0.0; 3],
@@ -232,25 +240,22 @@ pub(super) fn through(lens: &Lens, corners: [Vec3; 3]) -> [DVec3; 3] {
     corners.map(|corner| lens.exact(corner))
 }
 
-/// Which blocks of the tile a triangle may touch.
-#[inline(always)]
-pub(super) fn blocks_touched<S: Simd>(simd: S, flat: &Flat, rays: &Rays) -> u32 {
-    let [x_lo, x_hi, y_lo, y_hi] = &rays.bounds;
-    let (x_lo, x_hi) = (x_lo.load(simd), x_hi.load(simd));
-    let (y_lo, y_hi) = (y_lo.load(simd), y_hi.load(simd));
-    let mut touched = x_lo.simd_le(splat(simd, flat.around[1]))
-        & x_hi.simd_ge(splat(simd, flat.around[0]))
-        & y_lo.simd_le(splat(simd, flat.around[3]))
-        & y_hi.simd_ge(splat(simd, flat.around[2]));
-    if flat.large {
-        for edge in 0..3 {
-            let x = if flat.ex[edge] > 0.0 { x_hi } else { x_lo };
-            let y = if flat.ey[edge] > 0.0 { y_hi } else { y_lo };
-            let most = line(simd, flat, edge, x, y);
-            touched &= most.simd_ge(splat(simd, 0.0));
+impl Flat {
+    /// Which blocks of the tile it may touch.
+    #[inline(always)]
+    pub(super) fn blocks_touched<S: Simd>(&self, simd: S, rays: &Rays) -> u32 {
+        let mut touched = rays.blocks_in(simd, self.around);
+        if self.large {
+            let [x_lo, x_hi, y_lo, y_hi] = &rays.bounds;
+            for edge in 0..3 {
+                let x = if self.ex[edge] > 0.0 { x_hi } else { x_lo };
+                let y = if self.ey[edge] > 0.0 { y_hi } else { y_lo };
+                let most = line(simd, self, edge, x.load(simd), y.load(simd));
+                touched &= bits(most.simd_ge(splat(simd, 0.0)));
+            }
         }
+        touched
     }
-    bits(touched)
 }
 
 /// The lines and the closeness of a triangle at the rays of a block.

@@ -1,6 +1,7 @@
-//! What lies between a point light and each point of a tile.
+//! What lies between a light and each point of a tile.
 //!
-//! Rays from the light to the points start in one point again: they are a tile with an uneven grid. A point is dark as
+//! Rays from a point light to the points start in one point again: they are a tile with an uneven grid. So are the
+//! parallel rays of a directional light, which start in one point infinitely far away. A point is dark as
 //! soon as one triangle is certain to be before it.
 
 use glam::{DMat3, DVec3, Vec3};
@@ -9,21 +10,34 @@ use super::cover::{Question, cover_flat, cover_mesh};
 use super::lens::{Frustum, Lens, ROUNDING};
 use super::setup::{At, Flat, at, flat_exact};
 use super::visible::depth_in_sight;
+use super::walk::Interest;
 use super::{BLOCKS, Rays};
 use crate::bvh::Child;
 use crate::compile::Item;
 use crate::frame::PreparedFrame;
-use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, each_bit, splat, three};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, each_bit, equal, splat, three};
 use crate::trace::{PrimitiveId, Ray};
 
 /// Points farther from the axis of the light's picture than this are asked one by one.
 const WIDEST: f32 = 8.0;
 
+/// Boxes that touch no more blocks than this are held against single rays.
+const FEW: u32 = 4;
+
+/// Where shadow rays go.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Source {
+    /// To a point.
+    Point(DVec3),
+    /// Along this direction.
+    Parallel(DVec3),
+}
+
 /// Points of a tile, and the light that they are asked about.
 pub(crate) struct ShadowTile<'a> {
     pub frame: &'a PreparedFrame,
     /// The light, in eye space.
-    pub light: DVec3,
+    pub light: Source,
     /// Share of the way to the light on which things are in its way.
     pub t_light: f64,
     /// Points in eye space, indexed `[axis][block]`.
@@ -59,7 +73,7 @@ impl ShadowTile<'_> {
             let node = &self.frame.nodes[index as usize];
             for side in 0..2 {
                 let Some(depth) = depth_in_sight(&frustum, node.child_bounds(side)) else { continue };
-                if depth * blocked.least_of_all() > 1.0 {
+                if lens.z_most(depth) < blocked.least_of_all() {
                     continue;
                 }
                 match node.child(side) {
@@ -93,23 +107,35 @@ impl ShadowTile<'_> {
                 hi = hi.max(self.point(block, lane));
             }
         }
-        let middle = (lo.as_dvec3() + hi.as_dvec3()) * 0.5 - self.light;
-        let axis = middle.try_normalize()?;
-        let half = (hi - lo).as_dvec3().length() * 0.5;
-        // The ball around the points, seen from the light.
-        if !(middle.length() > half * (1.0 + 1.0 / f64::from(WIDEST))) {
-            return None;
+        let middle = (lo.as_dvec3() + hi.as_dvec3()) * 0.5;
+        let reach = f64::from(lo.abs().max(hi.abs()).max_element());
+        let along = |axis: DVec3| {
+            let (u, v) = axis.any_orthonormal_pair();
+            DMat3::from_cols(u, v, axis).transpose()
+        };
+        match self.light {
+            Source::Parallel(to_light) => {
+                let linear = along(-to_light);
+                Some(Lens::parallel(linear, -(linear * middle), reach))
+            }
+            Source::Point(light) => {
+                let linear = along((middle - light).try_normalize()?);
+                // The ball around the points, seen from the light, must not reach far to its sides.
+                let half = (hi - lo).as_dvec3().length() * 0.5;
+                let sees = (middle - light).length() > half * (1.0 + 1.0 / f64::from(WIDEST));
+                sees.then(|| Lens::new(linear, -(linear * light), reach))
+            }
         }
-        let (u, v) = axis.any_orthonormal_pair();
-        let linear = DMat3::from_cols(u, v, axis).transpose();
-        let reach = lo.abs().max(hi.abs()).max_element();
-        Some(Lens::new(linear, -(linear * self.light), f64::from(reach)))
     }
 
     fn ray(&self, block: usize, lane: usize) -> (Ray, PrimitiveId) {
         let origin = self.point(block, lane).as_dvec3();
         let leaving = PrimitiveId { item: self.item[block][lane], triangle: self.triangle[block][lane] };
-        (Ray { origin, direction: self.light - origin }, leaving)
+        let direction = match self.light {
+            Source::Point(light) => light - origin,
+            Source::Parallel(to_light) => to_light,
+        };
+        (Ray { origin, direction }, leaving)
     }
 }
 
@@ -139,11 +165,13 @@ impl Blocked<'_> {
                 let [x, y, z, c] = lens.rows[i];
                 splat(simd, x) * p[0] + splat(simd, y) * p[1] + splat(simd, z) * p[2] + splat(simd, c)
             });
-            let closeness = splat(simd, 1.0) / g;
-            self.rays.x[block].store(a * closeness);
-            self.rays.y[block].store(b * closeness);
-            let error = closeness * closeness * splat(simd, 2.0 * lens.error[1])
-                + closeness * splat(simd, 4.0 * ROUNDING);
+            let one = splat(simd, 1.0);
+            let scale = if lens.parallel { one } else { one / g };
+            let closeness = if lens.parallel { -g } else { scale };
+            self.rays.x[block].store(a * scale);
+            self.rays.y[block].store(b * scale);
+            let error = scale * scale * splat(simd, 2.0 * lens.error[1])
+                + closeness.abs() * splat(simd, 4.0 * ROUNDING);
             self.low[block].store(closeness - error);
             self.high[block].store(closeness + error);
             for lane in each_bit(self.open[block]) {
@@ -155,7 +183,9 @@ impl Blocked<'_> {
             (0..BLOCKS).filter(|&block| self.open[block] != 0).fold(0, |bits, block| bits | 1 << block);
         self.rays.bound(self.open, blocks);
         let reach = self.rays.reach();
-        self.rays.error = 2.0 * (lens.error[0] + reach * lens.error[1]) / nearest + 4.0 * ROUNDING * reach;
+        let by_lens =
+            if lens.parallel { lens.error[0] } else { (lens.error[0] + reach * lens.error[1]) / nearest };
+        self.rays.error = 2.0 * by_lens + 4.0 * ROUNDING * reach;
         for side in 0..4 {
             let out = if side % 2 == 0 { -self.rays.error } else { self.rays.error };
             self.rays.union[side] += out;
@@ -178,7 +208,7 @@ impl Blocked<'_> {
             }
             Item::Triangle(index) => {
                 let corners = self.tile.frame.triangles[index].corners.map(|p| lens.exact_point(p));
-                if let Some(flat) = flat_exact(corners, rays) {
+                if let Some(flat) = flat_exact(lens.parallel, corners, rays) {
                     cover_flat(simd, &flat, 0, rays, self);
                 }
             }
@@ -228,11 +258,35 @@ impl Blocked<'_> {
 
     /// Points of a block that do not lie on this very triangle.
     #[inline(always)]
-    fn others(&self, block: usize, triangle: u32) -> u32 {
-        let (items, triangles) = (&self.tile.item[block], &self.tile.triangle[block]);
-        (0..LANES).fold(0, |bits, lane| {
-            bits | u32::from(items[lane] != self.item || triangles[lane] != triangle) << lane
-        })
+    fn others<S: Simd>(&self, simd: S, block: usize, triangle: u32) -> u32 {
+        let own_item = equal(simd, &self.tile.item[block], self.item);
+        !(own_item & equal(simd, &self.tile.triangle[block], triangle))
+    }
+
+    /// Blocks with an open point at most as close to the light as `z_most`.
+    #[inline(always)]
+    fn open_blocks<S: Simd>(&self, simd: S, z_most: f32) -> u32 {
+        bits(self.least.load(simd).simd_le(splat(simd, z_most)))
+    }
+}
+
+impl<S: Simd> Interest<S> for Blocked<'_> {
+    #[inline(always)]
+    fn wants(&self, simd: S, around: [f32; 4], z_most: f32) -> bool {
+        let error = self.rays.error;
+        let around = [around[0] - error, around[1] + error, around[2] - error, around[3] + error];
+        let blocks = self.rays.blocks_in(simd, around) & self.open_blocks(simd, z_most);
+        if blocks.count_ones() > FEW {
+            return true;
+        }
+        // A small box: it may well stand between the rays.
+        for block in each_bit(blocks) {
+            let before = bits(self.low[block].load(simd).simd_le(splat(simd, z_most)));
+            if self.rays.rays_in(simd, block, around) & self.open[block] & before != 0 {
+                return true;
+            }
+        }
+        false
     }
 }
 
@@ -245,7 +299,7 @@ impl<S: Simd> Question<S> for Blocked<'_> {
 
     #[inline(always)]
     fn open_blocks(&self, simd: S, z_most: f32) -> u32 {
-        bits(self.least.load(simd).simd_le(splat(simd, z_most)))
+        self.open_blocks(simd, z_most)
     }
 
     #[inline(always)]
@@ -261,7 +315,7 @@ impl<S: Simd> Question<S> for Blocked<'_> {
         if maybe == 0 {
             return;
         }
-        let maybe = maybe & self.others(block, triangle);
+        let maybe = maybe & self.others(simd, block, triangle);
         let certain = maybe & certain & bits((z - error).simd_gt(self.high[block].load(simd)));
         self.darken(block, certain);
         for lane in each_bit(maybe & !certain) {

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use super::cover::{Question, cover_flat, cover_mesh};
 use super::lens::{Frustum, Lens, ROUNDING};
 use super::setup::{At, Flat, at, flat_exact};
+use super::walk::Interest;
 use super::{BLOCKS, Rays, SIDE};
 use crate::bvh::Child;
 use crate::compile::Item;
@@ -66,9 +67,27 @@ pub(crate) struct EyeTile<'a> {
     pub live: [u32; BLOCKS],
     /// Column and row of sample (0, 0) of the tile.
     pub corner: (u32, u32),
+    /// Direction through the tile's centre, and what a step right and a step down add.
+    pub steps: [DVec3; 3],
+    rounded_steps: [[f32; 3]; 3],
 }
 
-impl EyeTile<'_> {
+impl<'a> EyeTile<'a> {
+    pub(crate) fn new(
+        frame: &'a PreparedFrame,
+        rays: &'a Rays,
+        live: [u32; BLOCKS],
+        corner: (u32, u32),
+    ) -> Self {
+        let half = SIDE as f64 / 2.0;
+        let n = f64::from(frame.rays.grid());
+        let (across, along) = ((f64::from(corner.0) + half) / n, (f64::from(corner.1) + half) / n);
+        let [right, down] = frame.rays.steps();
+        let steps = [frame.rays.through(across, along), right, down];
+        let rounded_steps = steps.map(|step| step.as_vec3().to_array());
+        Self { frame, rays, lens: frame.rays.lens(across, along), live, corner, steps, rounded_steps }
+    }
+
     /// The ray of a lane, exactly.
     pub(crate) fn ray(&self, block: usize, lane: usize) -> Ray {
         let (column, row) = super::place(block, lane);
@@ -76,20 +95,10 @@ impl EyeTile<'_> {
         Ray { origin: DVec3::ZERO, direction }
     }
 
-    /// Direction through the tile's centre, and what a step right and a step down add.
-    pub(crate) fn steps(&self) -> [DVec3; 3] {
-        let [right, down] = self.frame.rays.steps();
-        let half = SIDE as f64 / 2.0;
-        let n = f64::from(self.frame.rays.grid());
-        let (column, row) = (f64::from(self.corner.0) + half, f64::from(self.corner.1) + half);
-        [self.frame.rays.through(column / n, row / n), right, down]
-    }
-
     /// Directions of the rays of a block in eye space, rounded.
     #[inline(always)]
     pub(crate) fn directions<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
-        let steps = self.steps();
-        let [center, right, down] = three!(i => Vec3x16::splat(simd, steps[i].as_vec3().to_array()));
+        let [center, right, down] = three!(i => Vec3x16::splat(simd, self.rounded_steps[i]));
         let (x, y) = (self.rays.x[block].load(simd), self.rays.y[block].load(simd));
         center.add(right.scale(x)).add(down.scale(y))
     }
@@ -103,7 +112,7 @@ impl EyeTile<'_> {
         items.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (depth, item) in items {
             let mut nearest = Nearest { tile: self, item, visible: &mut visible };
-            if depth * nearest_least(&nearest) > 1.0 {
+            if self.lens.z_most(depth) < nearest_least(&nearest) {
                 break;
             }
             match self.frame.items.get(item) {
@@ -114,7 +123,7 @@ impl EyeTile<'_> {
                 }
                 Item::Triangle(index) => {
                     let corners = self.frame.triangles[index].corners.map(|p| self.lens.exact_point(p));
-                    if let Some(flat) = flat_exact(corners, self.rays) {
+                    if let Some(flat) = flat_exact(false, corners, self.rays) {
                         cover_flat(simd, &flat, 0, self.rays, &mut nearest);
                     }
                 }
@@ -168,8 +177,8 @@ pub(super) fn depth_in_sight(frustum: &Frustum, (lo, hi): (Vec3, Vec3)) -> Optio
     };
     let outside = (0..4).any(|side| corner(frustum.planes[side], false) > frustum.error[side]);
     let farthest = corner(frustum.planes[4], true) + frustum.error[4];
-    let nearest = corner(frustum.planes[4], false) - frustum.error[4];
-    (!outside && farthest >= 0.0).then_some(nearest.max(0.0))
+    let behind = !frustum.parallel && farthest < 0.0;
+    (!outside && !behind).then(|| corner(frustum.planes[4], false) - frustum.error[4])
 }
 
 /// Asks for the nearest triangle.
@@ -180,6 +189,12 @@ struct Nearest<'a, 'b> {
 }
 
 impl Nearest<'_, '_> {
+    /// Blocks with a ray that sees nothing closer than `z_most`.
+    #[inline(always)]
+    fn open_blocks<S: Simd>(&self, simd: S, z_most: f32) -> u32 {
+        bits(self.visible.least.load(simd).simd_le(splat(simd, z_most)))
+    }
+
     /// Items without lines in the picture: exactly, ray by ray.
     fn ask_every_ray(&mut self) {
         for block in 0..BLOCKS {
@@ -205,6 +220,17 @@ impl Nearest<'_, '_> {
     }
 }
 
+impl<S: Simd> Interest<S> for Nearest<'_, '_> {
+    #[inline(always)]
+    fn wants(&self, simd: S, around: [f32; 4], z_most: f32) -> bool {
+        let [x_from, x_to, y_from, y_to] = around;
+        // Rays stand at whole numbers and a half.
+        (x_to - 0.5).floor() >= x_from - 0.5
+            && (y_to - 0.5).floor() >= y_from - 0.5
+            && self.tile.rays.blocks_in(simd, around) & self.open_blocks(simd, z_most) != 0
+    }
+}
+
 impl<S: Simd> Question<S> for Nearest<'_, '_> {
     const ON_GRID: bool = true;
 
@@ -214,7 +240,7 @@ impl<S: Simd> Question<S> for Nearest<'_, '_> {
 
     #[inline(always)]
     fn open_blocks(&self, simd: S, z_most: f32) -> u32 {
-        bits(self.visible.least.load(simd).simd_le(splat(simd, z_most)))
+        self.open_blocks(simd, z_most)
     }
 
     #[inline(always)]
