@@ -167,6 +167,27 @@ async fn a_panic_fails_its_frame_once_and_leaves_the_threads_alive() {
 }
 
 #[tokio::test]
+async fn a_frame_that_failed_is_tried_again_when_it_is_announced_again() {
+    let body = scene(1, &[]);
+    let mut master = Master::meet(keep(1, PLENTY).0, &[&body]);
+    master.announce(0, &body, b"panic").await;
+    master.say(ToWorker::Segment(lease(0, 0..8))).await;
+    assert!(master.failure(0).await.contains("is unlucky"));
+    // A lease alone is no new attempt, and the failure has been told.
+    master.say(ToWorker::Segment(lease(0, 0..8))).await;
+    // What the frame shows changes only so that this renderer has better luck.
+    master.announce(0, &body, b"v").await;
+    master.say(ToWorker::Segment(lease(0, 8..16))).await;
+    let (done, bytes) = master.pixels().await;
+    assert_eq!((done, bytes), (lease(0, 8..16), expected(&body, b"v", 8..16).into()));
+    // What failed for good is told again, so that the master need not wait for it.
+    master.announce(1, &body, b"unpreparable").await;
+    assert!(master.failure(1).await.contains("cannot be"));
+    master.announce(1, &body, b"unpreparable").await;
+    assert!(master.failure(1).await.contains("cannot be"));
+}
+
+#[tokio::test]
 async fn a_scene_beyond_the_cache_is_refused_with_the_remedy() {
     let large = [b"mesh".as_slice(), &[0; 3000]].concat();
     let body = scene(1, &[&large]);

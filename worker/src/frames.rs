@@ -54,9 +54,11 @@ impl<F> Frames<F> {
     }
 
     /// Takes a new frame in; `false` when it is stale or known. At most one older frame gives way and is returned.
+    /// A frame that has failed begins anew: the master announces it again when it tries this worker again.
     pub(crate) fn announce(&mut self, announce: FrameAnnounce) -> (bool, Option<FrameId>) {
         let frame = announce.frame;
-        if frame < self.before || self.held.contains_key(&frame) {
+        let known = self.held.get(&frame).is_some_and(|held| !matches!(held.state, State::Failed));
+        if frame < self.before || known {
             return (false, None);
         }
         self.held.insert(frame, Held { announce, state: State::Loading, waiting: Vec::new() });
@@ -98,7 +100,8 @@ impl<F> Frames<F> {
 
     /// A frame is ready: the leases that waited for it.
     pub(crate) fn ready(&mut self, frame: FrameId, ready: F) -> Vec<Lease> {
-        let Some(held) = self.held.get_mut(&frame) else { return Vec::new() };
+        let held = self.held.get_mut(&frame).filter(|held| matches!(held.state, State::Preparing));
+        let Some(held) = held else { return Vec::new() };
         held.state = State::Ready(Arc::new(ready));
         std::mem::take(&mut held.waiting)
     }

@@ -23,8 +23,7 @@ impl Renderer for TracerRenderer {
     type Frame = PreparedFrame;
 
     fn simd(&self) -> String {
-        // One code path so far, compiled for the target's baseline.
-        format!("baseline {}", std::env::consts::ARCH)
+        rayfarm_tracer::simd_level().to_owned()
     }
 
     fn band_rows(&self) -> u32 {
