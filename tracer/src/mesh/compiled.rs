@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::blob::{AlignedBytes, Header, NO_TRIANGLE, Sections, TriangleBlock};
 use super::clean::{CleanMesh, clean};
-use super::{Mesh, MeshError, MeshId, NamedMaterial};
+use super::{MAX_COORDINATE, Mesh, MeshError, MeshId, NamedMaterial};
 use crate::bvh::{self, WIDTH, WideNode, WideTree};
 use crate::scene::Material;
 use crate::simd::Lanes;
@@ -115,8 +115,8 @@ impl CompiledMesh {
         if self.triangles().count() != self.triangle_count() {
             return broken("its blocks do not hold as many triangles as it announces".into());
         }
-        if self.triangles().any(|i| self.corners(i).iter().any(|corner| !(corner.abs().max_element() <= 1.0)))
-        {
+        self.check_placement()?;
+        if self.triangles().any(|i| !self.corners(i).into_iter().all(is_within_one)) {
             return broken("a corner lies outside [-1, 1]".into());
         }
         if let Some(slot) = self.slots().iter().find(|&&slot| slot as usize >= self.materials.len()) {
@@ -126,10 +126,25 @@ impl CompiledMesh {
         if self.indices().iter().flatten().any(|&index| index as usize >= normals.len()) {
             return broken("a triangle names a normal that is not there".into());
         }
-        if normals.iter().any(|normal| !(normal.abs().max_element() <= 1.0)) {
+        if !normals.iter().copied().all(is_within_one) {
             return broken("a normal is longer than 1".into());
         }
         Ok(())
+    }
+
+    /// Bounds and centre come from the same bytes as the rest, and the scene's own tree is built over them.
+    fn check_placement(&self) -> Result<(), MeshError> {
+        let (center, (lo, hi)) = (self.center(), self.bounds());
+        let reach = DVec3::splat(libm::exp2(f64::from(self.exponent())));
+        let inside = center.abs().cmple(DVec3::splat(MAX_COORDINATE)).all()
+            && lo.cmple(hi).all()
+            && (center - lo).cmple(reach).all()
+            && (hi - center).cmple(reach).all();
+        if inside {
+            Ok(())
+        } else {
+            Err(MeshError::Format("its bounds do not fit its centre and scale".into()))
+        }
     }
 
     /// The bytes, as they are stored and sent.
@@ -243,6 +258,11 @@ impl CompiledMesh {
     fn section<T: bytemuck::AnyBitPattern>(&self, start: usize, count: usize) -> &[T] {
         bytemuck::cast_slice(&self.bytes.as_slice()[start..start + count * size_of::<T>()])
     }
+}
+
+/// Component by component: the greatest of several numbers says nothing about those that are NaN.
+fn is_within_one(point: Vec3) -> bool {
+    point.abs().cmple(Vec3::ONE).all()
 }
 
 fn bounds_of_corners([a, b, c]: &[Vec3; 3]) -> (Vec3, Vec3) {

@@ -136,6 +136,27 @@ fn other_formats_and_versions_are_told_apart() {
     assert!(cut.contains("there are 200"), "{cut}");
 }
 
+/// Where the header keeps its centre and its bounds, and a few places behind them in the first block.
+#[test]
+fn numbers_that_lead_a_builder_astray_are_refused() {
+    let (compiled, _) = CompiledMesh::compile(&sheet(4)).unwrap();
+    let (center, lo, hi) = (16, 40, 64);
+    for (at, number) in [(center, 1e90), (center, 5.0), (lo, -1e300), (lo, 9.0), (hi, 1e300), (hi, -9.0)] {
+        let mut bytes = compiled.bytes().to_vec();
+        bytes[at..at + 8].copy_from_slice(&f64::to_le_bytes(number));
+        let error = CompiledMesh::from_bytes(&bytes).unwrap_err().to_string();
+        assert!(error.contains("bounds do not fit"), "{number} at {at}: {error}");
+    }
+    let first_block = 128 + 512 * compiled.nodes().len();
+    for axis in 0..3 {
+        let mut bytes = compiled.bytes().to_vec();
+        let at = first_block + axis * 64;
+        bytes[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
+        let error = CompiledMesh::from_bytes(&bytes).unwrap_err().to_string();
+        assert!(error.contains("outside [-1, 1]"), "axis {axis}: {error}");
+    }
+}
+
 proptest! {
     #[test]
     fn changed_bytes_are_refused_or_still_a_sound_mesh(

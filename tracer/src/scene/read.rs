@@ -56,21 +56,23 @@ fn unreadable(path: &Path, source: io::Error) -> SceneError {
     SceneError::Read { path: path.to_owned(), source }
 }
 
-/// All bytes of a file of at most `limit` bytes.
+/// All bytes of a file of at most `limit` bytes. A larger one is refused before any of it is read.
 pub(super) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, SceneError> {
+    let too_large = || SceneError::in_file(path, format!("the file is larger than {limit} bytes, the limit"));
     let read = || {
         let file = File::open(path)?;
         // Room for all of it at once: a compiled model may have hundreds of megabytes.
-        let announced = file.metadata()?.len().min(limit);
-        let mut bytes = Vec::with_capacity(usize::try_from(announced).unwrap_or_default());
+        let announced = file.metadata()?.len();
+        if announced > limit {
+            return Ok(None);
+        }
+        let mut bytes = Vec::new();
+        bytes.try_reserve_exact(usize::try_from(announced).unwrap_or(usize::MAX))?;
+        // What announces nothing (a pipe) or grows meanwhile is counted as it comes.
         file.take(limit + 1).read_to_end(&mut bytes)?;
-        Ok(bytes)
+        Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= limit))
     };
-    let bytes = read().map_err(|source| unreadable(path, source))?;
-    if bytes.len() as u64 > limit {
-        return Err(SceneError::in_file(path, format!("the file is larger than {limit} bytes, the limit")));
-    }
-    Ok(bytes)
+    read().map_err(|source| unreadable(path, source))?.ok_or_else(too_large)
 }
 
 #[cfg(test)]
