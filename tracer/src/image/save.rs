@@ -71,13 +71,19 @@ impl Temporary {
     fn create_beside(target: &Path) -> io::Result<(Self, File)> {
         // The process and a counter make the name unique, so that no two savings share a temporary file.
         static COUNTER: AtomicU32 = AtomicU32::new(0);
-        let mut name = OsString::from(".");
-        name.push(target.file_name().ok_or(io::ErrorKind::InvalidInput)?);
-        let serial = COUNTER.fetch_add(1, Ordering::Relaxed);
-        name.push(format!(".{}-{serial}.partial", std::process::id()));
-        let path = target.with_file_name(name);
-        let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
-        Ok((Self { path: Some(path) }, file))
+        loop {
+            let mut name = OsString::from(".");
+            name.push(target.file_name().ok_or(io::ErrorKind::InvalidInput)?);
+            let serial = COUNTER.fetch_add(1, Ordering::Relaxed);
+            name.push(format!(".{}-{serial}.partial", std::process::id()));
+            let path = target.with_file_name(name);
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => return Ok((Self { path: Some(path) }, file)),
+                // Left by a process that was killed and had our number: in containers numbers come again soon.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && serial < u32::MAX => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
 
     fn rename_to(mut self, target: &Path) -> io::Result<()> {
@@ -158,6 +164,19 @@ mod tests {
         assert!(save(&good, &empty).is_err(), "PNG has no empty pictures");
         assert_eq!(load(&good).unwrap(), gradient());
         assert_eq!(names_in(folder.path()), ["good.png", "taken.ppm"]);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_behind_is_in_nobodys_way() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ppm");
+        // Other tests of this process may count on meanwhile, so all that may come next is taken.
+        let left: Vec<String> =
+            (0..500).map(|serial| format!(".a.ppm.{}-{serial}.partial", std::process::id())).collect();
+        left.iter().for_each(|name| fs::write(folder.path().join(name), "half").unwrap());
+        save(&path, &gradient()).unwrap();
+        assert_eq!(load(&path).unwrap(), gradient());
+        assert_eq!(names_in(folder.path()).len(), left.len() + 1);
     }
 
     #[test]
