@@ -84,6 +84,8 @@ impl Display {
         mut camera: CameraControl,
         link: &Link,
     ) -> Result<(), String> {
+        // Whatever ends the window ends the farm: who waits for it waits in vain otherwise.
+        let _ended = link.stop.clone().drop_guard();
         let (mut last_step, mut last_draw, mut last_title) = (Instant::now(), None, Instant::now());
         while self.window.is_open() && !link.stop.is_cancelled() {
             let happened = self.controls.look(&mut self.window);
@@ -106,7 +108,6 @@ impl Display {
                 last_title = Instant::now();
             }
         }
-        link.stop.cancel();
         Ok(())
     }
 
