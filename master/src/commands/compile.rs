@@ -18,6 +18,7 @@ use crate::output::check_writable;
 /// A wrong model or output; a full disk.
 pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     check_writable(&args.output)?;
+    refuse_the_model_itself(args)?;
     let started = Instant::now();
     let (mesh, warnings) = scene::load_model(&args.model).map_err(CommandError::wrong_input)?;
     let seconds = started.elapsed().as_secs_f64();
@@ -34,6 +35,19 @@ pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     );
     writeln!(io::stdout().lock(), "{line}")
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
+
+/// Its source would be gone.
+fn refuse_the_model_itself(args: &CompileArgs) -> Result<(), CommandError> {
+    let real = |path: &Path| path.canonicalize().ok();
+    match (real(&args.model), real(&args.output)) {
+        (Some(model), Some(output)) if model == output => Err(CommandError::WrongInput(format!(
+            "{}: is the model itself; give the compiled one another name, as in {}",
+            args.output.display(),
+            args.output.with_extension("rfm").display()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Writes a file under a temporary name beside it and renames it: it is there whole, or as it was before.
@@ -69,6 +83,17 @@ mod tests {
         write_whole(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_model_is_not_overwritten_by_its_own_compiled_form() {
+        let folder = tempfile::tempdir().unwrap();
+        let model = folder.path().join("a.obj");
+        fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let args = CompileArgs { model: model.clone(), output: folder.path().join(".").join("a.obj") };
+        let message = run(&args).unwrap_err().to_string();
+        assert!(message.contains("the model itself") && message.contains("a.rfm"), "{message}");
+        assert!(fs::read_to_string(&model).unwrap().starts_with("v 0 0 0"));
     }
 
     #[test]
