@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use rayfarm_protocol::{FrameId, Lease};
 
-/// Leases taken back that a late answer may still come to; beyond that, the oldest are forgotten.
-const MAX_REVOKED: usize = 64;
+/// Leases taken back that a late answer may still come to; beyond that, the oldest are forgotten. A worker that stands
+/// still for some seconds is granted, and loses, eight a frame until it is noticed, and must be forgiven when it wakes.
+const MAX_REVOKED: usize = 4096;
 
 /// The leases of one session.
 #[derive(Debug, Default)]
@@ -94,7 +95,7 @@ mod tests {
     #[test]
     fn what_was_taken_back_is_forgotten_in_the_end() {
         let mut book = LeaseBook::default();
-        for segment in 0..1000 {
+        for segment in 0..2 * MAX_REVOKED as u32 {
             book.grant(lease(1, segment));
             book.cancel(FrameId(2));
         }
