@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
 use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, ToWorker, codec};
+use rayfarm_tracer::TILE_SIZE;
 use rayfarm_tracer::scene::FrameView;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
@@ -63,7 +64,7 @@ pub(crate) enum AnswerError {
 impl Driver {
     pub(crate) fn new(policy: SegmentPolicy, assets: Assets) -> Self {
         let inner = Inner {
-            scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64),
+            scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64, TILE_SIZE),
             roster: Roster::default(),
             views: BTreeMap::new(),
             unfetched: VecDeque::new(),

@@ -129,7 +129,7 @@ impl Scheduler {
             Some(speed) => self.costs.rows_for(run.first, run.count, self.segment_seconds(strength) * speed),
             None => frame.height / (FIRST_SEGMENTS * strength.workers.max(1)),
         };
-        let step = adaptive_step(frame.height, strength.workers);
+        let step = adaptive_step(frame.height, strength.workers, self.tile_rows);
         let end = run.first.saturating_add(rows.max(1)).next_multiple_of(step);
         Some(end - run.first)
     }

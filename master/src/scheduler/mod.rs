@@ -51,6 +51,7 @@ const AWAY: Duration = PING_EVERY.saturating_mul(2);
 pub struct Scheduler {
     policy: SegmentPolicy,
     max_segment_bytes: u64,
+    tile_rows: u32,
     workers: BTreeMap<WorkerId, Worker>,
     /// Frames that have begun, oldest first.
     frames: VecDeque<Frame>,
@@ -95,11 +96,13 @@ pub struct Progress {
 
 impl Scheduler {
     /// A scheduler without workers and frames. No lease asks for more than `max_segment_bytes` bytes of RGB8
-    /// pixels, except that a single row is always one lease.
-    pub fn new(policy: SegmentPolicy, max_segment_bytes: u64) -> Self {
+    /// pixels, except that a single row is always one lease. Workers trace `tile_rows` rows at a time: cuts elsewhere
+    /// cost them.
+    pub fn new(policy: SegmentPolicy, max_segment_bytes: u64, tile_rows: u32) -> Self {
         Self {
             policy,
             max_segment_bytes,
+            tile_rows,
             workers: BTreeMap::new(),
             frames: VecDeque::new(),
             waiting: None,

@@ -9,8 +9,6 @@ use super::frame::Run;
 pub(super) const SEED_WINDOW: usize = 2;
 /// Leases that a worker ever holds.
 pub(super) const MAX_WINDOW: usize = 8;
-/// Segments begin and end on multiples of the tracer's tile height.
-const TILE_ROWS: u32 = 8;
 
 /// How a frame is cut into segments. Written `static:ROWS`, `smart:ROWS` or `adaptive` on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -51,8 +49,8 @@ pub(super) fn adaptive_window(round_trip_s: f64, segment_s: f64) -> usize {
 
 /// Rows of which a segment under `adaptive` is a multiple: a tile's, or fewer when the frame is too small for
 /// everybody to get one.
-pub(super) fn adaptive_step(height: u32, workers: u32) -> u32 {
-    (height / workers.saturating_mul(2).max(1)).clamp(1, TILE_ROWS)
+pub(super) fn adaptive_step(height: u32, workers: u32, tile_rows: u32) -> u32 {
+    (height / workers.saturating_mul(2).max(1)).clamp(1, tile_rows.max(1))
 }
 
 impl FromStr for SegmentPolicy {
@@ -103,7 +101,9 @@ mod tests {
 
     #[test]
     fn small_frames_are_cut_finer_than_tiles() {
-        assert_eq!([(768, 7), (100, 10), (3, 4), (100, 0)].map(|(h, n)| adaptive_step(h, n)), [8, 5, 1, 8]);
+        let step =
+            |tile_rows| [(768, 7), (100, 10), (3, 4), (100, 0)].map(|(h, n)| adaptive_step(h, n, tile_rows));
+        assert_eq!([step(8), step(16), step(0)], [[8, 5, 1, 8], [16, 5, 1, 16], [1; 4]]);
     }
 
     #[test]

@@ -66,7 +66,7 @@ struct Farm {
 impl Farm {
     fn new(policy: SegmentPolicy, seed: u64) -> Self {
         Self {
-            scheduler: Scheduler::new(policy, 1 << 20),
+            scheduler: Scheduler::new(policy, 1 << 20, 8),
             dice: Dice(seed),
             now_us: 0,
             agenda: BTreeMap::new(),

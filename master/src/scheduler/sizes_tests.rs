@@ -6,7 +6,7 @@ use super::{Action, Cost, Event, FrameId, Lease, Scheduler, SegmentPolicy, Worke
 
 #[test]
 fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
-    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
+    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24, 16);
     let rows = drive_two(&mut scheduler, [1, 4], 6);
     let last: Vec<u32> = rows.last().copied().unwrap().into();
     assert!(last[1] > 2 * last[0], "rows of the worker and of one four times as fast, by frame: {rows:?}");
@@ -30,7 +30,7 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
             while let Some(action) = scheduler.poll_action() {
                 match action {
                     Action::Grant { worker, lease } => {
-                        assert!(lease.first_row % 8 == 0 && lease.row_count % 8 == 0, "{lease:?}");
+                        assert!(lease.first_row % 16 == 0 && lease.row_count % 16 == 0, "{lease:?}");
                         queues[worker.0 as usize].push(lease);
                     }
                     Action::FrameDone { .. } => break 'frame,
@@ -60,7 +60,7 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
 #[test]
 fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
     for policy in ["static:1000", "smart:1000", "adaptive"] {
-        let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000);
+        let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000, 16);
         scheduler.handle(Duration::ZERO, Event::WorkerJoined { worker: WorkerId(1), threads: 1 });
         let request = Event::FrameRequested { frame: FrameId(1), width: 300, height: 100 };
         scheduler.handle(Duration::ZERO, request);

@@ -11,7 +11,7 @@ use super::{Action, Cost, Event, FrameId, Lease, Scheduler, WorkerId};
 
 /// Runs a script and writes the transcript.
 pub(super) fn transcript(policy: &str, script: &str) -> String {
-    let mut scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20);
+    let mut scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20, 8);
     let mut granted = BTreeMap::new();
     let mut log = String::new();
     for line in script.lines().map(str::trim).filter(|line| !line.is_empty()) {

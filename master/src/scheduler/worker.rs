@@ -39,7 +39,6 @@ pub(super) struct Worker {
     pub(super) draining: bool,
     pub(super) speed: Speed,
     pub(super) segments_done: u64,
-    pub(super) rows_done: u64,
     /// Smoothed round trip of pings, in seconds.
     pub(super) round_trip: Option<f64>,
     last_heard: Duration,
@@ -90,7 +89,6 @@ impl Worker {
             draining: false,
             speed: Speed::default(),
             segments_done: 0,
-            rows_done: 0,
             round_trip: None,
             last_heard: now,
             pinged_at: now,
@@ -140,7 +138,6 @@ impl Worker {
         (self.failures, self.resting_until) = (0, None);
         let measured = self.measure(now, &held, cost);
         self.segments_done += 1;
-        self.rows_done += u64::from(lease.row_count);
         self.last_done_at = now;
         Some((held, measured))
     }
