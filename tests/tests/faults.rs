@@ -2,10 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::process::Command;
+use std::sync::OnceLock;
 
 use rayfarm_tests::{Outcome, Running, Scenes, free_port, master, wait_until, worker};
 
-const FRAMES: usize = 30;
+const FRAMES: usize = 100;
 
 /// A `render` of some frames that waits for workers on a port.
 fn start_master(scenes: &Scenes, port: u16, prefix: &str) -> Running {
@@ -28,12 +29,16 @@ fn worker_command(port: u16, name: &str) -> Command {
 }
 
 /// What the frames must be: rendered by one worker that nothing happens to.
-fn undisturbed(scenes: &Scenes) -> Vec<Vec<u8>> {
-    let port = free_port();
-    let master = start_master(scenes, port, "calm");
-    let _worker = start_worker(port, "calm");
-    master.finish().expect_success();
-    frames(scenes, "calm")
+fn undisturbed() -> &'static [Vec<u8>] {
+    static CALM: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    CALM.get_or_init(|| {
+        let scenes = Scenes::new();
+        let port = free_port();
+        let master = start_master(&scenes, port, "calm");
+        let _worker = start_worker(port, "calm");
+        master.finish().expect_success();
+        frames(&scenes, "calm")
+    })
 }
 
 fn frames(scenes: &Scenes, prefix: &str) -> Vec<Vec<u8>> {
@@ -45,15 +50,24 @@ fn wait_for_frame(scenes: &Scenes, prefix: &str, frame: usize) {
     wait_until("a frame is written", || path.exists());
 }
 
+/// What happens to a worker after the last frame proves nothing.
+fn expect_under_way(scenes: &Scenes, prefix: &str) {
+    let last = scenes.path(&format!("{prefix}-{:03}.ppm", FRAMES - 1));
+    assert!(!last.exists(), "the run was over before anything happened to its worker: render more");
+}
+
 #[test]
 fn a_killed_worker_costs_no_frame_and_no_byte() {
     let scenes = Scenes::new();
-    let expected = undisturbed(&scenes);
+    let expected = undisturbed();
     let port = free_port();
-    let master = start_master(&scenes, port, "kill");
+    let mut master = start_master(&scenes, port, "kill");
     let (victim, _other) = (start_worker(port, "victim"), start_worker(port, "other"));
+    master.wait_for("joins: victim");
+    master.wait_for("joins: other");
     wait_for_frame(&scenes, "kill", 2);
     victim.signal("KILL");
+    expect_under_way(&scenes, "kill");
     master.finish().expect_success();
     assert!(frames(&scenes, "kill") == expected);
 }
@@ -61,12 +75,15 @@ fn a_killed_worker_costs_no_frame_and_no_byte() {
 #[test]
 fn a_hung_worker_costs_no_frame_and_no_byte() {
     let scenes = Scenes::new();
-    let expected = undisturbed(&scenes);
+    let expected = undisturbed();
     let port = free_port();
-    let master = start_master(&scenes, port, "hang");
+    let mut master = start_master(&scenes, port, "hang");
     let (victim, _other) = (start_worker(port, "victim"), start_worker(port, "other"));
+    master.wait_for("joins: victim");
+    master.wait_for("joins: other");
     wait_for_frame(&scenes, "hang", 2);
     victim.signal("STOP");
+    expect_under_way(&scenes, "hang");
     let outcome = master.finish();
     victim.signal("CONT");
     outcome.expect_success();
@@ -76,12 +93,13 @@ fn a_hung_worker_costs_no_frame_and_no_byte() {
 #[test]
 fn when_the_last_worker_dies_the_next_one_goes_on() {
     let scenes = Scenes::new();
-    let expected = undisturbed(&scenes);
+    let expected = undisturbed();
     let port = free_port();
     let master = start_master(&scenes, port, "next");
     let first = start_worker(port, "first");
     wait_for_frame(&scenes, "next", 3);
     first.signal("KILL");
+    expect_under_way(&scenes, "next");
     drop(first);
     let _second = start_worker(port, "second");
     master.finish().expect_success();
