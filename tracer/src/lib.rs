@@ -26,7 +26,7 @@
 //! # }
 //! ```
 
-pub mod bvh;
+mod bvh;
 mod camera;
 mod compile;
 mod frame;

@@ -12,7 +12,7 @@ use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
 
 /// A tree, and the order that it wants its primitives in.
 #[derive(Clone, Debug)]
-pub struct Tree {
+pub(crate) struct Tree {
     /// Nodes, the root first, children after their parents.
     pub nodes: Vec<Node>,
     /// For each position in the leaves, the primitive that belongs there.
@@ -31,7 +31,7 @@ const MEDIAN_LEAF: usize = 4;
 ///
 /// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (many boxes in one place),
 /// the tree is built by the median instead, whose depth is logarithmic whatever the boxes are.
-pub fn build(boxes: Vec<(Vec3, Vec3)>) -> Tree {
+pub(crate) fn build(boxes: Vec<(Vec3, Vec3)>) -> Tree {
     let primitives: Vec<Primitive> = boxes.into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
     if primitives.is_empty() {
         return Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 };
@@ -170,7 +170,6 @@ fn bounds_of(primitives: &[Primitive], indices: &[u32]) -> (Vec3, Vec3) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::validate;
     use super::*;
 
     fn grid(n: usize) -> Vec<(Vec3, Vec3)> {
@@ -182,26 +181,49 @@ mod tests {
             .collect()
     }
 
-    fn check(boxes: Vec<(Vec3, Vec3)>) -> Tree {
-        let count = boxes.len() as u32;
-        let tree = build(boxes);
-        assert_eq!(validate(&tree.nodes, count).unwrap(), tree.depth);
+    /// Walks the whole tree: children come later, boxes hold what is below, leaves cover the order once.
+    fn check(tree: &Tree, count: usize) {
+        let mut covered = vec![0; count];
+        let mut pending = vec![(0_u32, 1_u32)];
+        let mut deepest = 1;
+        while let Some((index, depth)) = pending.pop() {
+            deepest = deepest.max(depth);
+            for side in 0..2 {
+                match tree.nodes[index as usize].child(side) {
+                    Child::Empty => assert_eq!((index, side), (0, 1)),
+                    Child::Inner(child) => {
+                        assert!(child > index);
+                        let (outer, inner) = (
+                            tree.nodes[index as usize].child_bounds(side),
+                            tree.nodes[child as usize].bounds(),
+                        );
+                        assert!(outer.0.cmple(inner.0).all() && outer.1.cmpge(inner.1).all());
+                        pending.push((child, depth + 1));
+                    }
+                    Child::Leaf { first, count } => {
+                        (first..first + count).for_each(|position| covered[position as usize] += 1);
+                    }
+                }
+            }
+        }
+        assert_eq!(deepest, tree.depth);
+        assert!(covered.iter().all(|&times| times == 1));
         let mut order = tree.order.clone();
         order.sort_unstable();
-        assert_eq!(order, (0..count).collect::<Vec<_>>());
-        tree
+        assert_eq!(order, (0..count as u32).collect::<Vec<_>>());
     }
 
     #[test]
     fn every_primitive_stands_in_one_leaf() {
         for count in [1, 2, 3, 5, 100, 5000] {
-            check(grid(count));
+            check(&build(grid(count)), count);
         }
     }
 
     #[test]
     fn twenty_thousand_boxes_in_one_place_stay_shallow() {
-        let tree = check(vec![(Vec3::ZERO, Vec3::ONE); 20_000]);
+        let tree = build(vec![(Vec3::ZERO, Vec3::ONE); 20_000]);
+        check(&tree, 20_000);
         assert!(tree.depth as usize <= MAX_DEPTH, "depth {}", tree.depth);
     }
 
@@ -210,7 +232,7 @@ mod tests {
         let primitives: Vec<Primitive> =
             grid(3000).into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
         let tree = median(&primitives);
-        assert_eq!(validate(&tree.nodes, 3000).unwrap(), tree.depth);
+        check(&tree, 3000);
         assert!(tree.depth <= 12, "depth {}", tree.depth);
     }
 

@@ -1,24 +1,21 @@
 //! Bounding volume hierarchies: built by `obvhs`, kept in an own layout, walked by an own traversal.
 //!
-//! Binary trees stand over the items of a scene; over the triangles of a mesh they are widened, so that one vector
+//! Binary trees stand over the items of a scene (they never travel); over the triangles of a mesh they are widened, so that one vector
 //! operation looks at sixteen boxes.
 
 mod build;
 mod node;
 mod traverse;
-mod validate;
 mod wide;
 
-pub(crate) use build::build_wide;
-pub use build::{Tree, build};
-pub use node::{Child, Node};
-pub use traverse::{RaySlabs, traverse};
-pub use validate::{TreeError, validate};
+pub(crate) use build::{Tree, build, build_wide};
+pub(crate) use node::{Child, Node};
+pub(crate) use traverse::{RaySlabs, traverse};
 pub(crate) use wide::{WIDTH, WideChild, WideNode, WideTree, validate_wide};
 
 /// Deepest tree that traversal accepts: the size of its stack. A balanced tree over 2^28 primitives is 28 deep;
 /// builds that end deeper are built again by the median.
-pub const MAX_DEPTH: usize = 64;
+pub(crate) const MAX_DEPTH: usize = 64;
 
 /// Deepest wide tree that walks accept: it bounds their stacks.
 pub(crate) const MAX_WIDE_DEPTH: usize = 16;

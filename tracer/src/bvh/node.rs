@@ -7,7 +7,7 @@ use glam::Vec3;
 /// Two children of a binary tree. Bounds are indexed `[axis][child]`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
-pub struct Node {
+pub(crate) struct Node {
     /// Least corner of each child's box.
     pub lo: [[f32; 2]; 3],
     /// Greatest corner of each child's box.
@@ -22,7 +22,7 @@ const _: () = assert!(size_of::<Node>() == 64);
 
 /// What hangs on one side of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Child {
+pub(crate) enum Child {
     /// Nothing: only in the root of a tree with a single leaf.
     Empty,
     /// The node of this index.
@@ -38,11 +38,11 @@ pub enum Child {
 
 impl Node {
     /// A node with nothing in it: boxes that no ray enters.
-    pub const EMPTY: Node =
+    pub(crate) const EMPTY: Node =
         Node { lo: [[f32::INFINITY; 2]; 3], hi: [[f32::NEG_INFINITY; 2]; 3], first: [0; 2], count: [0; 2] };
 
     /// Puts a child with its box on one side.
-    pub fn set(&mut self, side: usize, (lo, hi): (Vec3, Vec3), child: Child) {
+    pub(crate) fn set(&mut self, side: usize, (lo, hi): (Vec3, Vec3), child: Child) {
         self.set_bounds(side, (lo, hi));
         (self.first[side], self.count[side]) = match child {
             Child::Empty => (0, 0),
@@ -52,7 +52,7 @@ impl Node {
     }
 
     /// Replaces the box of one side.
-    pub fn set_bounds(&mut self, side: usize, (lo, hi): (Vec3, Vec3)) {
+    pub(crate) fn set_bounds(&mut self, side: usize, (lo, hi): (Vec3, Vec3)) {
         for axis in 0..3 {
             self.lo[axis][side] = lo[axis];
             self.hi[axis][side] = hi[axis];
@@ -60,7 +60,7 @@ impl Node {
     }
 
     /// What hangs on one side. Node 0 is the root, so no child is node 0.
-    pub fn child(&self, side: usize) -> Child {
+    pub(crate) fn child(&self, side: usize) -> Child {
         match (self.first[side], self.count[side]) {
             (0, 0) => Child::Empty,
             (node, 0) => Child::Inner(node),
@@ -69,13 +69,13 @@ impl Node {
     }
 
     /// The box of one side.
-    pub fn child_bounds(&self, side: usize) -> (Vec3, Vec3) {
+    pub(crate) fn child_bounds(&self, side: usize) -> (Vec3, Vec3) {
         let corner = |bounds: &[[f32; 2]; 3]| Vec3::new(bounds[0][side], bounds[1][side], bounds[2][side]);
         (corner(&self.lo), corner(&self.hi))
     }
 
     /// The box of both sides.
-    pub fn bounds(&self) -> (Vec3, Vec3) {
+    pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
         let [a, b] = [self.child_bounds(0), self.child_bounds(1)];
         (a.0.min(b.0), a.1.max(b.1))
     }

@@ -15,7 +15,7 @@ const SLACK: f32 = 1.0 + 4e-6;
 
 /// A ray as boxes want it: o + t d, with the reciprocal of d.
 #[derive(Clone, Copy, Debug)]
-pub struct RaySlabs {
+pub(crate) struct RaySlabs {
     origin: Vec3,
     inverse: Vec3,
     negative: [bool; 3],
@@ -23,7 +23,7 @@ pub struct RaySlabs {
 
 impl RaySlabs {
     /// Zero components of the direction are welcome: their reciprocal is infinite, and 0 * infinity is passed over.
-    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+    pub(crate) fn new(origin: Vec3, direction: Vec3) -> Self {
         Self {
             origin,
             inverse: Vec3::ONE / direction,
@@ -54,9 +54,9 @@ impl RaySlabs {
 /// Calls `leaf(first, count)` for each leaf that the ray may touch within [0, `t_max`], nearer ones earlier. It answers
 /// with the farthest distance that is still of interest, or stops the walk.
 ///
-/// `nodes` must have passed [`super::validate`], which bounds the stack.
+/// `nodes` must come from [`super::build`], which bounds the depth and with it the stack.
 #[inline(always)]
-pub fn traverse(
+pub(crate) fn traverse(
     nodes: &[Node],
     ray: &RaySlabs,
     mut t_max: f32,

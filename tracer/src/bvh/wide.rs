@@ -8,7 +8,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::{Child, MAX_WIDE_DEPTH, Node, Tree, TreeError};
+use super::{Child, MAX_WIDE_DEPTH, Node, Tree};
 use crate::simd::{LANES, Lanes};
 
 /// Children of a node, and triangles of a block.
@@ -187,6 +187,18 @@ fn primitives_below(tree: &Tree, child: Child) -> Vec<u32> {
     found
 }
 
+/// Why bytes are no tree.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+#[error("its tree is broken at node {node}: {what}")]
+pub(crate) struct TreeError {
+    /// Where.
+    node: usize,
+    /// What was found.
+    what: String,
+}
+
+/// Trees come from files and peers: one pass makes sure that no walk leaves them.
+///
 /// Checks in O(n) that children come after their parents, that every node and block has one parent, that the depth is
 /// within [`MAX_WIDE_DEPTH`], and that all bounds are finite. Returns the depth.
 ///
@@ -239,4 +251,74 @@ pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32,
         return broken(0, "a block hangs nowhere".into());
     }
     Ok(u32::from(deepest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::build_wide;
+    use super::*;
+
+    fn boxes(n: usize) -> Vec<(Vec3, Vec3)> {
+        (0..n)
+            .map(|i| {
+                let corner = Vec3::new((i % 17) as f32, (i / 17 % 13) as f32, (i / 221) as f32);
+                (corner, corner + 0.9)
+            })
+            .collect()
+    }
+
+    /// A node with the given children, all in the unit box.
+    fn node(children: &[u32]) -> WideNode {
+        let mut node = WideNode::zeroed();
+        children.iter().for_each(|&child| node.push((Vec3::ZERO, Vec3::ONE), child));
+        node
+    }
+
+    #[test]
+    fn every_primitive_stands_in_one_block_inside_the_boxes_above() {
+        for count in [1, 2, 16, 17, 300, 5000] {
+            let all = boxes(count);
+            let tree = build_wide(all.clone());
+            assert_eq!(validate_wide(&tree.nodes, tree.blocks.len() as u32).unwrap(), tree.depth);
+            let mut seen: Vec<u32> = tree.blocks.iter().flatten().copied().collect();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..count as u32).collect::<Vec<_>>());
+            assert!(tree.blocks.iter().all(|block| !block.is_empty() && block.len() <= WIDTH));
+            let (lo, hi) = tree.nodes[0].bounds();
+            assert!(all.iter().all(|(a, b)| lo.cmple(*a).all() && hi.cmpge(*b).all()));
+        }
+    }
+
+    #[test]
+    fn twenty_thousand_boxes_in_one_place_stay_shallow() {
+        let tree = build_wide(vec![(Vec3::ZERO, Vec3::ONE); 20_000]);
+        assert!(tree.depth as usize <= MAX_WIDE_DEPTH, "depth {}", tree.depth);
+    }
+
+    #[test]
+    fn what_would_lead_a_walk_astray_is_named() {
+        let mut infinite = node(&[LEAF]);
+        infinite.hi[1].0[0] = f32::INFINITY;
+        let mut crowded = node(&[LEAF]);
+        crowded.count = 17;
+        let chain: Vec<WideNode> = (0..=MAX_WIDE_DEPTH as u32).map(|i| node(&[i + 1])).collect();
+        let cases = [
+            (vec![], 0, "no root"),
+            (vec![node(&[])], 0, "0 children"),
+            (vec![crowded], 1, "17 children"),
+            (vec![node(&[0])], 0, "comes after"),
+            (vec![node(&[7])], 0, "comes after"),
+            (vec![node(&[1, 1]), node(&[LEAF])], 1, "comes after"),
+            (vec![node(&[LEAF, LEAF])], 1, "two parents"),
+            (vec![node(&[LEAF | 5])], 1, "not there"),
+            (vec![node(&[LEAF])], 2, "hangs nowhere"),
+            (vec![node(&[LEAF]), node(&[LEAF | 1])], 2, "no node names it"),
+            (vec![infinite], 1, "not finite"),
+            (chain, 0, "deeper than"),
+        ];
+        for (nodes, blocks, expected) in cases {
+            let error = validate_wide(&nodes, blocks).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error} does not say `{expected}`");
+        }
+    }
 }
