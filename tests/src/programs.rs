@@ -22,7 +22,8 @@ fn folder() -> &'static Path {
         let test = std::env::current_exe().unwrap();
         let profile = test.parent().and_then(Path::parent).unwrap().to_path_buf();
         let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--package", "rayfarm-master", "--package", "rayfarm-worker"]);
+        // All targets, as the tests themselves are built: what they share is then built once.
+        build.args(["build", "--quiet", "--workspace", "--all-targets"]);
         build.arg("--target-dir").arg(profile.parent().unwrap());
         if profile.ends_with("release") {
             build.arg("--release");

@@ -45,7 +45,8 @@ pub(super) struct AlignedBytes {
 
 impl AlignedBytes {
     pub(super) fn zeroed(len: usize) -> Self {
-        Self { lines: vec![Line([0; ALIGN]); len.div_ceil(ALIGN)], len }
+        // Zero pages from the system: nothing is written twice.
+        Self { lines: bytemuck::zeroed_vec(len.div_ceil(ALIGN)), len }
     }
 
     pub(super) fn copy_of(bytes: &[u8]) -> Self {

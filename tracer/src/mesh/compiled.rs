@@ -93,7 +93,7 @@ impl CompiledMesh {
     fn from_aligned(bytes: AlignedBytes) -> Result<Self, MeshError> {
         let header = Header::read(bytes.as_slice())?;
         let sections = header.sections();
-        let id = MeshId(*blake3::hash(bytes.as_slice()).as_bytes());
+        let id = MeshId(*blake3::Hasher::new().update_rayon(bytes.as_slice()).finalize().as_bytes());
         let start = sections.materials;
         let materials =
             decode_materials(&bytes.as_slice()[start..start + header.material_bytes as usize], &header)?;
@@ -116,7 +116,8 @@ impl CompiledMesh {
             return broken("its blocks do not hold as many triangles as it announces".into());
         }
         self.check_placement()?;
-        if self.triangles().any(|i| !self.corners(i).into_iter().all(is_within_one)) {
+        let sources = self.sources().chunks_exact(WIDTH);
+        if !self.blocks().iter().zip(sources).all(|(block, sources)| corners_are_within_one(block, sources)) {
             return broken("a corner lies outside [-1, 1]".into());
         }
         if let Some(slot) = self.slots().iter().find(|&&slot| slot as usize >= self.materials.len()) {
@@ -267,6 +268,18 @@ fn is_within_one(point: Vec3) -> bool {
 
 fn bounds_of_corners([a, b, c]: &[Vec3; 3]) -> (Vec3, Vec3) {
     (a.min(*b).min(*c), a.max(*b).max(*c))
+}
+
+/// Whether all triangles of a block lie within [-1, 1], lane by lane without a branch: there may be millions.
+fn corners_are_within_one(block: &TriangleBlock, sources: &[u32]) -> bool {
+    let mut outside = 0;
+    for coordinate in block.0.iter().flatten() {
+        for (number, &source) in coordinate.0.iter().zip(sources) {
+            // False for NaN.
+            outside |= u32::from(!(number.abs() <= 1.0)) & u32::from(source != NO_TRIANGLE);
+        }
+    }
+    outside == 0
 }
 
 /// Writes the sections, triangles in the order of the tree's blocks.

@@ -16,35 +16,34 @@ pub(super) fn highlight<S: Simd>(
     to_viewer: Vec3x16<S>,
     exponents: &Lanes,
 ) -> f32x16<S> {
-    if exponents.0.iter().any(|&exponent| exponent > SINGLE || exponent == 0.0) {
-        return by_lane(simd, normals, to_light, to_viewer, exponents);
-    }
     let half = to_light.add(to_viewer).normalize(simd);
     let n_dot_h = normals.dot(half);
     let positive = n_dot_h.simd_gt(splat(simd, 1e-30));
     let base = select(positive, n_dot_h, splat(simd, 1.0)).min(splat(simd, 1.0));
     let power = exp2(simd, (log2(simd, base) * exponents.load(simd)).max(splat(simd, -126.0)));
-    select(positive, power, splat(simd, 0.0))
+    let mut power = select(positive, power, splat(simd, 0.0));
+    for lane in 0..LANES {
+        // Lane by lane: what a point looks like must not depend on which others stand in its block.
+        if exponents.0[lane] > SINGLE || exponents.0[lane] == 0.0 {
+            power.as_mut_slice()[lane] = precise(normals, to_light, to_viewer, lane, exponents.0[lane]);
+        }
+    }
+    power
 }
 
 /// In `f64`: an exponent of 10^6 multiplies the relative error of N.H by as much. `libm` is the same on every platform.
 #[inline(never)]
-fn by_lane<S: Simd>(
-    simd: S,
+fn precise<S: Simd>(
     normals: Vec3x16<S>,
     to_light: Vec3x16<S>,
     to_viewer: Vec3x16<S>,
-    exponents: &Lanes,
-) -> f32x16<S> {
-    let vector =
-        |v: Vec3x16<S>, lane: usize| glam::Vec3::from_array(v.0.map(|c| c[lane])).as_dvec3().normalize();
-    let of_lane = |lane: usize| {
-        let half = vector(to_light, lane) + vector(to_viewer, lane);
-        let n_dot_h = vector(normals, lane).dot(half) / half.length();
-        // Only an exponent of zero makes something of nothing: x^0 = 1.
-        let power = libm::pow(n_dot_h.clamp(0.0, 1.0), f64::from(exponents.0[lane]));
-        if power.is_nan() { 0.0 } else { power as f32 }
-    };
-    let lanes: [f32; LANES] = std::array::from_fn(of_lane);
-    f32x16::load_array(simd, lanes)
+    lane: usize,
+    exponent: f32,
+) -> f32 {
+    let vector = |v: Vec3x16<S>| glam::Vec3::from_array(v.0.map(|c| c[lane])).as_dvec3().normalize();
+    let half = vector(to_light) + vector(to_viewer);
+    let n_dot_h = vector(normals).dot(half) / half.length();
+    // Only an exponent of zero makes something of nothing: x^0 = 1.
+    let power = libm::pow(n_dot_h.clamp(0.0, 1.0), f64::from(exponent));
+    if power.is_nan() { 0.0 } else { power as f32 }
 }

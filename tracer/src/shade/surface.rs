@@ -181,8 +181,8 @@ impl Surfaces {
                 let full = ab.cross(ac);
                 let whole = splat(simd, 1.0) / full.dot(full);
                 let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-                let u = (at.cross(ac).dot(full) * whole).max(zero).min(one);
-                let v = (ab.cross(at).dot(full) * whole).max(zero).min(one - u);
+                let u = (at.cross(ac).dot(full) * whole).max_precise(zero).min_precise(one);
+                let v = (ab.cross(at).dot(full) * whole).max_precise(zero).min_precise(one - u);
                 let [na, nb, nc] = three!(k => Vec3x16::load(simd, &normals[k]));
                 let blended = na.scale(one - u - v).add(nb.scale(u)).add(nc.scale(v));
                 let smooth = blended.transform(simd, &space.normals).normalize(simd);

@@ -21,6 +21,9 @@ use crate::trace::{PrimitiveId, Ray};
 /// Points farther from the axis of the light's picture than this are asked one by one.
 const WIDEST: f32 = 8.0;
 
+/// A triangle this many times closer to the light than a point lies before `t_light` for certain: half of what that allows.
+const BEFORE_LIGHT: f32 = (1 << 17) as f32;
+
 /// Boxes that touch no more blocks than this are held against single rays.
 const FEW: u32 = 4;
 
@@ -310,13 +313,17 @@ impl<S: Simd> Question<S> for Blocked<'_> {
             return;
         };
         let error = splat(simd, flat.z_error);
-        let farther = bits((z + error).simd_lt(self.low[block].load(simd)));
-        let maybe = maybe & !farther & self.open[block];
+        let low = self.low[block].load(simd);
+        let maybe = maybe & !bits((z + error).simd_lt(low)) & self.open[block];
         if maybe == 0 {
             return;
         }
         let maybe = maybe & self.others(simd, block, triangle);
-        let certain = maybe & certain & bits((z - error).simd_gt(self.high[block].load(simd)));
+        let mut certain = maybe & certain & bits((z - error).simd_gt(self.high[block].load(simd)));
+        if self.tile.t_light.is_finite() {
+            // What is next to the light itself is for the exact test to tell from the light.
+            certain &= bits((z + error).simd_lt(low * splat(simd, BEFORE_LIGHT)));
+        }
         self.darken(block, certain);
         for lane in each_bit(maybe & !certain) {
             self.ask(block, lane, triangle);
