@@ -186,3 +186,35 @@ fn write_means(frame: &PreparedFrame, pixels: &Pixels, colors: &Colors, out: &mu
 fn offset(frame: &PreparedFrame, pixels: &Pixels, x: u32, y: u32) -> usize {
     ((y - pixels.rows.start) as usize * frame.width() as usize + x as usize) * 3
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::scene::FrameView;
+    use crate::{CompiledScene, simd};
+
+    /// Every kind of light, primitive, normal and exponent, on every level that this machine has.
+    #[test]
+    fn all_levels_of_simd_render_the_same_bytes() {
+        for scene in ["lights.toml", "room.toml"] {
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(scene);
+            let loaded = crate::scene::load(&path).unwrap();
+            let view = FrameView { width: 150, height: 110, samples: 4, ..FrameView::of(&loaded.scene) };
+            let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes).unwrap());
+            let mut frame = PreparedFrame::new(compiled, &view).unwrap();
+            let mut bytes_at = |level| {
+                frame.level = level;
+                let mut bytes = vec![0; 150 * 110 * 3];
+                render_rows(&frame, 0..110, &mut bytes, &|| false).unwrap();
+                bytes
+            };
+            let first = bytes_at(simd::best());
+            for level in simd::all() {
+                assert!(bytes_at(level) == first, "{scene} with {}", simd::name(level));
+            }
+        }
+    }
+}

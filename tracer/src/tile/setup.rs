@@ -165,8 +165,14 @@ impl Flats {
         let extent = (x_hi - x_lo) + (y_hi - y_lo);
         let distance = x[0].abs() + y[0].abs() + local;
         let by_place = steep * fma(distance, near_zero, margin * splat(simd, 4.0));
-        let by_slope = extent * extent * (steep * margin + z_rounding) * inverse.abs() * splat(simd, 4.0);
-        let z_error = by_place + z_rounding + by_slope;
+        // Inside a triangle closeness is a mean of that of its corners, so an error of the weights (by places, and by
+        // rounding of the gradient) counts by how much the corners differ.
+        let range = z[0].max(z[1]).max(z[2]) - z[0].min(z[1]).min(z[2]);
+        let by_weights = range
+            * extent
+            * inverse.abs()
+            * fma(extent, splat(simd, 4.0 * ROUNDING), margin * splat(simd, 8.0));
+        let z_error = by_place + z_rounding * splat(simd, 4.0) + by_weights;
         self.z[0].store(z[0] - fma(zx, x[0], zy * y[0]));
         self.z[1].store(zx);
         self.z[2].store(zy);
