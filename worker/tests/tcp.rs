@@ -27,7 +27,7 @@ async fn a_worker_renders_the_same_pixels_as_this_process() {
     let worker = tokio::spawn(run(options(&address), CancellationToken::new()));
     let mut link = Link::accept(&listener).await;
     assert_eq!((link.hello.name.as_str(), link.hello.threads), ("attic", 2));
-    assert!(link.hello.simd.starts_with("baseline"));
+    assert_eq!(link.hello.simd, rayfarm_tracer::simd_level());
     for (frame, spin) in [(0, 0.0), (1, 10.0), (2, -35.5)] {
         link.check_frame(&stage, frame, spin).await;
     }
