@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::bvh;
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Model, NormalMode, Scene, rotation};
+use crate::scene::{Model, NormalMode, Scene, ValidateError, rotation};
 
 /// Why a scene cannot be traced.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +31,7 @@ pub enum CompileError {
     },
     /// The frame asked for cannot be rendered.
     #[error("cannot render this frame: {0}")]
-    Frame(String),
+    Frame(#[from] ValidateError),
 }
 
 /// A scene with its meshes, and the shape of the tree over its instances. Immutable; share it between threads.

@@ -18,12 +18,6 @@ use crate::scene::{Camera, FrameView, Model, NormalMode, Scene};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
 
-/// Longest side of a frame in pixels.
-pub const MAX_SIDE: u32 = 16384;
-
-/// Most samples per pixel.
-pub const MAX_SAMPLES: u32 = 256;
-
 /// Widening of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
 
@@ -69,7 +63,7 @@ impl PreparedFrame {
     /// # Errors
     /// A view that cannot be rendered: its size, samples or camera are out of range.
     pub fn new(scene: Arc<CompiledScene>, view: &FrameView) -> Result<Self, CompileError> {
-        check(view)?;
+        view.validate()?;
         let source = scene.scene();
         let unit = unit_of(&scene, &view.camera);
         let to_eye = |world: DVec3| (world - view.camera.position) / unit;
@@ -183,33 +177,6 @@ impl Instance {
             smooth: model.normals == NormalMode::Smooth,
         }
     }
-}
-
-fn check(view: &FrameView) -> Result<(), CompileError> {
-    let refuse = |what: String| Err(CompileError::Frame(what));
-    let FrameView { camera, width, height, samples, spin } = view;
-    if !(1..=MAX_SIDE).contains(width) || !(1..=MAX_SIDE).contains(height) {
-        return refuse(format!("its size is {width}x{height}; each side must be 1 to {MAX_SIDE} pixels"));
-    }
-    if !(1..=MAX_SAMPLES).contains(samples) || samples.isqrt().pow(2) != *samples {
-        return refuse(format!(
-            "it asks for {samples} samples; they must be a square number of at most {MAX_SAMPLES}"
-        ));
-    }
-    let vectors = [camera.position, camera.look_at, camera.up];
-    if vectors.iter().any(|vector| !vector.is_finite()) || camera.position == camera.look_at {
-        return refuse("its camera has no position, direction or up".into());
-    }
-    if !(camera.fov > 0.0 && camera.fov < 180.0 && camera.zoom > 0.0 && camera.zoom.is_finite()) {
-        return refuse(format!(
-            "its field of view is {} degrees at zoom {}; it must lie between 0 and 180, the zoom above 0",
-            camera.fov, camera.zoom
-        ));
-    }
-    if !spin.is_finite() {
-        return refuse("its spin is not a number".into());
-    }
-    Ok(())
 }
 
 /// World units per eye unit: the power of two next to the distance from the camera to the far end of what is finite.

@@ -47,6 +47,6 @@ mod triangle;
 
 pub use camera::Basis;
 pub use compile::{CompileError, CompiledScene};
-pub use frame::{MAX_SAMPLES, MAX_SIDE, PreparedFrame};
+pub use frame::PreparedFrame;
 pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows};
 pub use simd::best_name as simd_level;

@@ -8,8 +8,8 @@ use crate::scene::{Attenuation, Light, LightKind};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, SimdBase, SimdFloat, bits, f32x16, select, splat};
 
-/// Where a shadow ray ends, in shares of the way to the light. A surface that holds the light, up to rounding, does not
-/// hide it.
+/// Where a shadow ray ends, in shares of the way to the light. A surface that holds the light does not hide it: points
+/// are `f32`, so what stands within the last 2^-18 of the way cannot be told from the light's own place.
 pub(crate) const JUST_BEFORE: f64 = 1.0 - 1.0 / (1 << 18) as f64;
 
 /// A light of one frame.
