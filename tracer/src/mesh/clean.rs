@@ -6,9 +6,8 @@
 //! coordinates lie within [-1, 1] and `f32` spends its digits on the shape, wherever the model stands and however
 //! large it is. Both steps are exact up to one rounding to `f32` a coordinate.
 
-use std::collections::HashSet;
-
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{MAX_COORDINATE, MAX_MATERIALS, MAX_TRIANGLES, Mesh, MeshError, MeshReport};
 
@@ -55,13 +54,14 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
         exponent,
         bounds,
     };
-    let mut seen = HashSet::with_capacity(finite.len());
-    for source in finite {
+    let all: Vec<[Vec3; 3]> =
+        finite.par_iter().map(|&source| mesh.triangles[source as usize].map(to_mesh)).collect();
+    let repeated = repeated(&all);
+    for ((source, corners), is_repeated) in finite.into_iter().zip(all).zip(repeated) {
         let indices = mesh.triangles[source as usize];
-        let corners = indices.map(to_mesh);
         if is_degenerate(&corners) {
             report.dropped_degenerate += 1;
-        } else if !seen.insert(identity(&corners)) {
+        } else if is_repeated {
             report.dropped_duplicate += 1;
         } else {
             kept.corners.push(corners);
@@ -148,6 +148,33 @@ fn placement((lo, hi): (DVec3, DVec3)) -> (DVec3, i32) {
 fn is_degenerate(corners: &[Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a) == DVec3::ZERO
+}
+
+/// Which triangles are copies of one that comes earlier.
+///
+/// Sorted by a hash, copies stand together; where different triangles have the same one, their corners decide. So the time is
+/// O(n log n) whatever the triangles are.
+fn repeated(triangles: &[[Vec3; 3]]) -> Vec<bool> {
+    let mut by_hash: Vec<(u64, u32)> =
+        (0_u32..).zip(triangles).map(|(i, corners)| (hash(&identity(corners)), i)).collect();
+    by_hash.par_sort_unstable();
+    let mut repeated = vec![false; triangles.len()];
+    for alike in by_hash.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() > 1) {
+        let mut alike: Vec<_> = alike.iter().map(|&(_, i)| (identity(&triangles[i as usize]), i)).collect();
+        alike.sort_unstable();
+        for pair in alike.windows(2) {
+            repeated[pair[1].1 as usize] = pair[0].0 == pair[1].0;
+        }
+    }
+    repeated
+}
+
+/// Multiplies and folds, a number at a time.
+fn hash(identity: &[[u32; 3]; 3]) -> u64 {
+    identity.iter().flatten().fold(1 << 63, |hash: u64, &bits| {
+        let product = u128::from(hash ^ u64::from(bits)) * 0x9E37_79B9_7F4A_7C15;
+        (product as u64) ^ (product >> 64) as u64
+    })
 }
 
 /// Equal for triangles with the same corners in the same or the opposite winding.
