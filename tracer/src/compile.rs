@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::bvh;
+use crate::bvh::{self, BuildQuality};
 use crate::mesh::{CompiledMesh, MeshId};
 use crate::scene::{Model, NormalMode, Scene, ValidateError, rotation};
 
@@ -42,6 +42,8 @@ pub struct CompiledScene {
     meshes: Vec<Arc<CompiledMesh>>,
     /// Over all finite items; its boxes are those of no frame in particular.
     tree: bvh::Tree,
+    /// The same widened, an item a leaf: for single rays.
+    wide: bvh::WideTree,
     bounds: Option<(DVec3, DVec3)>,
 }
 
@@ -108,8 +110,9 @@ impl CompiledScene {
         let boxes: Vec<(DVec3, DVec3)> =
             items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let tree = bvh::build(relative_boxes(&boxes, bounds));
-        Ok(Self { scene, meshes, tree, bounds })
+        let tree = bvh::build(relative_boxes(&boxes, bounds), BuildQuality::Default);
+        let wide = bvh::widen(&tree, 1);
+        Ok(Self { scene, meshes, tree, wide, bounds })
     }
 
     /// What was compiled.
@@ -135,6 +138,10 @@ impl CompiledScene {
 
     pub(crate) fn tree(&self) -> &bvh::Tree {
         &self.tree
+    }
+
+    pub(crate) fn wide_tree(&self) -> &bvh::WideTree {
+        &self.wide
     }
 }
 

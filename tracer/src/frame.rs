@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::bvh::{Child, Node};
+use crate::bvh::{Child, Node, WideNode};
 use crate::camera::PinholeRays;
 use crate::compile::{CompileError, CompiledScene, Item, Items, orientation, transformed_bounds};
 use crate::light::EyeLight;
@@ -26,6 +26,8 @@ const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
 pub struct PreparedFrame {
     scene: Arc<CompiledScene>,
     view: FrameView,
+    /// Eye units per world unit: a power of two.
+    pub(crate) per_unit: f64,
     pub(crate) rays: PinholeRays,
     pub(crate) items: Items,
     pub(crate) instances: Vec<Instance>,
@@ -34,6 +36,8 @@ pub struct PreparedFrame {
     pub(crate) planes: Vec<EyePlane>,
     pub(crate) lights: Vec<EyeLight>,
     pub(crate) nodes: Vec<Node>,
+    /// The scene's tree for single rays.
+    pub(crate) wide_nodes: Vec<WideNode>,
     /// Which lanes it is traced with.
     pub(crate) level: Level,
 }
@@ -75,6 +79,7 @@ impl PreparedFrame {
             .collect();
         let mut frame = Self {
             view: *view,
+            per_unit: 1.0 / unit,
             rays: PinholeRays::new(view),
             items: Items::of(source),
             instances,
@@ -83,10 +88,12 @@ impl PreparedFrame {
             planes: planes(source, &to_eye),
             lights: source.lights.iter().map(|light| EyeLight::new(light, to_eye, unit)).collect(),
             nodes: Vec::new(),
+            wide_nodes: Vec::new(),
             level: simd::best(),
             scene,
         };
         frame.nodes = frame.refitted();
+        frame.wide_nodes = frame.scene.wide_tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
 
@@ -105,6 +112,11 @@ impl PreparedFrame {
         self.view.height
     }
 
+    /// World bounds of everything finite.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.scene.bounds()
+    }
+
     /// The scene as plain data.
     pub fn scene(&self) -> &Scene {
         self.scene.scene()
@@ -113,6 +125,11 @@ impl PreparedFrame {
     /// Index of the item at a position in the leaves of the scene's tree.
     pub(crate) fn item_at(&self, position: u32) -> u32 {
         self.scene.tree().order[position as usize]
+    }
+
+    /// The items in a leaf of the scene's wide tree.
+    pub(crate) fn items_of(&self, block: u32) -> &[u32] {
+        &self.scene.wide_tree().blocks[block as usize]
     }
 
     /// The compiled tree with the boxes of this frame, children before parents.

@@ -50,3 +50,4 @@ pub use compile::{CompileError, CompiledScene};
 pub use frame::PreparedFrame;
 pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows};
 pub use simd::best_name as simd_level;
+pub use trace::{Primitive, RayHit};

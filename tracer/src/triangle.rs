@@ -9,42 +9,48 @@ use glam::DVec3;
 /// A ray prepared for triangles: o + t d, permuted and sheared so that d points along its largest axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShearedRay {
-    origin: DVec3,
+    origin: [f64; 3],
     axes: [usize; 3],
-    shear: DVec3,
+    shear: [f64; 3],
 }
 
 impl ShearedRay {
     /// `direction` need not be a unit vector; it must not be zero.
+    #[inline(always)]
     pub(crate) fn new(origin: DVec3, direction: DVec3) -> Self {
-        let z = direction.abs().max_position();
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let shear = DVec3::new(direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]);
-        Self { origin, axes: [x, y, z], shear }
+        let [x, y, z] = direction.abs().to_array();
+        let largest = if x >= y && x >= z { 0 } else { 1 + usize::from(y < z) };
+        let axes @ [x, y, z] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][largest];
+        // Arrays, not vectors: an index that is not known is a branch there, which nobody can predict here.
+        let direction = direction.to_array();
+        let shear = [direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]];
+        Self { origin: origin.to_array(), axes, shear }
     }
 
     /// Distance of the hit with t > 0, in lengths of the direction, whichever side of the triangle faces the ray.
+    #[inline(always)]
     pub(crate) fn intersect(&self, corners: &[DVec3; 3]) -> Option<f64> {
         let [x, y, z] = self.axes;
         let [a, b, c] = corners.map(|corner| {
-            let relative = corner - self.origin;
-            DVec3::new(
-                relative[x] - self.shear.x * relative[z],
-                relative[y] - self.shear.y * relative[z],
-                self.shear.z * relative[z],
-            )
+            let corner = corner.to_array();
+            let depth = corner[z] - self.origin[z];
+            [
+                corner[x] - self.origin[x] - self.shear[0] * depth,
+                corner[y] - self.origin[y] - self.shear[1] * depth,
+                self.shear[2] * depth,
+            ]
         });
-        let edge = |p: DVec3, q: DVec3| p.x * q.y - p.y * q.x;
-        let weights = [edge(c, b), edge(a, c), edge(b, a)];
-        if weights.iter().any(|&w| w < 0.0) && weights.iter().any(|&w| w > 0.0) {
+        let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+        let [wa, wb, wc] = [edge(c, b), edge(a, c), edge(b, a)];
+        // All six compared, again for the branches.
+        if ((wa < 0.0) | (wb < 0.0) | (wc < 0.0)) & ((wa > 0.0) | (wb > 0.0) | (wc > 0.0)) {
             return None;
         }
-        let [wa, wb, wc] = weights;
         let determinant = wa + wb + wc;
         if determinant == 0.0 {
             return None;
         }
-        let t = (wa * a.z + wb * b.z + wc * c.z) / determinant;
+        let t = (wa * a[2] + wb * b[2] + wc * c[2]) / determinant;
         (t > 0.0 && t.is_finite()).then_some(t)
     }
 }

@@ -7,7 +7,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::wide::{WideTree, widen};
+use super::wide::{WIDTH, WideTree, widen};
 use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
 
 /// A tree, and the order that it wants its primitives in.
@@ -21,8 +21,30 @@ pub(crate) struct Tree {
     pub depth: u32,
 }
 
-/// Leaves stay single: [`super::widen`] puts them together as it needs them.
-const PARAMS: BvhBuildParams = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
+/// How much time the builder may take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BuildQuality {
+    /// As soon as possible: for meshes that are traced a few times.
+    Fast,
+    /// Where more time would gain little.
+    #[default]
+    Default,
+    /// Several times as long as the default, for meshes that are compiled once and traced often.
+    High,
+}
+
+impl BuildQuality {
+    /// Leaves stay single: [`super::widen`] puts them together as it needs them.
+    fn params(self) -> BvhBuildParams {
+        let preset = match self {
+            BuildQuality::Fast => BvhBuildParams::very_fast_build(),
+            BuildQuality::Default => BvhBuildParams::medium_build(),
+            BuildQuality::High => BvhBuildParams::very_slow_build(),
+        };
+        // A split triangle would stand in two leaves.
+        BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..preset }
+    }
+}
 
 /// Leaves of the median build.
 const MEDIAN_LEAF: usize = 4;
@@ -31,20 +53,20 @@ const MEDIAN_LEAF: usize = 4;
 ///
 /// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (many boxes in one place),
 /// the tree is built by the median instead, whose depth is logarithmic whatever the boxes are.
-pub(crate) fn build(boxes: Vec<(Vec3, Vec3)>) -> Tree {
+pub(crate) fn build(boxes: Vec<(Vec3, Vec3)>, quality: BuildQuality) -> Tree {
     let primitives: Vec<Primitive> = boxes.into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
     if primitives.is_empty() {
         return Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 };
     }
-    let source = build_bvh2(&primitives, PARAMS, &mut Duration::default());
+    let source = build_bvh2(&primitives, quality.params(), &mut Duration::default());
     lay_out(&source).unwrap_or_else(|| median(&primitives))
 }
 
 /// Builds a tree of sixteen children a node. Where it ends deeper than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
-pub(crate) fn build_wide(boxes: Vec<(Vec3, Vec3)>) -> WideTree {
+pub(crate) fn build_wide(boxes: Vec<(Vec3, Vec3)>, quality: BuildQuality) -> WideTree {
     let primitives: Vec<Primitive> = boxes.iter().map(|&(lo, hi)| Primitive { lo, hi }).collect();
-    let wide = widen(&build(boxes));
-    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives)) }
+    let wide = widen(&build(boxes, quality), WIDTH);
+    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives), WIDTH) }
 }
 
 struct Primitive {
@@ -216,13 +238,13 @@ mod tests {
     #[test]
     fn every_primitive_stands_in_one_leaf() {
         for count in [1, 2, 3, 5, 100, 5000] {
-            check(&build(grid(count)), count);
+            check(&build(grid(count), BuildQuality::Default), count);
         }
     }
 
     #[test]
     fn twenty_thousand_boxes_in_one_place_stay_shallow() {
-        let tree = build(vec![(Vec3::ZERO, Vec3::ONE); 20_000]);
+        let tree = build(vec![(Vec3::ZERO, Vec3::ONE); 20_000], BuildQuality::Default);
         check(&tree, 20_000);
         assert!(tree.depth as usize <= MAX_DEPTH, "depth {}", tree.depth);
     }
@@ -238,6 +260,6 @@ mod tests {
 
     #[test]
     fn no_boxes_make_an_empty_root() {
-        assert_eq!(build(Vec::new()).nodes, [Node::EMPTY]);
+        assert_eq!(build(Vec::new(), BuildQuality::Default).nodes, [Node::EMPTY]);
     }
 }

@@ -4,14 +4,14 @@
 //! operation looks at sixteen boxes.
 
 mod build;
+mod collapse;
 mod node;
-mod traverse;
 mod wide;
 
+pub use build::BuildQuality;
 pub(crate) use build::{Tree, build, build_wide};
 pub(crate) use node::{Child, Node};
-pub(crate) use traverse::{RaySlabs, traverse};
-pub(crate) use wide::{WIDTH, WideChild, WideNode, WideTree, validate_wide};
+pub(crate) use wide::{WIDTH, WideChild, WideNode, WideTree, validate_wide, widen};
 
 /// Deepest tree that traversal accepts: the size of its stack. A balanced tree over 2^28 primitives is 28 deep;
 /// builds that end deeper are built again by the median.

@@ -1,15 +1,14 @@
 //! Trees of sixteen children a node, over blocks of sixteen triangles: one vector operation looks at a whole node, or
 //! at a whole leaf.
 //!
-//! Made from a binary tree by opening, again and again, the child with the largest surface
-//! (Wald, Benthin and Boulos, "Getting Rid of Packets", RT 2008), until sixteen stand side by side. A subtree with no
-//! more than sixteen triangles becomes a leaf: one block.
+//! Made from a binary tree (see `collapse.rs`). A subtree with no more than sixteen triangles becomes a leaf: one block.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::collapse::Collapse;
 use super::{Child, MAX_WIDE_DEPTH, Node, Tree};
-use crate::simd::{LANES, Lanes};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, mask32x16, u32x16};
 
 /// Children of a node, and triangles of a block.
 pub(crate) const WIDTH: usize = LANES;
@@ -25,7 +24,7 @@ pub(crate) struct WideNode {
     pub lo: [Lanes; 3],
     /// Greatest corners.
     pub hi: [Lanes; 3],
-    /// Index of a node, or of a block with [`LEAF`] set.
+    /// Index of a node, or of a block with [`LEAF`] set; zero where there is no child.
     children: [u32; WIDTH],
     /// How many there are, from the first on.
     pub count: u32,
@@ -43,10 +42,36 @@ pub(crate) enum WideChild {
     Block(u32),
 }
 
+impl WideChild {
+    /// What a child's number means: it is the index of a node, or of a block with [`LEAF`] set.
+    #[inline(always)]
+    pub(crate) fn of(link: u32) -> Self {
+        if link & LEAF == 0 { WideChild::Inner(link) } else { WideChild::Block(link & !LEAF) }
+    }
+}
+
 impl WideNode {
     pub(crate) fn child(&self, lane: usize) -> WideChild {
-        let child = self.children[lane];
-        if child & LEAF == 0 { WideChild::Inner(child) } else { WideChild::Block(child & !LEAF) }
+        WideChild::of(self.children[lane])
+    }
+
+    /// The number of a child: see [`WideChild::of`].
+    #[inline(always)]
+    pub(crate) fn link(&self, lane: usize) -> u32 {
+        self.children[lane]
+    }
+
+    /// Which lanes have a child. The walk needs the children's cache line next anyhow; the one with their count it does not.
+    #[inline(always)]
+    pub(crate) fn present_lanes<S: Simd>(&self, simd: S) -> mask32x16<S> {
+        // The root is nobody's child, and lanes without a child hold zero.
+        u32x16::load_array_ref(simd, &self.children).simd_gt(u32x16::splat(simd, 0))
+    }
+
+    /// Least corners of the boxes, by axis, then greatest ones; what follows is not for the eye.
+    #[inline(always)]
+    pub(crate) fn sides(&self) -> &[Lanes; 8] {
+        bytemuck::cast_ref(self)
     }
 
     /// One bit per child.
@@ -66,18 +91,23 @@ impl WideNode {
         )
     }
 
-    fn push(&mut self, (lo, hi): (Vec3, Vec3), child: u32) {
+    fn push(&mut self, bounds: (Vec3, Vec3), child: u32) {
         let lane = self.count as usize;
+        self.set_bounds(lane, bounds);
+        self.children[lane] = child;
+        self.count += 1;
+    }
+
+    fn set_bounds(&mut self, lane: usize, (lo, hi): (Vec3, Vec3)) {
         for axis in 0..3 {
             self.lo[axis].0[lane] = lo[axis];
             self.hi[axis].0[lane] = hi[axis];
         }
-        self.children[lane] = child;
-        self.count += 1;
     }
 }
 
 /// A wide tree, and which primitives stand in which block.
+#[derive(Clone, Debug)]
 pub(crate) struct WideTree {
     pub nodes: Vec<WideNode>,
     /// Up to sixteen primitives each.
@@ -85,73 +115,62 @@ pub(crate) struct WideTree {
     pub depth: u32,
 }
 
-/// A child of the binary tree.
-#[derive(Clone, Copy)]
-struct Open {
-    bounds: (Vec3, Vec3),
-    child: Child,
-    primitives: u32,
-}
-
-/// Widens a binary tree.
-pub(crate) fn widen(tree: &Tree) -> WideTree {
-    let sizes = subtree_sizes(&tree.nodes);
-    let mut wide = WideTree { nodes: vec![WideNode::zeroed()], blocks: Vec::new(), depth: 1 };
-    let mut pending = vec![(0_u32, children_of(&tree.nodes[0], &sizes), 1_u32)];
-    while let Some((own, children, depth)) = pending.pop() {
-        wide.depth = wide.depth.max(depth);
-        for open in opened(children, &tree.nodes, &sizes) {
-            let link = if open.primitives as usize <= WIDTH {
-                wide.blocks.push(primitives_below(tree, open.child));
-                LEAF | (wide.blocks.len() - 1) as u32
-            } else {
-                wide.nodes.push(WideNode::zeroed());
-                (wide.nodes.len() - 1) as u32
-            };
-            wide.nodes[own as usize].push(open.bounds, link);
-            if link & LEAF == 0
-                && let Child::Inner(node) = open.child
-            {
-                pending.push((link, children_of(&tree.nodes[node as usize], &sizes), depth + 1));
+impl WideTree {
+    /// The nodes with other boxes: those of the blocks are given by their primitives.
+    pub(crate) fn refitted(&self, bounds_of: impl Fn(u32) -> (Vec3, Vec3)) -> Vec<WideNode> {
+        let mut nodes = self.nodes.clone();
+        // Children stand behind their parents.
+        for index in (0..nodes.len()).rev() {
+            for lane in 0..nodes[index].count as usize {
+                let bounds = match nodes[index].child(lane) {
+                    WideChild::Inner(child) => nodes[child as usize].bounds(),
+                    WideChild::Block(block) => self.blocks[block as usize].iter().fold(
+                        (Vec3::INFINITY, Vec3::NEG_INFINITY),
+                        |(lo, hi), &primitive| {
+                            let (a, b) = bounds_of(primitive);
+                            (lo.min(a), hi.max(b))
+                        },
+                    ),
+                };
+                nodes[index].set_bounds(lane, bounds);
             }
         }
+        nodes
+    }
+}
+
+/// Widens a binary tree. Subtrees with no more than `leaf` primitives become leaves, and so do leaves with more.
+pub(crate) fn widen(tree: &Tree, leaf: usize) -> WideTree {
+    let sizes = subtree_sizes(&tree.nodes);
+    let collapse = Collapse::new(tree, |node| sizes[node as usize] as usize <= leaf);
+    let mut wide = WideTree { nodes: vec![WideNode::zeroed()], blocks: Vec::new(), depth: 1 };
+    let mut pending = vec![(0_u32, 0_u32, 1_u32)];
+    while let Some((own, source, depth)) = pending.pop() {
+        wide.depth = wide.depth.max(depth);
+        collapse.children(source, &mut |parent, side| {
+            let node = &tree.nodes[parent as usize];
+            let child = node.child(side);
+            let link = match child {
+                Child::Inner(inner) if sizes[inner as usize] as usize > leaf => {
+                    wide.nodes.push(WideNode::zeroed());
+                    let link = (wide.nodes.len() - 1) as u32;
+                    pending.push((link, inner, depth + 1));
+                    link
+                }
+                _ => {
+                    wide.blocks.push(primitives_below(tree, child));
+                    LEAF | (wide.blocks.len() - 1) as u32
+                }
+            };
+            wide.nodes[own as usize].push(node.child_bounds(side), link);
+        });
     }
     wide
 }
 
-/// Opens the largest child that is no leaf of the wide tree, until there are sixteen or none is left to open.
-fn opened(mut children: Vec<Open>, nodes: &[Node], sizes: &[u32]) -> Vec<Open> {
-    while children.len() < WIDTH {
-        let largest = (0..children.len())
-            .filter(|&i| children[i].primitives as usize > WIDTH)
-            .max_by(|&a, &b| half_area(children[a].bounds).total_cmp(&half_area(children[b].bounds)));
-        let Some(index) = largest else { break };
-        let Child::Inner(node) = children[index].child else { break };
-        let mut inner = children_of(&nodes[node as usize], sizes).into_iter();
-        // A binary node has two children, unless it is a root with one leaf: then there is nothing to open.
-        children[index] = inner.next().unwrap_or(children[index]);
-        children.extend(inner);
-    }
-    children
-}
-
-fn half_area((lo, hi): (Vec3, Vec3)) -> f32 {
+pub(super) fn half_area((lo, hi): (Vec3, Vec3)) -> f32 {
     let size = hi - lo;
     size.x * size.y + size.y * size.z + size.z * size.x
-}
-
-fn children_of(node: &Node, sizes: &[u32]) -> Vec<Open> {
-    (0..2)
-        .filter_map(|side| {
-            let child = node.child(side);
-            let primitives = match child {
-                Child::Empty => return None,
-                Child::Inner(inner) => sizes[inner as usize],
-                Child::Leaf { count, .. } => count,
-            };
-            Some(Open { bounds: node.child_bounds(side), child, primitives })
-        })
-        .collect()
 }
 
 /// Primitives below each node; children stand behind their parents.
@@ -225,6 +244,9 @@ pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32,
         if node.lo.iter().chain(&node.hi).flat_map(|lanes| lanes.0).any(|bound| !bound.is_finite()) {
             return broken(index, "a bound is not finite".into());
         }
+        if node.children[node.count as usize..].iter().any(|&child| child != 0) {
+            return broken(index, "a lane without a child names one".into());
+        }
         for lane in 0..node.count as usize {
             match node.child(lane) {
                 WideChild::Inner(child) => {
@@ -255,7 +277,7 @@ pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32,
 
 #[cfg(test)]
 mod tests {
-    use super::super::build_wide;
+    use super::super::{BuildQuality, build_wide};
     use super::*;
 
     fn boxes(n: usize) -> Vec<(Vec3, Vec3)> {
@@ -278,7 +300,7 @@ mod tests {
     fn every_primitive_stands_in_one_block_inside_the_boxes_above() {
         for count in [1, 2, 16, 17, 300, 5000] {
             let all = boxes(count);
-            let tree = build_wide(all.clone());
+            let tree = build_wide(all.clone(), BuildQuality::Default);
             assert_eq!(validate_wide(&tree.nodes, tree.blocks.len() as u32).unwrap(), tree.depth);
             let mut seen: Vec<u32> = tree.blocks.iter().flatten().copied().collect();
             seen.sort_unstable();
@@ -290,8 +312,16 @@ mod tests {
     }
 
     #[test]
+    fn nodes_are_well_filled() {
+        let tree = build_wide(boxes(20_000), BuildQuality::Default);
+        let children: u32 = tree.nodes.iter().map(|node| node.count).sum();
+        let mean = f64::from(children) / tree.nodes.len() as f64;
+        assert!(mean > 10.0, "{mean} children a node");
+    }
+
+    #[test]
     fn two_thousand_boxes_in_one_place_stay_shallow() {
-        let tree = build_wide(vec![(Vec3::ZERO, Vec3::ONE); 2_000]);
+        let tree = build_wide(vec![(Vec3::ZERO, Vec3::ONE); 2_000], BuildQuality::Default);
         assert!(tree.depth as usize <= MAX_WIDE_DEPTH, "depth {}", tree.depth);
     }
 
@@ -301,6 +331,8 @@ mod tests {
         infinite.hi[1].0[0] = f32::INFINITY;
         let mut crowded = node(&[LEAF]);
         crowded.count = 17;
+        let mut hidden = node(&[LEAF]);
+        hidden.children[1] = LEAF;
         let chain: Vec<WideNode> = (0..=MAX_WIDE_DEPTH as u32).map(|i| node(&[i + 1])).collect();
         let cases = [
             (vec![], 0, "no root"),
@@ -314,6 +346,7 @@ mod tests {
             (vec![node(&[LEAF])], 2, "hangs nowhere"),
             (vec![node(&[LEAF]), node(&[LEAF | 1])], 2, "no node names it"),
             (vec![infinite], 1, "not finite"),
+            (vec![hidden], 1, "without a child"),
             (chain, 0, "deeper than"),
         ];
         for (nodes, blocks, expected) in cases {

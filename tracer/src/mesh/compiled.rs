@@ -1,11 +1,12 @@
 //! A mesh ready to trace: triangles in the order of the tree's leaves, and the tree, in one blob.
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::blob::{AlignedBytes, Header, NO_TRIANGLE, Sections, TriangleBlock};
 use super::clean::{CleanMesh, clean};
 use super::{MAX_COORDINATE, Mesh, MeshError, MeshId, NamedMaterial};
-use crate::bvh::{self, WIDTH, WideNode, WideTree};
+use crate::bvh::{self, BuildQuality, WIDTH, WideNode, WideTree};
 use crate::scene::Material;
 use crate::simd::Lanes;
 
@@ -14,6 +15,15 @@ use crate::simd::Lanes;
 pub struct CompileOptions {
     /// Vertex normals for smooth shading: the file's, or averaged. A mesh that is only ever drawn flat needs none.
     pub normals: bool,
+    /// How much time its tree may take. What is seen does not depend on it.
+    pub quality: BuildQuality,
+}
+
+impl Default for CompileOptions {
+    /// With normals, at the default quality.
+    fn default() -> Self {
+        Self { normals: true, quality: BuildQuality::Default }
+    }
 }
 
 /// What cleaning dropped.
@@ -55,7 +65,7 @@ impl CompiledMesh {
     /// # Errors
     /// A mesh that is inconsistent, too large, or has nothing left after cleaning.
     pub fn compile(mesh: &Mesh) -> Result<(Self, MeshReport), MeshError> {
-        Self::compile_with(mesh, CompileOptions { normals: true })
+        Self::compile_with(mesh, CompileOptions::default())
     }
 
     /// Cleans, centres and builds.
@@ -64,7 +74,7 @@ impl CompiledMesh {
     /// As [`CompiledMesh::compile`].
     pub fn compile_with(mesh: &Mesh, options: CompileOptions) -> Result<(Self, MeshReport), MeshError> {
         let (clean, report) = clean(mesh, options.normals)?;
-        let tree = bvh::build_wide(clean.corners.iter().map(bounds_of_corners).collect());
+        let tree = bvh::build_wide(clean.corners.iter().map(bounds_of_corners).collect(), options.quality);
         let materials = encode_materials(&mesh.materials);
 
         let mut header = Header::new(clean.center, clean.exponent, clean.bounds);
@@ -289,7 +299,7 @@ fn lay_out(header: &Header, clean: &CleanMesh, tree: &WideTree, materials: &[u8]
     let out = bytes.as_mut_slice();
     out[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(header));
     let blocks: Vec<TriangleBlock> =
-        tree.blocks.iter().map(|block| block_of(block, &clean.corners)).collect();
+        tree.blocks.par_iter().map(|block| block_of(block, &clean.corners)).collect();
     put(out, sections.nodes, &tree.nodes);
     put(out, sections.blocks, &blocks);
     put(out, sections.sources, &in_lanes(tree, &clean.sources, NO_TRIANGLE));

@@ -14,6 +14,7 @@ use std::fmt;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+pub use crate::bvh::BuildQuality;
 use crate::scene::Material;
 pub(crate) use blob::TriangleBlock;
 pub use compiled::{CompileOptions, CompiledMesh, MeshReport};

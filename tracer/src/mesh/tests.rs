@@ -85,7 +85,11 @@ fn bytes_come_back_as_the_same_mesh() {
 
 #[test]
 fn normals_are_left_out_where_nobody_asks_for_them() {
-    let (flat, _) = CompiledMesh::compile_with(&sheet(20), CompileOptions { normals: false }).unwrap();
+    let (flat, _) = CompiledMesh::compile_with(
+        &sheet(20),
+        CompileOptions { normals: false, ..CompileOptions::default() },
+    )
+    .unwrap();
     let (smooth, _) = CompiledMesh::compile(&sheet(20)).unwrap();
     assert!(flat.bytes().len() < smooth.bytes().len());
     assert_eq!((flat.has_normals(), flat.corner_normals(0)), (false, None));

@@ -43,10 +43,14 @@ pub fn load(path: &Path) -> Result<LoadedScene, SceneError> {
 /// # Errors
 /// As [`load`].
 pub fn load_model(path: &Path) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
-    load_model_with(path, CompileOptions { normals: true })
+    load_model_with(path, CompileOptions::default())
 }
 
-fn load_model_with(
+/// As [`load_model`], compiled as asked for; what is compiled already stays as it is.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_model_with(
     path: &Path,
     options: CompileOptions,
 ) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
@@ -203,7 +207,8 @@ impl Models {
                 let normals = self.smooth.contains(entry.key());
                 // Messages name the file as the user does.
                 let path = self.folder.join(&text.file);
-                let (mesh, warnings) = load_model_with(&path, CompileOptions { normals })?;
+                let (mesh, warnings) =
+                    load_model_with(&path, CompileOptions { normals, ..CompileOptions::default() })?;
                 self.warnings.extend(warnings);
                 entry.insert(LoadedModel { mesh, own_materials: None })
             }

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::mesh::MeshId;
 
 pub use error::SceneError;
-pub use load::{LoadedScene, load, load_model};
+pub use load::{LoadedScene, load, load_model, load_model_with};
 pub use validate::{
     MAX_COORDINATE, MAX_DEPTH, MAX_EXPONENT, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES,
     MAX_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TRIANGLES, ValidateError,

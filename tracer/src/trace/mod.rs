@@ -1,9 +1,12 @@
 //! Rays against the whole scene: the scene's tree over its items, and for models a tree over their triangles.
 //!
-//! Rays live in `f64`. Trees and edges are `f32`, so before a ray enters one its origin is moved, exactly enough, to
-//! where it meets the tree's bounds: the digits of an `f32` are then spent near the geometry, however far the ray
-//! comes from.
+//! Rays live in `f64`. Trees and edges are `f32`: a filter looks at sixteen boxes or triangles at once and tells what is
+//! certain (`walk.rs`, `filter.rs`); the exact test of `triangle.rs` decides the rest, and computes the distance that is
+//! answered. Every level of SIMD, and every tree, therefore gives the same hit, to the bit.
 
+mod filter;
+mod near_ray;
+mod search;
 #[cfg(test)]
 mod tests;
 mod walk;
@@ -12,12 +15,16 @@ use std::ops::ControlFlow::{self, Continue};
 
 use glam::{DVec3, Vec3};
 
-use crate::bvh::{RaySlabs, traverse};
+use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
-use crate::simd::{Level, Simd, dispatch};
+use crate::mesh::TriangleBlock;
+use crate::simd::{Simd, dispatch, each_bit};
 use crate::triangle::ShearedRay;
-use walk::{FilterRay, walk};
+use filter::FilterRay;
+use near_ray::NearRay;
+use search::{Any, Closest, Offer, Search};
+use walk::{Leaves, Stack, walk};
 
 /// o + t d in eye space; d need not be a unit vector.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +40,7 @@ pub(crate) struct PrimitiveId {
     pub triangle: u32,
 }
 
-/// Where a ray meets the scene.
+/// Where a ray meets one primitive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {
     pub t: f64,
@@ -42,43 +49,71 @@ pub(crate) struct Hit {
     rank: (u32, u32),
 }
 
-/// What a visitor of hits answers: go on up to this distance, or stop.
-type Answer = ControlFlow<(), f64>;
-
-/// Which ray is traced, and what it cannot hit.
-#[derive(Clone, Copy)]
-struct Query {
-    ray: Ray,
-    leaving: Option<PrimitiveId>,
+/// Where a ray meets the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// The point is origin + `t` * direction.
+    pub t: f64,
+    /// What is there.
+    pub primitive: Primitive,
 }
 
-impl Query {
-    fn leaves(&self, primitive: PrimitiveId) -> bool {
-        self.leaving == Some(primitive)
-    }
+/// A part of a scene that a ray can hit, by its place in [`crate::scene::Scene`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Primitive {
+    /// A triangle of a model's mesh.
+    Model {
+        /// Index of the model in the scene.
+        model: usize,
+        /// Index of the triangle in the model's [`crate::mesh::CompiledMesh`].
+        triangle: u32,
+    },
+    /// Index of a sphere.
+    Sphere(usize),
+    /// Index of a triangle of the scene file.
+    Triangle(usize),
+    /// Index of a plane.
+    Plane(usize),
 }
 
 impl PreparedFrame {
-    /// The nearest hit with t > 0, for one ray: what tiles are held against.
-    #[cfg(test)]
-    pub(crate) fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let mut best = None;
-        let mut limit = f64::INFINITY;
-        let _ = self.each_hit(Query { ray: *ray, leaving: None }, limit, |hit| {
-            if best.is_none_or(|best| hit.wins_over(&best)) {
-                limit = hit.t;
-                best = Some(hit);
-            }
-            Answer::Continue(limit)
-        });
-        best
+    /// The closest hit with 0 < t < `t_max` of the ray origin + t * direction, in world space, from either side of a
+    /// surface.
+    ///
+    /// `direction` need not be a unit vector; t is in its lengths. The hit is the one that an exact test (in `f64`) of all
+    /// primitives in turn would find, to the bit and on every machine. No ray slips between two triangles that share an
+    /// edge (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013). Of hits with the same t the first in
+    /// the scene counts: models before spheres before triangles before planes, and in a mesh the triangle that comes
+    /// first in its file.
+    ///
+    /// `None` also for what is no ray: an origin or a direction that is not finite, or a direction whose largest
+    /// component is not within 1e-100 to 1e100.
+    pub fn closest_hit(&self, origin: DVec3, direction: DVec3, t_max: f64) -> Option<RayHit> {
+        let ray = self.to_eye(origin, direction)?;
+        let (t, primitive) = self.closest(&ray, t_max)?;
+        Some(RayHit { t, primitive: self.named(primitive) })
+    }
+
+    /// Whether there is a hit with 0 < t < `t_max`: as [`PreparedFrame::closest_hit`], in less time.
+    pub fn any_hit(&self, origin: DVec3, direction: DVec3, t_max: f64) -> bool {
+        self.to_eye(origin, direction).is_some_and(|ray| self.is_occluded(&ray, t_max, None))
+    }
+
+    /// The closest hit with 0 < t < `t_max`: its t, and what is there.
+    pub(crate) fn closest(&self, ray: &Ray, t_max: f64) -> Option<(f64, PrimitiveId)> {
+        let mut closest = Closest::new(self, ray, t_max);
+        let _ = dispatch!(self.level, simd => self.search(simd, ray, &mut closest));
+        closest.found()
     }
 
     /// Whether anything but the primitive that the ray leaves is hit within 0 < t < `t_max`.
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f64, leaving: PrimitiveId) -> bool {
-        let query = Query { ray: *ray, leaving: Some(leaving) };
-        let visit = |hit: Hit| if hit.t < t_max { Answer::Break(()) } else { Answer::Continue(t_max) };
-        self.each_hit(query, t_max, visit).is_break()
+        self.is_occluded(ray, t_max, Some(leaving))
+    }
+
+    fn is_occluded(&self, ray: &Ray, t_max: f64, leaving: Option<PrimitiveId>) -> bool {
+        let mut any = Any { frame: self, ray, t_max, leaving };
+        dispatch!(self.level, simd => self.search(simd, ray, &mut any)).is_break()
     }
 
     /// The hit of one primitive, to the last digit.
@@ -88,126 +123,176 @@ impl PreparedFrame {
         primitive: PrimitiveId,
         leaving: Option<PrimitiveId>,
     ) -> Option<Hit> {
-        let query = Query { ray: *ray, leaving };
+        let t = self.t_of(ray, primitive, leaving)?;
         let PrimitiveId { item, triangle } = primitive;
+        // Planes and other items have one triangle, so to say.
+        let position = match self.items.get(item) {
+            Item::Model(index) => self.instances[index].mesh.source(triangle),
+            Item::Sphere(_) | Item::Triangle(_) => 0,
+        };
+        Some(Hit { t, primitive, rank: (item, position) })
+    }
+
+    /// Where the ray hits one primitive, to the last digit. Of one that it leaves only the far side is hit, if it has one.
+    fn t_of(&self, ray: &Ray, primitive: PrimitiveId, leaving: Option<PrimitiveId>) -> Option<f64> {
+        let PrimitiveId { item, triangle } = primitive;
+        let leaves = leaving == Some(primitive);
         if item >= self.items.first_plane() {
             let plane = &self.planes[(item - self.items.first_plane()) as usize];
-            let t = plane.intersect(ray.origin, ray.direction).filter(|_| !query.leaves(primitive))?;
-            return Some(Hit::of_item(item, t));
+            return plane.intersect(ray.origin, ray.direction).filter(|_| !leaves);
         }
-        let Item::Model(index) = self.items.get(item) else {
-            return self.item_hit(item, query, &ShearedRay::new(ray.origin, ray.direction));
-        };
-        if query.leaves(primitive) {
-            return None;
-        }
-        let instance = &self.instances[index];
-        let local = instance.to_mesh(ray);
-        let corners = instance.mesh.corners(triangle).map(Vec3::as_dvec3);
-        let t = ShearedRay::new(local.origin, local.direction).intersect(&corners)?;
-        let rank = (item, instance.mesh.source(triangle));
-        Some(Hit { t, primitive, rank })
-    }
-
-    /// Offers every hit that may matter to `visit`, which answers with the farthest distance still of interest.
-    #[inline(always)]
-    fn each_hit(&self, query: Query, t_max: f64, mut visit: impl FnMut(Hit) -> Answer) -> ControlFlow<()> {
-        let mut limit = t_max;
-        for hit in self.plane_hits(query) {
-            limit = visit(hit)?.min(limit);
-        }
-        let (lo, hi) = self.nodes[0].bounds();
-        let Some(start) = approach(&query.ray, lo, hi) else { return Continue(()) };
-        let local = query.ray.from(start);
-        let triangle_ray = ShearedRay::new(query.ray.origin, query.ray.direction);
-        traverse(&self.nodes, &local.slabs(), shifted(limit, start), |first, count| {
-            for position in first..first + count {
-                let item = self.item_at(position);
-                if let Item::Model(index) = self.items.get(item) {
-                    limit = self.instances[index].each_hit(self.level, item, query, limit, &mut visit)?;
-                } else if let Some(hit) = self.item_hit(item, query, &triangle_ray) {
-                    limit = visit(hit)?.min(limit);
-                }
-            }
-            Continue(shifted(limit, start))
-        })
-    }
-
-    fn plane_hits(&self, query: Query) -> impl Iterator<Item = Hit> {
-        (self.items.first_plane()..).zip(&self.planes).filter_map(move |(item, plane)| {
-            let t = plane.intersect(query.ray.origin, query.ray.direction)?;
-            let hit = Hit::of_item(item, t);
-            (!query.leaves(hit.primitive)).then_some(hit)
-        })
-    }
-
-    /// The hit of a sphere or a triangle of the scene file.
-    fn item_hit(&self, item: u32, query: Query, triangle_ray: &ShearedRay) -> Option<Hit> {
-        let leaves = query.leaves(PrimitiveId { item, triangle: 0 });
         match self.items.get(item) {
-            Item::Model(_) => None,
-            Item::Sphere(index) => {
-                let t = self.spheres[index].intersect(query.ray.origin, query.ray.direction, leaves)?;
-                Some(Hit::of_item(item, t))
-            }
-            Item::Triangle(_) if leaves => None,
+            Item::Sphere(index) => self.spheres[index].intersect(ray.origin, ray.direction, leaves),
+            Item::Model(_) | Item::Triangle(_) if leaves => None,
             Item::Triangle(index) => {
-                let t = triangle_ray.intersect(&self.triangles[index].corners)?;
-                Some(Hit::of_item(item, t))
+                ShearedRay::new(ray.origin, ray.direction).intersect(&self.triangles[index].corners)
             }
+            Item::Model(index) => {
+                let instance = &self.instances[index];
+                let local = instance.to_mesh(ray);
+                let corners = instance.mesh.corners(triangle).map(Vec3::as_dvec3);
+                ShearedRay::new(local.origin, local.direction).intersect(&corners)
+            }
+        }
+    }
+
+    /// Offers every primitive to `search` that the ray may hit, those in nearer boxes earlier.
+    #[inline(always)]
+    fn search<S: Simd>(&self, simd: S, ray: &Ray, search: &mut impl Search) -> ControlFlow<()> {
+        for plane in 0..self.planes.len() as u32 {
+            self.offer_item(ray, self.items.first_plane() + plane, search)?;
+        }
+        let mut items = ItemLeaves { frame: self, ray, stack: Stack::new(), search };
+        if self.wide_nodes[0].count == 1 && self.wide_nodes.len() == 1 {
+            return items.visit_items(simd, 0);
+        }
+        let bounds = || self.wide_nodes[0].bounds();
+        let Some(near) = NearRay::new(*ray, bounds) else { return Continue(()) };
+        walk(simd, &self.wide_nodes, &near, &mut Stack::new(), &mut items)
+    }
+
+    /// A sphere, a plane or a triangle of the scene file.
+    #[inline(never)]
+    fn offer_item(&self, ray: &Ray, item: u32, search: &mut impl Search) -> ControlFlow<()> {
+        let primitive = PrimitiveId { item, triangle: 0 };
+        let leaving = search.leaves(primitive).then_some(primitive);
+        match self.t_of(ray, primitive, leaving) {
+            Some(t) => search.offer(Offer { primitive, certain: true, low: t, high: t }),
+            None => Continue(()),
+        }
+    }
+
+    /// `None` for what is no ray.
+    #[inline(always)]
+    fn to_eye(&self, origin: DVec3, direction: DVec3) -> Option<Ray> {
+        let reach = direction.abs().max_element();
+        let usable = origin.is_finite() && direction.is_finite() && (1e-100..=1e100).contains(&reach);
+        // Units are powers of two: t stays what it is, to the bit.
+        usable.then(|| Ray {
+            origin: (origin - self.view().camera.position) * self.per_unit,
+            direction: direction * self.per_unit,
+        })
+    }
+
+    fn named(&self, PrimitiveId { item, triangle }: PrimitiveId) -> Primitive {
+        if item >= self.items.first_plane() {
+            return Primitive::Plane((item - self.items.first_plane()) as usize);
+        }
+        match self.items.get(item) {
+            Item::Model(model) => Primitive::Model { model, triangle },
+            Item::Sphere(index) => Primitive::Sphere(index),
+            Item::Triangle(index) => Primitive::Triangle(index),
         }
     }
 }
 
-impl Instance {
-    /// Offers the hits of this model to `visit`. Continues with the farthest distance still of interest.
-    fn each_hit(
-        &self,
-        level: Level,
-        item: u32,
-        query: Query,
-        limit: f64,
-        visit: &mut impl FnMut(Hit) -> Answer,
-    ) -> Answer {
-        let ray = self.to_mesh(&query.ray);
-        let (lo, hi) = self.mesh.root_bounds();
-        let Some(start) = approach(&ray, lo, hi).filter(|&start| start <= limit) else {
-            return Continue(limit);
-        };
-        let near = ray.from(start);
-        let filter = FilterRay::new(near.origin, near.direction);
-        let exact = ShearedRay::new(ray.origin, ray.direction);
-        dispatch!(level, simd => self.walk(simd, &filter, &exact, (item, start), query, limit, visit))
+/// Leaves of the scene's tree.
+struct ItemLeaves<'a, T> {
+    frame: &'a PreparedFrame,
+    ray: &'a Ray,
+    /// For the trees of meshes.
+    stack: Stack,
+    search: &'a mut T,
+}
+
+impl<T: Search> ItemLeaves<'_, T> {
+    #[inline(always)]
+    fn visit_items<S: Simd>(&mut self, simd: S, leaf: u32) -> ControlFlow<()> {
+        for &item in self.frame.items_of(leaf) {
+            if let Item::Model(index) = self.frame.items.get(item) {
+                let instance = &self.frame.instances[index];
+                instance.search(simd, self.ray, item, &mut self.stack, self.search)?;
+            } else {
+                self.frame.offer_item(self.ray, item, self.search)?;
+            }
+        }
+        Continue(())
+    }
+}
+
+impl<S: Simd, T: Search> Leaves<S> for ItemLeaves<'_, T> {
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.search.limit()
     }
 
     #[inline(always)]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one call, split off so that it is compiled for each level"
-    )]
-    fn walk<S: Simd>(
-        &self,
-        simd: S,
-        filter: &FilterRay,
-        exact: &ShearedRay,
-        (item, start): (u32, f64),
-        query: Query,
-        mut limit: f64,
-        visit: &mut impl FnMut(Hit) -> Answer,
-    ) -> Answer {
-        walk(simd, &self.mesh, filter, shifted(limit, start), |triangle| {
-            let primitive = PrimitiveId { item, triangle };
-            if !query.leaves(primitive)
-                && let Some(t) = exact.intersect(&self.mesh.corners(triangle).map(Vec3::as_dvec3))
-            {
-                let rank = (item, self.mesh.source(triangle));
-                limit = visit(Hit { t, primitive, rank })?.min(limit);
-            }
-            Continue(shifted(limit, start))
-        })?;
-        Continue(limit)
+    fn visit(&mut self, simd: S, leaf: u32, _: f32) -> ControlFlow<()> {
+        self.visit_items(simd, leaf)
+    }
+}
+
+/// Blocks of triangles of a mesh.
+struct TriangleLeaves<'a, T> {
+    item: u32,
+    blocks: &'a [TriangleBlock],
+    near: &'a NearRay,
+    filter: FilterRay,
+    search: &'a mut T,
+}
+
+impl<S: Simd, T: Search> Leaves<S> for TriangleLeaves<'_, T> {
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.search.limit()
     }
 
+    #[inline(always)]
+    fn visit(&mut self, simd: S, leaf: u32, reach: f32) -> ControlFlow<()> {
+        let hits = self.filter.hits(simd, &self.blocks[leaf as usize], reach);
+        for lane in each_bit(hits.maybe) {
+            let triangle = leaf * WIDTH as u32 + lane as u32;
+            let primitive = PrimitiveId { item: self.item, triangle };
+            if !self.search.leaves(primitive) {
+                let certain = hits.certain >> lane & 1 == 1;
+                let (low, high) = (self.near.t(hits.low[lane]), self.near.t(hits.high[lane]));
+                self.search.offer(Offer { primitive, certain, low, high })?;
+            }
+        }
+        Continue(())
+    }
+}
+
+impl Instance {
+    /// Offers every triangle of this model to `search` that the ray may hit.
+    #[inline(always)]
+    fn search<S: Simd>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        item: u32,
+        stack: &mut Stack,
+        search: &mut impl Search,
+    ) -> ControlFlow<()> {
+        let whole_mesh = || (Vec3::NEG_ONE, Vec3::ONE);
+        let Some(near) = NearRay::new(self.to_mesh(ray), whole_mesh) else { return Continue(()) };
+        let filter = FilterRay::new(&near);
+        let blocks = self.mesh.blocks();
+        let mut triangles = TriangleLeaves { item, blocks, near: &near, filter, search };
+        walk(simd, self.mesh.nodes(), &near, stack, &mut triangles)
+    }
+
+    #[inline(always)]
     fn to_mesh(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.inverse * (ray.origin - self.translation),
@@ -217,48 +302,7 @@ impl Instance {
 }
 
 impl Hit {
-    fn of_item(item: u32, t: f64) -> Self {
-        Self { t, primitive: PrimitiveId { item, triangle: 0 }, rank: (item, 0) }
-    }
-
     pub(crate) fn wins_over(&self, other: &Hit) -> bool {
         self.t < other.t || (self.t == other.t && self.rank < other.rank)
     }
-}
-
-impl Ray {
-    /// The same line, starting at distance `start`: t there is t here minus `start`.
-    fn from(&self, start: f64) -> Ray {
-        Ray { origin: self.origin + self.direction * start, direction: self.direction }
-    }
-
-    fn slabs(&self) -> RaySlabs {
-        RaySlabs::new(self.origin.as_vec3(), self.direction.as_vec3())
-    }
-}
-
-/// A limit along the ray, seen from `start` on.
-fn shifted(limit: f64, start: f64) -> f32 {
-    ((limit - start).max(0.0)) as f32
-}
-
-/// How far before a box a ray is started, in units of its space (boxes lie within [-1, 1] or so): far more than the
-/// rounding of its origin to `f32` may carry it past a flat box, and far less than would cost digits.
-const RUN_UP: f64 = 1.0 / (1 << 18) as f64;
-
-/// Where to start a ray so that it enters a box soon, 0 if it starts inside or close by; `None` if it misses the box.
-#[inline(always)]
-fn approach(ray: &Ray, lo: Vec3, hi: Vec3) -> Option<f64> {
-    let (mut near, mut far) = (0.0_f64, f64::INFINITY);
-    for axis in 0..3 {
-        let inverse = 1.0 / ray.direction[axis];
-        let (entry, exit) = if inverse.is_sign_negative() { (hi, lo) } else { (lo, hi) };
-        // Written so that a NaN (a ray inside the plane of a side) changes nothing.
-        let t_entry = (f64::from(entry[axis]) - ray.origin[axis]) * inverse;
-        let t_exit = (f64::from(exit[axis]) - ray.origin[axis]) * inverse;
-        near = if t_entry > near { t_entry } else { near };
-        far = if t_exit < far { t_exit } else { far };
-    }
-    let run_up = RUN_UP / ray.direction.abs().max_element();
-    (near <= far * (1.0 + 1e-12)).then_some((near - run_up).max(0.0))
 }

@@ -9,7 +9,8 @@ use super::*;
 use crate::compile::CompiledScene;
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::scene::{
-    Background, Camera, FrameView, Material, Model, NormalMode, RenderSettings, Scene, Triangle,
+    Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
+    Triangle,
 };
 
 /// A scene of models of one mesh, seen from `eye`.
@@ -77,7 +78,9 @@ fn ball(rings: u32, sectors: u32, place: impl Fn(DVec3) -> DVec3) -> Mesh {
 /// Rays from `eye` at every vertex and at points of every edge of a mesh around the origin. Returns how many missed.
 fn leaks(mesh: &Mesh, eye: DVec3) -> usize {
     let frame = frame_of(mesh, eye, |_| {});
-    let aim = |target: DVec3| frame.closest(&Ray { origin: DVec3::ZERO, direction: target - eye }).is_none();
+    let aim = |target: DVec3| {
+        frame.closest(&Ray { origin: DVec3::ZERO, direction: target - eye }, f64::INFINITY).is_none()
+    };
     let mut missed = mesh.positions.iter().filter(|&&p| aim(p)).count();
     for corners in &mesh.triangles {
         for edge in 0..3 {
@@ -108,8 +111,10 @@ fn no_ray_from_inside_slips_through_at_any_scale_or_place() {
 fn zero_components_of_directions_hit_like_others() {
     let frame = frame_of(&ball(12, 20, |p| p), DVec3::ZERO, |_| {});
     for direction in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
-        assert!(frame.closest(&Ray { origin: DVec3::ZERO, direction }).is_some(), "{direction}");
-        assert!(frame.closest(&Ray { origin: DVec3::ZERO, direction: direction * 1e-30 }).is_some());
+        for length in [1.0, 1e-30, 1e90] {
+            let ray = Ray { origin: DVec3::ZERO, direction: direction * length };
+            assert!(frame.closest(&ray, f64::INFINITY).is_some(), "{direction} {length}");
+        }
     }
 }
 
@@ -121,9 +126,9 @@ fn of_equal_distances_the_lowest_source_index_is_seen() {
     for order in [[quad, larger], [larger, quad]] {
         let positions = order.iter().flatten().copied().collect();
         let frame = frame_of(&mesh_of(positions, vec![[0, 1, 2], [3, 4, 5]]), DVec3::ZERO, |_| {});
-        let hit = frame.closest(&Ray { origin: DVec3::ZERO, direction: DVec3::NEG_Z }).unwrap();
-        assert_eq!(frame.instances[0].mesh.source(hit.primitive.triangle), 0);
-        assert_eq!(hit.t * f64::from(2_u32), hit.t + hit.t);
+        let ray = Ray { origin: DVec3::ZERO, direction: DVec3::NEG_Z };
+        let (_, primitive) = frame.closest(&ray, f64::INFINITY).unwrap();
+        assert_eq!(frame.instances[0].mesh.source(primitive.triangle), 0);
     }
 }
 
@@ -133,8 +138,9 @@ fn of_equal_distances_the_first_item_is_seen() {
     let frame = frame_of(&ball(6, 6, |p| p + DVec3::Z * 50.0), DVec3::ZERO, |scene| {
         scene.triangles = vec![Triangle { vertices: corners, material: 0 }; 5];
     });
-    let hit = frame.closest(&Ray { origin: DVec3::ZERO, direction: DVec3::NEG_Z }).unwrap();
-    assert_eq!(hit.primitive.item, 1, "item 0 is the model, 1 the first triangle");
+    let ray = Ray { origin: DVec3::ZERO, direction: DVec3::NEG_Z };
+    let (_, primitive) = frame.closest(&ray, f64::INFINITY).unwrap();
+    assert_eq!(primitive.item, 1, "item 0 is the model, 1 the first triangle");
 }
 
 proptest! {
@@ -167,17 +173,107 @@ proptest! {
             let ray = Ray { origin: DVec3::ZERO, direction: direction.into() };
             prop_assume!(ray.direction.length() > 1e-3);
             let brute = brute_force(&frame, &ray);
-            let found = frame.closest(&ray);
-            prop_assert_eq!(found.map(|hit| hit.primitive), brute.map(|(_, primitive)| primitive));
-            if let (Some(hit), Some((t, primitive))) = (found, brute) {
-                prop_assert!((hit.t - t).abs() <= 1e-12 * t);
+            let found = frame.closest(&ray, f64::INFINITY);
+            prop_assert_eq!(found, brute);
+            if let Some((t, primitive)) = brute {
                 let elsewhere = PrimitiveId { item: u32::MAX, triangle: 0 };
                 prop_assert!(frame.occluded(&ray, t * 1.001, elsewhere));
-                prop_assert!(!frame.occluded(&ray, t * 0.999, elsewhere));
+                prop_assert!(!frame.occluded(&ray, t, elsewhere));
                 prop_assert!(!frame.occluded(&ray, t * 1.000001, primitive) || brute_count(&frame, &ray, t * 1.00001) > 1);
+                prop_assert_eq!(frame.closest(&ray, t), None);
             }
         }
     }
+
+    /// Rays from anywhere, near and far, at vertices, at points of edges, and past the mesh: on every level of SIMD what
+    /// brute force finds, to the bit.
+    #[test]
+    fn at_vertices_and_edges_every_level_finds_what_brute_force_finds(
+        from in prop::array::uniform3(-3.0..3.0_f64),
+        distance in prop::sample::select(vec![0.1, 1.0, 30.0, 1e5]),
+        targets in prop::collection::vec((0_usize..400, 0_usize..3, 0.0..1.0_f64, prop::bool::ANY), 30),
+        length in prop::sample::select(vec![1.0, 1.0 / f64::from(1 << 25), f64::from(1 << 25)]),
+        shift in prop::array::uniform3(-1.0..1.0_f64),
+        beside in prop::sample::select(vec![1e-2, 1e-6, 1e-7]),
+    ) {
+        let mesh = ball(9, 13, |p| p);
+        let mut frame = frame_of(&mesh, DVec3::new(0.1, 0.2, 0.3), |scene| {
+            scene.models.push(scene.models[0].clone());
+            // The same again, so that all hits tie, and once more a little beside.
+            scene.models.push(Model { translate: DVec3::from(shift) * beside, ..scene.models[0].clone() });
+        });
+        let scale = 1.0 / frame.per_unit;
+        for (triangle, corner, share, on_edge) in targets {
+            let corners = mesh.triangles[triangle % mesh.triangles.len()].map(|v| mesh.positions[v as usize]);
+            let [a, b] = [corners[corner], corners[(corner + 1) % 3]];
+            let target = if on_edge { a.lerp(b, share) } else { a };
+            let origin = DVec3::from(from) * distance;
+            prop_assume!((target - origin).length() > 1e-3);
+            let eye = DVec3::new(0.1, 0.2, 0.3);
+            let direction = (target - origin) * length;
+            let ray = Ray { origin: (origin - eye) / scale, direction: direction / scale };
+            let brute = brute_force(&frame, &ray);
+            for level in crate::simd::all() {
+                frame.level = level;
+                prop_assert_eq!(frame.closest(&ray, f64::INFINITY), brute);
+                let public = frame.closest_hit(origin, direction, f64::INFINITY);
+                prop_assert_eq!(public.map(|hit| hit.t), brute.map(|(t, _)| t));
+                prop_assert_eq!(frame.any_hit(origin, direction, f64::INFINITY), brute.is_some());
+            }
+        }
+    }
+}
+
+/// Every box holds every other: walks must remember far more than is usual.
+#[test]
+fn a_walk_that_enters_everything_forgets_nothing() {
+    let corner = |i: u32, turn: f64| {
+        let angle = f64::from(i) * 0.37 + turn * std::f64::consts::TAU / 3.0;
+        DVec3::new(angle.cos(), angle.sin(), f64::from(i * 997 % 6000) * 1e-5 - 2.0)
+    };
+    let count = 6000;
+    let positions = (0..count).flat_map(|i| [0.0, 1.0, 2.0].map(|turn| corner(i, turn))).collect();
+    let triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let frame = frame_of(&mesh_of(positions, triangles), DVec3::ZERO, |_| {});
+    for (x, y) in [(0.0, 0.0), (0.1, -0.2), (-0.3, 0.05), (0.2, 0.2)] {
+        for direction in [DVec3::new(x, y, -1.0), DVec3::new(x, y, -1e-3)] {
+            let ray = Ray { origin: DVec3::ZERO, direction };
+            assert_eq!(frame.closest(&ray, f64::INFINITY), brute_force(&frame, &ray));
+        }
+    }
+}
+
+#[test]
+fn hits_are_named_by_their_place_in_the_scene() {
+    let eye = DVec3::new(3.0, 4.0, 50.0);
+    let frame = frame_of(&ball(6, 6, |p| p), eye, |scene| {
+        let place = |x: f64| DVec3::new(x, 0.0, 0.0);
+        scene.models.push(Model { translate: place(10.0), ..scene.models[0].clone() });
+        scene.spheres = vec![Sphere { center: place(20.0), radius: 2.0, material: 0 }];
+        let corners = [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::new(0.0, 1.0, 0.0)];
+        let triangle = |x: f64| Triangle { vertices: corners.map(|p| p + place(x)), material: 0 };
+        scene.triangles = vec![triangle(30.0), triangle(40.0)];
+        scene.planes = vec![Plane { point: DVec3::NEG_Z * 7.0, normal: DVec3::Z, material: 0 }];
+    });
+    let at = |x: f64| frame.closest_hit(DVec3::new(x, 0.01, 9.0), DVec3::NEG_Z * 0.5, f64::INFINITY).unwrap();
+    assert!(matches!(at(10.0).primitive, Primitive::Model { model: 1, .. }));
+    assert!((at(20.0).t - 14.0).abs() < 1e-4 && at(20.0).primitive == Primitive::Sphere(0));
+    assert_eq!(at(40.0), RayHit { t: 18.0, primitive: Primitive::Triangle(1) });
+    assert_eq!(at(60.0), RayHit { t: 32.0, primitive: Primitive::Plane(0) });
+    let origin = DVec3::new(60.0, 0.0, 9.0);
+    assert!(frame.any_hit(origin, DVec3::NEG_Z, 16.1) && !frame.any_hit(origin, DVec3::NEG_Z, 16.0));
+}
+
+#[test]
+fn what_is_no_ray_hits_nothing() {
+    let frame = frame_of(&ball(6, 6, |p| p), DVec3::ZERO, |_| {});
+    for broken in
+        [DVec3::ZERO, DVec3::NAN, DVec3::INFINITY, DVec3::X * 1e-200, DVec3::new(1.0, f64::NAN, 0.0)]
+    {
+        assert!(frame.closest_hit(DVec3::ZERO, broken, f64::INFINITY).is_none(), "{broken}");
+    }
+    assert!(!frame.any_hit(DVec3::NAN, DVec3::X, f64::INFINITY));
+    assert!(!frame.any_hit(DVec3::ZERO, DVec3::X, f64::NAN));
 }
 
 /// All triangles in turn, by the same test of one ray against one triangle but without trees.
@@ -196,7 +292,11 @@ fn all_hits(frame: &PreparedFrame, ray: &Ray) -> Vec<(f64, PrimitiveId)> {
 }
 
 fn brute_force(frame: &PreparedFrame, ray: &Ray) -> Option<(f64, PrimitiveId)> {
-    all_hits(frame, ray).into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+    let rank = |id: PrimitiveId| (id.item, frame.instances[id.item as usize].mesh.source(id.triangle));
+    let nearer = |a: &(f64, PrimitiveId), b: &(f64, PrimitiveId)| {
+        a.0.total_cmp(&b.0).then_with(|| rank(a.1).cmp(&rank(b.1)))
+    };
+    all_hits(frame, ray).into_iter().min_by(nearer)
 }
 
 fn brute_count(frame: &PreparedFrame, ray: &Ray, t_max: f64) -> usize {

@@ -1,141 +1,167 @@
-//! One ray against one mesh: a filter in `f32` lanes, exact code for what passes.
-//!
-//! A node costs one slab test of sixteen boxes, a leaf one edge test of sixteen triangles. Both let through whatever
-//! the exact test might accept, and little else; they never decide a hit.
+//! One ray down a tree of sixteen children a node, nearer children first.
 
-use std::ops::ControlFlow;
+use std::ops::ControlFlow::{self, Continue};
 
-use glam::{DVec3, Vec3};
-
-use crate::bvh::{MAX_WIDE_DEPTH, WIDTH, WideChild, WideNode};
-use crate::mesh::{CompiledMesh, TriangleBlock};
+use super::near_ray::NearRay;
+use crate::bvh::{WIDTH, WideChild, WideNode};
 use crate::simd::{Simd, SimdBase, bits, each_bit, f32x16, fma, splat, three};
 
-/// Relative widening of distances: Ize's 2 gamma(3) ("Robust BVH Ray Traversal", JCGT 2013), and room for distances that
-/// the exact test rounds elsewhere.
-const SLACK: f32 = 1.0 + 4e-6;
+/// The number of the root: see [`WideChild::of`].
+const ROOT: u32 = 0;
 
-/// Error of a corner's coordinates, in shares of the largest number that went into them.
-const ROUNDING: f32 = 1.0 / (1 << 21) as f32;
+/// What is done about the leaves that a ray reaches.
+pub(super) trait Leaves<S: Simd> {
+    /// Hits at a larger t are of no interest.
+    fn limit(&self) -> f64;
 
-/// A ray in mesh space, rounded to `f32` near the mesh. The filter's bounds account for the rounding.
-pub(super) struct FilterRay {
-    origin: Vec3,
-    inverse: Vec3,
-    negative: [bool; 3],
-    axes: [usize; 3],
-    shear: Vec3,
+    /// Looks at one leaf, within [0, `reach`]; may stop the walk.
+    fn visit(&mut self, simd: S, leaf: u32, reach: f32) -> ControlFlow<()>;
 }
 
-impl FilterRay {
-    pub(super) fn new(origin: DVec3, direction: DVec3) -> Self {
-        let (origin, single) = (origin.as_vec3(), direction.as_vec3());
-        let z = direction.abs().max_position();
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let scale = direction[z];
-        let shear = DVec3::new(direction[x] / scale, direction[y] / scale, 1.0 / scale).as_vec3();
-        Self {
-            origin,
-            inverse: Vec3::ONE / single,
-            negative: single.to_array().map(|component| component.is_sign_negative()),
-            axes: [x, y, z],
-            shear,
-        }
-    }
-}
-
-/// Calls `candidate(triangle)` for each triangle that the ray may hit within [0, `t_max`], those in nearer boxes
-/// earlier. It answers with the farthest distance that is still of interest, or stops the walk.
+/// Visits each leaf that the ray may touch, nearer ones earlier. `stack` must be empty.
 #[inline(always)]
 pub(super) fn walk<S: Simd>(
     simd: S,
-    mesh: &CompiledMesh,
-    ray: &FilterRay,
-    mut t_max: f32,
-    mut candidate: impl FnMut(u32) -> ControlFlow<(), f32>,
+    nodes: &[WideNode],
+    ray: &NearRay,
+    stack: &mut Stack,
+    leaves: &mut impl Leaves<S>,
 ) -> ControlFlow<()> {
-    let (nodes, blocks) = (mesh.nodes(), mesh.blocks());
-    let mut stack = [(WideChild::Inner(0), 0.0_f32); MAX_WIDE_DEPTH * (WIDTH - 1) + 1];
-    let mut depth = 1;
-    while depth > 0 {
-        depth -= 1;
-        let (child, entry) = stack[depth];
-        if entry > t_max * SLACK {
-            continue;
-        }
-        match child {
+    let slabs = Slabs::new(ray);
+    let mut reach = ray.distance(leaves.limit());
+    let mut next = ROOT;
+    loop {
+        match WideChild::of(next) {
             WideChild::Inner(index) => {
                 let node = &nodes[index as usize];
-                let (entered, entries) = enter(simd, node, ray, t_max);
-                let first = depth;
-                for lane in each_bit(entered) {
-                    // Sorted so that the nearest ends on top.
-                    let mut at = depth;
-                    while at > first && stack[at - 1].1 < entries[lane] {
-                        stack[at] = stack[at - 1];
-                        at -= 1;
-                    }
-                    stack[at] = (node.child(lane), entries[lane]);
-                    depth += 1;
+                let (entered, near) = slabs.enter(simd, node, reach);
+                if entered != 0 {
+                    next = stack.push_all_but_nearest(node, entered, &near.to_array());
+                    continue;
                 }
             }
-            WideChild::Block(index) => {
-                for lane in each_bit(candidates(simd, &blocks[index as usize], ray, t_max)) {
-                    t_max = candidate(index * WIDTH as u32 + lane as u32)?;
-                }
+            WideChild::Block(leaf) => {
+                leaves.visit(simd, leaf, reach)?;
+                reach = ray.distance(leaves.limit());
+            }
+        }
+        match stack.pop(reach) {
+            Some(link) => next = link,
+            None => return Continue(()),
+        }
+    }
+}
+
+/// A ray as boxes want it.
+struct Slabs {
+    inverse: [f32; 3],
+    /// Products with the origin that make the entry too early and the exit too late, by the error of coordinates: a
+    /// box is entered whenever the exact ray touches it (Ize, "Robust BVH Ray Traversal", JCGT 2013, with an absolute
+    /// bound, so that one fused operation a plane is enough).
+    entry: [f32; 3],
+    exit: [f32; 3],
+    /// Where a node has the sides that the ray enters by, and those that it leaves by.
+    first: [usize; 3],
+    last: [usize; 3],
+}
+
+impl Slabs {
+    #[inline(always)]
+    fn new(ray: &NearRay) -> Self {
+        let (mut entry, mut exit, mut first, mut last) = ([0.0; 3], [0.0; 3], [0; 3], [0; 3]);
+        for axis in 0..3 {
+            let product = ray.origin[axis] * ray.inverse[axis];
+            let slack = ray.inverse[axis].abs() * ray.error;
+            (entry[axis], exit[axis]) = (-product - slack, slack - product);
+            let negative = (ray.inverse[axis].to_bits() >> 31) as usize;
+            (first[axis], last[axis]) = (axis + 3 * negative, axis + 3 - 3 * negative);
+        }
+        Self { inverse: ray.inverse, entry, exit, first, last }
+    }
+
+    /// Which children the ray enters within [0, `reach`], and where.
+    #[inline(always)]
+    fn enter<S: Simd>(&self, simd: S, node: &WideNode, reach: f32) -> (u32, f32x16<S>) {
+        let sides = node.sides();
+        let inverse = three!(axis => splat(simd, self.inverse[axis]));
+        let [x0, y0, z0] = three!(axis => {
+            fma(sides[self.first[axis]].load(simd), inverse[axis], splat(simd, self.entry[axis]))
+        });
+        let [x1, y1, z1] = three!(axis => {
+            fma(sides[self.last[axis]].load(simd), inverse[axis], splat(simd, self.exit[axis]))
+        });
+        let near = x0.max(y0).max(z0.max(splat(simd, 0.0)));
+        let far = x1.min(y1).min(z1.min(splat(simd, reach)));
+        (bits(near.simd_le(far) & node.present_lanes(simd)), near)
+    }
+}
+
+/// Children that are kept at hand: deeper trees than usual keep the rest in memory of its own.
+const AT_HAND: usize = 32;
+
+/// What a walk has to come back to, the nearest of each node on top.
+pub(super) struct Stack {
+    /// A child and where the ray enters it, as one number: of two, the lower is nearer. Distances are not negative, so
+    /// that their bits compare as they do.
+    keys: [u64; AT_HAND],
+    len: usize,
+    rest: Vec<u64>,
+}
+
+impl Stack {
+    #[inline(always)]
+    pub(super) fn new() -> Self {
+        Self { keys: [0; AT_HAND], len: 0, rest: Vec::new() }
+    }
+
+    /// Pushes the children in `entered`, of which there is one at least, but for the nearest, which it returns.
+    #[inline(always)]
+    fn push_all_but_nearest(&mut self, node: &WideNode, entered: u32, near: &[f32; WIDTH]) -> u32 {
+        let first = entered.trailing_zeros() as usize;
+        let others = entered & (entered - 1);
+        if others == 0 {
+            return node.link(first);
+        }
+        if self.len > AT_HAND - WIDTH {
+            self.put_away();
+        }
+        let key = |lane: usize| u64::from(near[lane].to_bits()) << 32 | u64::from(node.link(lane));
+        let bottom = self.len;
+        let mut nearest = key(first);
+        for lane in each_bit(others) {
+            let key = key(lane);
+            let farther = nearest.max(key);
+            nearest = nearest.min(key);
+            let mut at = self.len;
+            while at > bottom && self.keys[at - 1] < farther {
+                self.keys[at] = self.keys[at - 1];
+                at -= 1;
+            }
+            self.keys[at] = farther;
+            self.len += 1;
+        }
+        nearest as u32
+    }
+
+    /// The next child that begins within `reach`.
+    #[inline(always)]
+    fn pop(&mut self, reach: f32) -> Option<u32> {
+        loop {
+            let key = if self.len > 0 {
+                self.len -= 1;
+                self.keys[self.len]
+            } else {
+                self.rest.pop()?
+            };
+            if f32::from_bits((key >> 32) as u32) <= reach {
+                return Some(key as u32);
             }
         }
     }
-    ControlFlow::Continue(())
-}
 
-/// Which children the ray enters within [0, `t_max`], and where.
-#[inline(always)]
-fn enter<S: Simd>(simd: S, node: &WideNode, ray: &FilterRay, t_max: f32) -> (u32, [f32; WIDTH]) {
-    let mut near = splat(simd, 0.0);
-    let mut far = splat(simd, t_max);
-    for axis in 0..3 {
-        let (origin, inverse) = (splat(simd, ray.origin[axis]), splat(simd, ray.inverse[axis]));
-        let (lo, hi) = (node.lo[axis].load(simd), node.hi[axis].load(simd));
-        let (entry, exit) = if ray.negative[axis] { (hi, lo) } else { (lo, hi) };
-        // The operand that may be NaN (a ray inside the plane of a side) stands first: then the other one wins.
-        near = ((entry - origin) * inverse).max_precise(near);
-        far = ((exit - origin) * inverse).min_precise(far);
+    #[cold]
+    fn put_away(&mut self) {
+        self.rest.extend_from_slice(&self.keys[..self.len]);
+        self.len = 0;
     }
-    let entered = near.simd_le(far * splat(simd, SLACK));
-    (bits(entered) & node.present(), near.to_array())
-}
-
-/// Twice the area between the ray and two corners, and the size of the numbers that it is made of.
-#[inline(always)]
-fn edge<S: Simd>(p: [f32x16<S>; 3], q: [f32x16<S>; 3]) -> (f32x16<S>, f32x16<S>) {
-    (fma(p[0], q[1], -(p[1] * q[0])), (p[0].abs() + p[1].abs()) + (q[0].abs() + q[1].abs()))
-}
-
-/// Which triangles of a block the ray may hit within [0, `t_max`].
-#[inline(always)]
-fn candidates<S: Simd>(simd: S, block: &TriangleBlock, ray: &FilterRay, t_max: f32) -> u32 {
-    let [x, y, z] = ray.axes;
-    let zero = splat(simd, 0.0);
-    let origin = three!(i => splat(simd, ray.origin[ray.axes[i]]));
-    let shear = three!(i => splat(simd, ray.shear[i]));
-    let flat = three!(k => {
-        let px = block.0[k][x].load(simd) - origin[0];
-        let py = block.0[k][y].load(simd) - origin[1];
-        let pz = block.0[k][z].load(simd) - origin[2];
-        [fma(-shear[0], pz, px), fma(-shear[1], pz, py), shear[2] * pz]
-    });
-    // Coordinates near the mesh are within 4 in magnitude, and the shear is at most 1.
-    let error = splat(simd, 16.0 * ROUNDING);
-    let edges = [edge(flat[2], flat[1]), edge(flat[0], flat[2]), edge(flat[1], flat[0])];
-    let bound = error * edges[0].1.max(edges[1].1).max(edges[2].1);
-    let least = edges[0].0.min(edges[1].0).min(edges[2].0);
-    let most = edges[0].0.max(edges[1].0).max(edges[2].0);
-    let nearest = flat[0][2].min(flat[1][2]).min(flat[2][2]);
-    let farthest = flat[0][2].max(flat[1][2]).max(flat[2][2]);
-    let depth_error = splat(simd, 16.0 * ROUNDING * ray.shear.z.abs());
-    let inside = least.simd_ge(-bound) | most.simd_le(bound);
-    let within =
-        nearest.simd_le(splat(simd, t_max * SLACK) + depth_error) & farthest.simd_ge(zero - depth_error);
-    bits(inside & within)
 }
