@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
-use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::farm::{FarmOptions, SegmentPolicy};
 use values::{Size, degrees, frame_count, listen_address, sample_count, size, thread_count, worker_count};
@@ -137,6 +137,21 @@ pub(crate) struct CompileArgs {
     /// The compiled model to write.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
+    /// How much time the hierarchy may take. The picture does not depend on it.
+    #[arg(long, value_enum, value_name = "QUALITY", default_value_t)]
+    pub(crate) quality: Quality,
+}
+
+/// How well a hierarchy is built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Quality {
+    /// As soon as possible.
+    Fast,
+    /// Where more time would gain little.
+    #[default]
+    Default,
+    /// For models that are compiled once and rendered often.
+    High,
 }
 
 /// `bench`.

@@ -5,9 +5,10 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use rayfarm_tracer::mesh::{BuildQuality, CompileOptions};
 use rayfarm_tracer::scene;
 
-use crate::cli::CompileArgs;
+use crate::cli::{CompileArgs, Quality};
 use crate::display::overlay::counted;
 use crate::error::CommandError;
 use crate::output::check_writable;
@@ -19,8 +20,9 @@ use crate::output::check_writable;
 pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     check_writable(&args.output)?;
     refuse_the_model_itself(args)?;
+    let options = CompileOptions { quality: build_quality(args.quality), ..CompileOptions::default() };
     let started = Instant::now();
-    let (mesh, warnings) = scene::load_model(&args.model).map_err(CommandError::wrong_input)?;
+    let (mesh, warnings) = scene::load_model_with(&args.model, options).map_err(CommandError::wrong_input)?;
     let seconds = started.elapsed().as_secs_f64();
     for warning in warnings {
         tracing::warn!("{warning}");
@@ -35,6 +37,14 @@ pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     );
     writeln!(io::stdout().lock(), "{line}")
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
+
+fn build_quality(quality: Quality) -> BuildQuality {
+    match quality {
+        Quality::Fast => BuildQuality::Fast,
+        Quality::Default => BuildQuality::Default,
+        Quality::High => BuildQuality::High,
+    }
 }
 
 /// Its source would be gone.
@@ -90,7 +100,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let model = folder.path().join("a.obj");
         fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-        let args = CompileArgs { model: model.clone(), output: folder.path().join(".").join("a.obj") };
+        let output = folder.path().join(".").join("a.obj");
+        let args = CompileArgs { model: model.clone(), output, quality: Quality::Default };
         let message = run(&args).unwrap_err().to_string();
         assert!(message.contains("the model itself") && message.contains("a.rfm"), "{message}");
         assert!(fs::read_to_string(&model).unwrap().starts_with("v 0 0 0"));
