@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::scene::{Camera, FrameView};
-use crate::tile::Lens;
+use crate::tile::Affine;
 
 /// A pinhole camera, ready to make rays. All rays start in the origin of eye space.
 #[derive(Clone, Copy, Debug)]
@@ -51,11 +51,10 @@ impl PinholeRays {
         self.corner + self.right * across + self.down * along
     }
 
-    /// A lens that sees the samples around a place in the picture, at distances of 1.
-    pub(crate) fn lens(&self, across: f64, along: f64) -> Lens {
-        let n = f64::from(self.grid);
-        let columns = DMat3::from_cols(self.right / n, self.down / n, self.through(across, along));
-        Lens::new(columns.inverse(), DVec3::ZERO, 1.0)
+    /// Where eye space is seen: (a, b, g) with depth g, and (a / g, b / g) counts samples from the top left corner.
+    pub(crate) fn projection(&self) -> Affine {
+        let [right, down] = self.steps();
+        Affine::new(DMat3::from_cols(right, down, self.corner).inverse(), DVec3::ZERO)
     }
 
     /// From one sample to the next in its row, and from one row of samples to the next.
@@ -88,6 +87,7 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tile::lens::Lens;
 
     fn view(width: u32, height: u32, samples: u32) -> FrameView {
         let camera = Camera {
@@ -123,8 +123,8 @@ mod tests {
     #[test]
     fn the_lens_sees_samples_where_they_are() {
         let rays = PinholeRays::new(&view(64, 48, 4));
-        let lens = rays.lens(20.0, 30.0);
-        let [a, b, g] = lens.exact_point(rays.of_sample(43, 57) * 7.0).to_array();
+        let lens = Lens::new(rays.projection().centered(40.0, 60.0), 1.0, false);
+        let [a, b, g] = lens.exact(rays.of_sample(43, 57) * 7.0).to_array();
         assert!(
             (g - 7.0).abs() < 1e-9 && (a / g - 3.5).abs() < 1e-9 && (b / g + 2.5).abs() < 1e-9,
             "{a} {b} {g}"

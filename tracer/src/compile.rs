@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::bvh::{self, BuildQuality};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Model, NormalMode, Scene, ValidateError, rotation};
+use crate::scene::{Material, Model, NormalMode, Scene, ValidateError, rotation};
 
 /// Why a scene cannot be traced.
 #[derive(Debug, thiserror::Error)]
@@ -41,9 +41,7 @@ pub struct CompiledScene {
     /// One per model.
     meshes: Vec<Arc<CompiledMesh>>,
     /// Over all finite items; its boxes are those of no frame in particular.
-    tree: bvh::Tree,
-    /// The same widened, an item a leaf: for single rays.
-    wide: bvh::WideTree,
+    tree: bvh::WideTree,
     bounds: Option<(DVec3, DVec3)>,
 }
 
@@ -53,6 +51,24 @@ pub(crate) enum Item {
     Model(usize),
     Sphere(usize),
     Triangle(usize),
+}
+
+/// What the scene asks for: the rest is not computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Features {
+    /// A material with a specular colour: directions to the viewer are needed.
+    pub specular: bool,
+    /// A model with interpolated normals: they differ from the geometric ones.
+    pub smooth: bool,
+}
+
+impl Features {
+    pub(crate) fn of(scene: &Scene) -> Self {
+        Self {
+            specular: scene.materials.iter().any(Material::is_specular),
+            smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
+        }
+    }
 }
 
 /// Which item indices are which.
@@ -110,9 +126,8 @@ impl CompiledScene {
         let boxes: Vec<(DVec3, DVec3)> =
             items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let tree = bvh::build(relative_boxes(&boxes, bounds), BuildQuality::Default);
-        let wide = bvh::widen(&tree, 1);
-        Ok(Self { scene, meshes, tree, wide, bounds })
+        let tree = bvh::build_wide(relative_boxes(&boxes, bounds), 1, BuildQuality::Default);
+        Ok(Self { scene, meshes, tree, bounds })
     }
 
     /// What was compiled.
@@ -136,12 +151,9 @@ impl CompiledScene {
         &self.meshes
     }
 
-    pub(crate) fn tree(&self) -> &bvh::Tree {
+    /// Over the items, one a leaf.
+    pub(crate) fn tree(&self) -> &bvh::WideTree {
         &self.tree
-    }
-
-    pub(crate) fn wide_tree(&self) -> &bvh::WideTree {
-        &self.wide
     }
 }
 

@@ -8,15 +8,16 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::bvh::{Child, Node, WideNode};
+use crate::bvh::WideNode;
 use crate::camera::PinholeRays;
-use crate::compile::{CompileError, CompiledScene, Item, Items, orientation, transformed_bounds};
+use crate::compile::{CompileError, CompiledScene, Features, Item, Items, orientation, transformed_bounds};
 use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
 use crate::scene::{Camera, FrameView, Model, NormalMode, Scene};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
+use crate::tile::Affine;
 
 /// Widening of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
@@ -29,15 +30,17 @@ pub struct PreparedFrame {
     /// Eye units per world unit: a power of two.
     pub(crate) per_unit: f64,
     pub(crate) rays: PinholeRays,
+    /// Where the camera sees eye space: see [`PinholeRays::projection`].
+    pub(crate) projection: Affine,
     pub(crate) items: Items,
     pub(crate) instances: Vec<Instance>,
     pub(crate) spheres: Vec<EyeSphere>,
     pub(crate) triangles: Vec<EyeTriangle>,
     pub(crate) planes: Vec<EyePlane>,
     pub(crate) lights: Vec<EyeLight>,
-    pub(crate) nodes: Vec<Node>,
-    /// The scene's tree for single rays.
-    pub(crate) wide_nodes: Vec<WideNode>,
+    /// The scene's tree, with the boxes of this frame.
+    pub(crate) nodes: Vec<WideNode>,
+    pub(crate) features: Features,
     /// Which lanes it is traced with.
     pub(crate) level: Level,
 }
@@ -53,6 +56,10 @@ pub(crate) struct Instance {
     /// Takes normals from mesh space to eye space, up to their length.
     pub normals: DMat3,
     pub smooth: bool,
+    /// `linear` and `translation` as one.
+    pub placement: Affine,
+    /// Where the camera sees the mesh.
+    pub projection: Affine,
 }
 
 /// A triangle of the scene file.
@@ -71,16 +78,19 @@ impl PreparedFrame {
         let source = scene.scene();
         let unit = unit_of(&scene, &view.camera);
         let to_eye = |world: DVec3| (world - view.camera.position) / unit;
+        let rays = PinholeRays::new(view);
+        let projection = rays.projection();
         let instances = source
             .models
             .iter()
             .zip(scene.meshes())
-            .map(|(model, mesh)| Instance::new(model, mesh, view.spin, to_eye, unit))
+            .map(|(model, mesh)| Instance::new(model, mesh, view.spin, to_eye, unit, &projection))
             .collect();
         let mut frame = Self {
             view: *view,
             per_unit: 1.0 / unit,
-            rays: PinholeRays::new(view),
+            rays,
+            projection,
             items: Items::of(source),
             instances,
             spheres: spheres(source, &to_eye, unit),
@@ -88,12 +98,11 @@ impl PreparedFrame {
             planes: planes(source, &to_eye),
             lights: source.lights.iter().map(|light| EyeLight::new(light, to_eye, unit)).collect(),
             nodes: Vec::new(),
-            wide_nodes: Vec::new(),
+            features: Features::of(source),
             level: simd::best(),
             scene,
         };
-        frame.nodes = frame.refitted();
-        frame.wide_nodes = frame.scene.wide_tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
+        frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
 
@@ -122,34 +131,9 @@ impl PreparedFrame {
         self.scene.scene()
     }
 
-    /// Index of the item at a position in the leaves of the scene's tree.
-    pub(crate) fn item_at(&self, position: u32) -> u32 {
-        self.scene.tree().order[position as usize]
-    }
-
-    /// The items in a leaf of the scene's wide tree.
+    /// The items in a leaf of the scene's tree.
     pub(crate) fn items_of(&self, block: u32) -> &[u32] {
-        &self.scene.wide_tree().blocks[block as usize]
-    }
-
-    /// The compiled tree with the boxes of this frame, children before parents.
-    fn refitted(&self) -> Vec<Node> {
-        let mut nodes = self.scene.tree().nodes.clone();
-        for index in (0..nodes.len()).rev() {
-            for side in 0..2 {
-                let bounds = match nodes[index].child(side) {
-                    Child::Empty => continue,
-                    Child::Inner(child) => nodes[child as usize].bounds(),
-                    Child::Leaf { first, count } => (first..first + count)
-                        .map(|position| self.item_bounds(self.items.get(self.item_at(position))))
-                        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), (a, b)| {
-                            (lo.min(a), hi.max(b))
-                        }),
-                };
-                nodes[index].set_bounds(side, bounds);
-            }
-        }
-        nodes
+        &self.scene.tree().blocks[block as usize]
     }
 
     /// Bounds of an item in eye space, padded.
@@ -180,15 +164,20 @@ impl Instance {
         spin: f64,
         to_eye: impl Fn(DVec3) -> DVec3,
         unit: f64,
+        projection: &Affine,
     ) -> Self {
         let orientation = orientation(model, spin);
         // Powers of two only: exact.
         let linear = orientation * (libm::exp2(f64::from(mesh.exponent())) / unit);
         let inverse = linear.inverse();
+        let translation = to_eye(model.translate) + orientation * mesh.center() / unit;
+        let placement = Affine::new(linear, translation);
         Self {
             mesh: Arc::clone(mesh),
             linear,
-            translation: to_eye(model.translate) + orientation * mesh.center() / unit,
+            translation,
+            placement,
+            projection: projection.after(&placement),
             inverse,
             normals: inverse.transpose(),
             smooth: model.normals == NormalMode::Smooth,

@@ -2,14 +2,13 @@
 
 use std::ops::{AddAssign, Range};
 
-use glam::Vec3;
-
 use crate::frame::PreparedFrame;
 use crate::shade::{self, Colors};
-use crate::simd::{LANES, Simd, dispatch, each_bit, three};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{LANES, Lanes, Simd, dispatch, each_bit, splat, three};
 use crate::srgb;
-use crate::tile::visible::EyeTile;
-use crate::tile::{BLOCKS, Rays, SIDE, place};
+use crate::tile::visible::{EyeTile, Visible};
+use crate::tile::{self, BLOCKS, Rays, SIDE, place};
 
 /// Rows of a tile of a frame with one sample a pixel. Segments that begin and end on multiples of it waste nothing.
 pub const TILE_SIZE: u32 = SIDE as u32;
@@ -81,7 +80,8 @@ fn tile_pixels(frame: &PreparedFrame) -> u32 {
 /// Tiles that share a band of rows.
 #[inline(always)]
 fn render_band<S: Simd>(simd: S, frame: &PreparedFrame, rows: Range<u32>, out: &mut [u8]) -> RayCounts {
-    let rays = Rays::grid();
+    let rays = Rays::grid(simd);
+    let mut scratch = Scratch::new();
     let side = tile_pixels(frame);
     let mut counts = RayCounts::default();
     for left in (0..frame.width()).step_by(side as usize) {
@@ -92,9 +92,22 @@ fn render_band<S: Simd>(simd: S, frame: &PreparedFrame, rows: Range<u32>, out: &
             top: rows.start / side * side,
             rows: rows.clone(),
         };
-        render_tile(simd, frame, &rays, &pixels, out, &mut counts);
+        render_tile(simd, frame, &rays, &pixels, &mut scratch, out, &mut counts);
     }
     counts
+}
+
+/// Room for a tile, kept from tile to tile.
+struct Scratch {
+    visible: Visible,
+    tile: tile::Scratch,
+    shade: shade::Scratch,
+}
+
+impl Scratch {
+    fn new() -> Self {
+        Self { visible: Visible::empty(), tile: tile::Scratch::new(), shade: shade::Scratch::new() }
+    }
 }
 
 /// The pixels of a tile that are asked for.
@@ -112,6 +125,7 @@ fn render_tile<S: Simd>(
     frame: &PreparedFrame,
     rays: &Rays,
     pixels: &Pixels,
+    scratch: &mut Scratch,
     out: &mut [u8],
     counts: &mut RayCounts,
 ) {
@@ -119,12 +133,14 @@ fn render_tile<S: Simd>(
     let corner = (pixels.left * grid, pixels.top * grid);
     let tile = EyeTile::new(frame, rays, live_lanes(grid, pixels), corner);
     counts.primary += tile.live.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
-    let visible = tile.visible(simd);
-    let colors = shade::shade(simd, &tile, &visible, counts);
+    let Scratch { visible, tile: room, shade: shading } = scratch;
+    tile.find_visible(simd, visible, room);
+    shade::shade(simd, &tile, visible, shading, room, counts);
+    let colors = &shading.colors;
     if grid == 1 {
-        write_samples(simd, frame, pixels, &colors, &tile.live, out);
+        write_samples(simd, frame, pixels, colors, &tile.live, out);
     } else {
-        write_means(frame, pixels, &colors, out);
+        write_means(simd, frame, pixels, colors, out);
     }
 }
 
@@ -154,31 +170,82 @@ fn write_samples<S: Simd>(
     out: &mut [u8],
 ) {
     for block in 0..BLOCKS {
-        let codes = three!(channel => srgb::encode_lanes(simd, colors[block][channel].load(simd)));
-        for lane in each_bit(live[block]) {
-            let (column, row) = place(block, lane);
-            let at = offset(frame, pixels, pixels.left + column as u32, pixels.top + row as u32);
-            out[at..at + 3].copy_from_slice(&[codes[0][lane], codes[1][lane], codes[2][lane]]);
+        if live[block] == 0 {
+            continue;
+        }
+        let encoded = srgb::encode_lanes(simd, Vec3x16::load(simd, &colors[block]));
+        for row_of_block in 0..4 {
+            let (first, encoded) = (row_of_block * 4, &encoded[row_of_block * 16..][..12]);
+            let (column, row) = place(block, first);
+            match live[block] >> first & 0xf {
+                0 => {}
+                0xf => {
+                    let at = offset(frame, pixels, pixels.left + column as u32, pixels.top + row as u32);
+                    out[at..at + 12].copy_from_slice(encoded);
+                }
+                some => {
+                    for lane in each_bit(some) {
+                        let x = pixels.left + (column + lane) as u32;
+                        let at = offset(frame, pixels, x, pixels.top + row as u32);
+                        out[at..at + 3].copy_from_slice(&encoded[3 * lane..3 * lane + 3]);
+                    }
+                }
+            }
         }
     }
 }
 
 /// Several samples a pixel: the mean in linear light, summed in the order of the samples.
-fn write_means(frame: &PreparedFrame, pixels: &Pixels, colors: &Colors, out: &mut [u8]) {
-    let grid = frame.rays.grid();
-    let sample = |column: u32, row: u32| {
-        let block = row / 4 * 4 + column / 4;
-        let lane = row % 4 * 4 + column % 4;
-        Vec3::from_array([0, 1, 2].map(|channel| colors[block as usize][channel].0[lane as usize]))
-    };
-    for y in pixels.rows.clone() {
+#[inline(always)]
+fn write_means<S: Simd>(simd: S, frame: &PreparedFrame, pixels: &Pixels, colors: &Colors, out: &mut [u8]) {
+    let grid = frame.rays.grid() as usize;
+    let mut batch = Batch { sums: [Lanes::ZERO; 3], places: [0; LANES], count: 0 };
+    for y in pixels.rows.start..pixels.rows.end {
         for x in pixels.left..pixels.right {
-            let (column, row) = ((x - pixels.left) * grid, (y - pixels.top) * grid);
-            let samples = (0..grid * grid).map(|i| sample(column + i % grid, row + i / grid));
-            let mean = samples.sum::<Vec3>() / (grid * grid) as f32;
-            let at = offset(frame, pixels, x, y);
-            out[at..at + 3].copy_from_slice(&srgb::encode(mean));
+            let (column, row) = ((x - pixels.left) as usize * grid, (y - pixels.top) as usize * grid);
+            let mut sum = [0.0; 3];
+            for row in row..row + grid {
+                for column in column..column + grid {
+                    let color = &colors[row / 4 * 4 + column / 4];
+                    let lane = row % 4 * 4 + column % 4;
+                    sum = three!(channel => sum[channel] + color[channel].0[lane]);
+                }
+            }
+            batch.push(sum, offset(frame, pixels, x, y));
+            if batch.count == LANES {
+                batch.write(simd, grid, out);
+            }
         }
+    }
+    batch.write(simd, grid, out);
+}
+
+/// Sums of samples of up to sixteen pixels, and where the pixels' bytes stand.
+struct Batch {
+    sums: [Lanes; 3],
+    places: [usize; LANES],
+    count: usize,
+}
+
+impl Batch {
+    fn push(&mut self, sum: [f32; 3], place: usize) {
+        for channel in 0..3 {
+            self.sums[channel].0[self.count] = sum[channel];
+        }
+        self.places[self.count] = place;
+        self.count += 1;
+    }
+
+    #[inline(always)]
+    fn write<S: Simd>(&mut self, simd: S, grid: usize, out: &mut [u8]) {
+        let samples = splat(simd, (grid * grid) as f32);
+        let sums = Vec3x16::load(simd, &self.sums);
+        let encoded = srgb::encode_lanes(simd, Vec3x16(three!(channel => sums.0[channel] / samples)));
+        for pixel in 0..self.count {
+            let (at, from) = (self.places[pixel], pixel / 4 * 16 + pixel % 4 * 3);
+            out[at..at + 3].copy_from_slice(&encoded[from..from + 3]);
+        }
+        self.count = 0;
     }
 }
 

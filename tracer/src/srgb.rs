@@ -1,5 +1,5 @@
-//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] one colour, exactly rounded; [`encode_lanes`] sixteen numbers at
-//! once by a polynomial, exact but within 10^-5 of a step of a threshold. Pictures of one sample take the second, means
+//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] one colour, exactly rounded; [`encode_lanes`] sixteen colours at
+//! once by a polynomial, exact but within 10^-4 of a step of a threshold. Pictures of one sample take the second, means
 //! of several the first.
 //!
 //! 255 thresholds, computed once in `f64`, say where one code ends and the next begins. A table over the leading bits
@@ -11,7 +11,8 @@ use std::sync::LazyLock;
 use glam::Vec3;
 
 use crate::simd::math::srgb255;
-use crate::simd::{LANES, Simd, SimdBase, SimdFloat, f32x16, select, splat};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{Bytes, Simd, SimdBase, SimdFloat, f32x16, select, splat, three, u8x64, u32x16};
 
 /// Bits of an `f32` below those that index the table: 8 bits of exponent and 6 of mantissa stay.
 const SHIFT: u32 = 17;
@@ -35,15 +36,37 @@ pub fn encode(color: Vec3) -> [u8; 3] {
     color.to_array().map(|linear| encoder.encode(linear))
 }
 
-/// Encodes sixteen linear values; those outside [0, 1] are clamped, NaN becomes 0. By a polynomial: a value within 10^-5 of a
-/// step of a threshold may fall on its other side.
+/// RGB8 of four rows of four pixels: row i in the twelve bytes from 16 i on.
+pub(crate) type Encoded = [u8; 64];
+
+/// Encodes sixteen linear colours; values outside [0, 1] are clamped, NaN becomes 0. By a polynomial: a value within 10^-4
+/// of a step of a threshold may fall on its other side.
 #[inline(always)]
-pub(crate) fn encode_lanes<S: Simd>(simd: S, linear: f32x16<S>) -> [u8; LANES] {
+pub(crate) fn encode_lanes<S: Simd>(simd: S, color: Vec3x16<S>) -> Encoded {
+    let [r, g, b] = three!(channel => code(simd, color.0[channel]));
+    let pixels = r | (g << 8) | (b << 16);
+    let without_fourth = u8x64::load_array_ref(simd, &WITHOUT_FOURTH);
+    simd.swizzle_dyn_within_blocks_u8x64(pixels.to_bytes(), without_fourth).to_array()
+}
+
+/// In each sixteen bytes: four times three of four.
+const WITHOUT_FOURTH: [u8; 64] = {
+    let mut from = [0; 64];
+    let mut to = 0;
+    while to < 64 {
+        let place = to % 16;
+        from[to] = if place < 12 { (place / 3 * 4 + place % 3) as u8 } else { 15 };
+        to += 1;
+    }
+    from
+};
+
+#[inline(always)]
+fn code<S: Simd>(simd: S, linear: f32x16<S>) -> u32x16<S> {
     let zero = splat(simd, 0.0);
     // False for NaN.
     let positive = select(linear.simd_gt(zero), linear, zero);
-    let codes = srgb255(simd, positive.min(splat(simd, 1.0))).round_ties_even().to_array();
-    codes.map(|code| code as u8)
+    simd.cvt_u32_f32x16(srgb255(simd, positive.min(splat(simd, 1.0))).round_ties_even())
 }
 
 /// The linear value, 0..1, of an 8-bit sRGB code.

@@ -7,7 +7,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::{Boundable, BvhBuildParams};
 
-use super::wide::{WIDTH, WideTree, widen};
+use super::wide::{WideTree, widen};
 use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
 
 /// A tree, and the order that it wants its primitives in.
@@ -62,11 +62,12 @@ pub(crate) fn build(boxes: Vec<(Vec3, Vec3)>, quality: BuildQuality) -> Tree {
     lay_out(&source).unwrap_or_else(|| median(&primitives))
 }
 
-/// Builds a tree of sixteen children a node. Where it ends deeper than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
-pub(crate) fn build_wide(boxes: Vec<(Vec3, Vec3)>, quality: BuildQuality) -> WideTree {
+/// Builds a tree of sixteen children a node, and at most `leaf` primitives a leaf (but a few more where boxes coincide). Where
+/// it ends deeper than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
+pub(crate) fn build_wide(boxes: Vec<(Vec3, Vec3)>, leaf: usize, quality: BuildQuality) -> WideTree {
     let primitives: Vec<Primitive> = boxes.iter().map(|&(lo, hi)| Primitive { lo, hi }).collect();
-    let wide = widen(&build(boxes, quality), WIDTH);
-    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives), WIDTH) }
+    let wide = widen(&build(boxes, quality), leaf);
+    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives), leaf) }
 }
 
 struct Primitive {

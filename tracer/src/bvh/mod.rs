@@ -9,13 +9,14 @@ mod node;
 mod wide;
 
 pub use build::BuildQuality;
-pub(crate) use build::{Tree, build, build_wide};
-pub(crate) use node::{Child, Node};
-pub(crate) use wide::{WIDTH, WideChild, WideNode, WideTree, validate_wide, widen};
+use build::Tree;
+pub(crate) use build::build_wide;
+use node::{Child, Node};
+pub(crate) use wide::{WIDTH, WideChild, WideNode, WideTree, validate_wide};
 
 /// Deepest tree that traversal accepts: the size of its stack. A balanced tree over 2^28 primitives is 28 deep;
 /// builds that end deeper are built again by the median.
-pub(crate) const MAX_DEPTH: usize = 64;
+const MAX_DEPTH: usize = 64;
 
 /// Deepest wide tree that walks accept: it bounds their stacks.
 pub(crate) const MAX_WIDE_DEPTH: usize = 16;

@@ -173,6 +173,11 @@ impl Material {
     /// What a model without a material gets.
     pub const NEUTRAL: Material =
         Material { diffuse: Vec3::splat(0.7), specular: Vec3::splat(0.2), exponent: 32.0 };
+
+    /// Whether it has a specular colour.
+    pub fn is_specular(&self) -> bool {
+        self.specular != Vec3::ZERO
+    }
 }
 
 /// How a model's normals are made.

@@ -18,9 +18,9 @@ use crate::light::{Emitter, EyeLight, JUST_BEFORE};
 use crate::render::RayCounts;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat, three};
-use crate::tile::BLOCKS;
 use crate::tile::shadow::{ShadowTile, Source};
 use crate::tile::visible::{EyeTile, Visible};
+use crate::tile::{self, BLOCKS};
 use material::Materials;
 use surface::Surfaces;
 
@@ -31,33 +31,58 @@ const LEAST_CONTRIBUTION: f32 = 1.0 / (1 << 24) as f32;
 /// Linear RGB of each ray of a tile, indexed `[block][channel]`.
 pub(crate) type Colors = [[Lanes; 3]; BLOCKS];
 
-/// What the rays of a tile see.
+/// Room for the shading of a tile, kept from tile to tile.
+pub(crate) struct Scratch {
+    surfaces: Surfaces,
+    /// The picture so far.
+    pub colors: Colors,
+    /// What the light at hand adds where nothing is in its way.
+    contributions: Colors,
+    /// Where shadow rays start, indexed `[block][axis]`.
+    lifted: [[Lanes; 3]; BLOCKS],
+}
+
+impl Scratch {
+    pub(crate) fn new() -> Self {
+        let nothing = [[Lanes::ZERO; 3]; BLOCKS];
+        Self { surfaces: Surfaces::empty(), colors: nothing, contributions: nothing, lifted: nothing }
+    }
+}
+
+/// What the rays of a tile see, into `scratch.colors`.
 #[inline(always)]
 pub(crate) fn shade<S: Simd>(
     simd: S,
     tile: &EyeTile<'_>,
     visible: &Visible,
+    scratch: &mut Scratch,
+    tiles: &mut tile::Scratch,
     counts: &mut RayCounts,
-) -> Colors {
+) {
     let frame = tile.frame;
-    let surfaces = Surfaces::of(simd, tile, visible);
-    let ambient = Vec3x16::splat(simd, frame.scene().ambient.to_array());
-    let mut colors = [[Lanes::ZERO; 3]; BLOCKS];
+    scratch.surfaces.find(simd, tile, visible);
     for block in 0..BLOCKS {
-        let missed = tile.live[block] & !surfaces.hit[block];
-        if missed != 0 {
-            background::background(simd, &frame.scene().background, tile, block).store(&mut colors[block]);
+        let hit = scratch.surfaces.hit[block];
+        if tile.live[block] & !hit != 0 {
+            background::background(simd, &frame.scene().background, tile, block)
+                .store(&mut scratch.colors[block]);
         }
-        if surfaces.hit[block] != 0 {
-            let base = Materials::gather(simd, frame.scene(), &surfaces, block).diffuse.mul(ambient);
-            let before = Vec3x16::load(simd, &colors[block]);
-            blend(simd, surfaces.hit[block], base, before).store(&mut colors[block]);
+        if hit != 0 {
+            let behind = Vec3x16::load(simd, &scratch.colors[block]);
+            blend(simd, hit, ambient(simd, frame, &scratch.surfaces, block), behind)
+                .store(&mut scratch.colors[block]);
         }
     }
     for light in &frame.lights {
-        add_light(simd, tile, visible, &surfaces, light, &mut colors, counts);
+        add_light(simd, tile, visible, light, scratch, tiles, counts);
     }
-    colors
+}
+
+/// c_d I_a of the points of a block.
+#[inline(always)]
+fn ambient<S: Simd>(simd: S, frame: &PreparedFrame, surfaces: &Surfaces, block: usize) -> Vec3x16<S> {
+    let light = Vec3x16::splat(simd, frame.scene().ambient.to_array());
+    Materials::gather(simd, frame.scene(), surfaces, block).diffuse.mul(light)
 }
 
 /// `a` where the bit is set, else `b`.
@@ -73,22 +98,25 @@ fn add_light<S: Simd>(
     simd: S,
     tile: &EyeTile<'_>,
     visible: &Visible,
-    surfaces: &Surfaces,
     light: &EyeLight,
-    colors: &mut Colors,
+    scratch: &mut Scratch,
+    tiles: &mut tile::Scratch,
     counts: &mut RayCounts,
 ) {
-    let mut contributions = [[Lanes::ZERO; 3]; BLOCKS];
-    let mut lifted = [[Lanes::ZERO; BLOCKS]; 3];
+    let Scratch { surfaces, colors, contributions, lifted } = scratch;
     let mut lit = [0_u32; BLOCKS];
     for block in 0..BLOCKS {
         if surfaces.hit[block] != 0 {
-            let (contribution, reached, points) = unshadowed(simd, tile.frame, surfaces, light, block);
-            contribution.store(&mut contributions[block]);
+            let reached = unshadowed(
+                simd,
+                tile.frame,
+                surfaces,
+                light,
+                block,
+                &mut contributions[block],
+                &mut lifted[block],
+            );
             lit[block] = reached & surfaces.hit[block];
-            for axis in 0..3 {
-                lifted[axis][block].store(points.0[axis]);
-            }
         }
     }
     if lit == [0; BLOCKS] {
@@ -96,7 +124,7 @@ fn add_light<S: Simd>(
     }
     if light.shadows {
         counts.shadow += lit.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
-        let dark = dark(simd, tile.frame, visible, light, &lifted, lit);
+        let dark = dark(simd, tile, visible, light, lifted, lit, tiles);
         for block in 0..BLOCKS {
             lit[block] &= !dark[block];
         }
@@ -110,8 +138,8 @@ fn add_light<S: Simd>(
     }
 }
 
-/// What a light adds to the points of a block if nothing is in its way; bits of those it adds something to; and the
-/// points, lifted off their surfaces on the side that the light is on.
+/// What a light adds to the points of a block if nothing is in its way, and the points, lifted off their surfaces on the
+/// side that the light is on. Returns the bits of those that it adds something to.
 #[inline(always)]
 fn unshadowed<S: Simd>(
     simd: S,
@@ -119,39 +147,47 @@ fn unshadowed<S: Simd>(
     surfaces: &Surfaces,
     light: &EyeLight,
     block: usize,
-) -> (Vec3x16<S>, u32, Vec3x16<S>) {
+    contributions: &mut [Lanes; 3],
+    lifted: &mut [Lanes; 3],
+) -> u32 {
     let points = Vec3x16::load(simd, &surfaces.point[block]);
-    let normals = Vec3x16::load(simd, &surfaces.ns[block]);
     let geometric = Vec3x16::load(simd, &surfaces.ng[block]);
+    let normals = if frame.features.smooth { Vec3x16::load(simd, &surfaces.ns[block]) } else { geometric };
     let zero = splat(simd, 0.0);
     let incidence = light.incidence(simd, points);
     let n_dot_l = normals.dot(incidence.direction);
-    let facing = n_dot_l.simd_gt(zero);
+    let facing = incidence.reached & bits(n_dot_l.simd_gt(zero));
+    if facing & surfaces.hit[block] == 0 {
+        return 0;
+    }
     let materials = Materials::gather(simd, frame.scene(), surfaces, block);
     let mut reflectance = materials.diffuse.scale(n_dot_l);
     if materials.any_specular {
         let to_viewer = Vec3x16::load(simd, &surfaces.to_viewer[block]);
         let highlight =
-            specular::highlight(simd, normals, incidence.direction, to_viewer, &materials.exponent);
+            specular::highlight(simd, normals, incidence.direction, to_viewer, materials.exponent);
         reflectance = reflectance.add(materials.specular.scale(highlight));
     }
     let contribution = incidence.radiance.mul(reflectance);
+    contribution.store(contributions);
     let [r, g, b] = contribution.0;
     let enough = r.max(g).max(b).simd_ge(splat(simd, LEAST_CONTRIBUTION));
     let lift = surfaces.lift[block].load(simd);
     let side = select(geometric.dot(incidence.direction).simd_lt(zero), -lift, lift);
-    (contribution, incidence.reached & bits(facing & enough), points.add(geometric.scale(side)))
+    points.add(geometric.scale(side)).store(lifted);
+    facing & bits(enough)
 }
 
 /// Which of the lit points are in shadow.
 #[inline(always)]
 fn dark<S: Simd>(
     simd: S,
-    frame: &PreparedFrame,
+    tile: &EyeTile<'_>,
     visible: &Visible,
     light: &EyeLight,
-    points: &[[Lanes; BLOCKS]; 3],
+    points: &[[Lanes; 3]; BLOCKS],
     lit: [u32; BLOCKS],
+    tiles: &mut tile::Scratch,
 ) -> [u32; BLOCKS] {
     let (light, t_light) = match light.emitter {
         Emitter::Point { position } | Emitter::Spot { position, .. } => {
@@ -160,5 +196,6 @@ fn dark<S: Simd>(
         Emitter::Directional { to_light } => (Source::Parallel(to_light), f64::INFINITY),
     };
     let (item, triangle) = (&visible.item, &visible.triangle);
-    ShadowTile { frame, light, t_light, points, item, triangle }.dark(simd, lit)
+    let shadow = ShadowTile { frame: tile.frame, light, t_light, grid: tile.rays, points, item, triangle };
+    shadow.dark(simd, lit, tiles)
 }

@@ -2,10 +2,13 @@
 
 use crate::simd::math::{exp2, log2};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd, SimdBase, f32x16, select, splat};
+use crate::simd::{Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat};
 
 /// Up to this exponent the rounding of N.H to `f32` stays below a fifth of a step of the 8-bit picture.
 const SINGLE: f32 = 2000.0;
+
+/// Up to this exponent squaring rounds less than the logarithm does.
+const MOST_SQUARED: u32 = 256;
 
 /// max(0, N.H)^p with H = (L + V) / |L + V|.
 #[inline(always)]
@@ -14,19 +17,60 @@ pub(super) fn highlight<S: Simd>(
     normals: Vec3x16<S>,
     to_light: Vec3x16<S>,
     to_viewer: Vec3x16<S>,
-    exponents: &Lanes,
+    exponents: f32x16<S>,
 ) -> f32x16<S> {
-    let half = to_light.add(to_viewer).normalize(simd);
-    let n_dot_h = normals.dot(half);
+    let half = to_light.add(to_viewer);
+    let n_dot_h = normals.dot(half) / half.dot(half).sqrt();
     let positive = n_dot_h.simd_gt(splat(simd, 1e-30));
     let base = select(positive, n_dot_h, splat(simd, 1.0)).min(splat(simd, 1.0));
-    let power = exp2(simd, (log2(simd, base) * exponents.load(simd)).max(splat(simd, -126.0)));
-    let mut power = select(positive, power, splat(simd, 0.0));
-    for lane in 0..LANES {
-        // Lane by lane: what a point looks like must not depend on which others stand in its block.
-        if exponents.0[lane] > SINGLE || exponents.0[lane] == 0.0 {
-            power.as_mut_slice()[lane] = precise(normals, to_light, to_viewer, lane, exponents.0[lane]);
+    let power = raised(simd, base, exponents);
+    let power = select(positive, power, splat(simd, 0.0));
+    let odd = bits(exponents.simd_gt(splat(simd, SINGLE)) | exponents.simd_eq(splat(simd, 0.0)));
+    if odd == 0 {
+        return power;
+    }
+    let (mut power, exponents) = (power.to_array(), exponents.to_array());
+    // Lane by lane: what a point looks like must not depend on which others stand in its block.
+    for lane in each_bit(odd) {
+        power[lane] = precise(normals, to_light, to_viewer, lane, exponents[lane]);
+    }
+    f32x16::load_array(simd, power)
+}
+
+/// base^exponent, lane by lane, exponent by exponent: most often there is one. `base` is in (0, 1].
+#[inline(always)]
+fn raised<S: Simd>(simd: S, base: f32x16<S>, exponents: f32x16<S>) -> f32x16<S> {
+    let first = exponents.to_array()[0];
+    let power = raised_to(simd, base, first);
+    if bits(exponents.simd_eq(splat(simd, first))) == 0xffff {
+        return power;
+    }
+    let mut power = power;
+    let mut rest = 0xffff & !bits(exponents.simd_eq(splat(simd, first)));
+    while rest != 0 {
+        let exponent = exponents.to_array()[rest.trailing_zeros() as usize];
+        // NaN equals nothing, and has no place here.
+        let same = rest & bits(exponents.simd_eq(splat(simd, exponent))) | rest & rest.wrapping_neg();
+        power = select(mask_of(simd, same), raised_to(simd, base, exponent), power);
+        rest &= !same;
+    }
+    power
+}
+
+/// base^exponent: whole exponents by squaring, which is shorter; others by logarithm.
+#[inline(always)]
+fn raised_to<S: Simd>(simd: S, base: f32x16<S>, exponent: f32) -> f32x16<S> {
+    let mut whole = exponent as u32;
+    if whole as f32 != exponent || whole > MOST_SQUARED {
+        return exp2(simd, (log2(simd, base) * splat(simd, exponent)).max(splat(simd, -126.0)));
+    }
+    let (mut power, mut square) = (splat(simd, 1.0), base);
+    while whole != 0 {
+        if whole & 1 == 1 {
+            power = power * square;
         }
+        square = square * square;
+        whole >>= 1;
     }
     power
 }

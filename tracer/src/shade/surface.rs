@@ -2,10 +2,16 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
+use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::frame::Instance;
+use crate::mesh::CompiledMesh;
+use crate::simd::math::to_unit;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, each_bit, mask_of, select, splat, three};
+use crate::simd::{
+    Indices, Lanes, Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, mask32x16, select, splat,
+    three,
+};
 use crate::tile::BLOCKS;
 use crate::tile::visible::{EyeTile, NOTHING, Visible};
 use crate::trace::PrimitiveId;
@@ -22,65 +28,73 @@ pub(super) struct Surfaces {
     pub point: [[Lanes; 3]; BLOCKS],
     /// Geometric unit normals on the viewer's side.
     pub ng: [[Lanes; 3]; BLOCKS],
-    /// Shading unit normals, on the same side as `ng`.
+    /// Shading unit normals, on the same side as `ng`. Only kept if a model of the scene is smooth: else they are `ng`.
     pub ns: [[Lanes; 3]; BLOCKS],
-    /// Unit vectors to the eye.
+    /// Unit vectors to the eye. Only kept if a material of the scene is specular.
     pub to_viewer: [[Lanes; 3]; BLOCKS],
     /// How far to lift shadow rays along `ng`.
     pub lift: [Lanes; BLOCKS],
-    /// Index into the scene's materials; lanes without a hit repeat one of the block.
-    pub material: [[u32; LANES]; BLOCKS],
+    /// Index into the scene's materials; in blocks with a hit, lanes without one repeat one of the others.
+    pub material: [Indices; BLOCKS],
 }
 
 impl Surfaces {
-    #[inline(always)]
-    pub(super) fn of<S: Simd>(simd: S, tile: &EyeTile<'_>, visible: &Visible) -> Self {
+    /// For [`Surfaces::find`] to fill.
+    pub(super) fn empty() -> Self {
         let nowhere = [[Lanes::ZERO; 3]; BLOCKS];
-        let mut surfaces = Self {
+        Self {
             hit: [0; BLOCKS],
             point: nowhere,
             ng: nowhere,
             ns: nowhere,
             to_viewer: nowhere,
             lift: [Lanes::ZERO; BLOCKS],
-            material: [[0; LANES]; BLOCKS],
-        };
+            material: [Indices::ZERO; BLOCKS],
+        }
+    }
+
+    /// Finds what is at the hits of a tile.
+    #[inline(always)]
+    pub(super) fn find<S: Simd>(&mut self, simd: S, tile: &EyeTile<'_>, visible: &Visible) {
+        let mut space = None;
         for block in 0..BLOCKS {
             let items = &visible.item[block];
-            let mut rest = tile.live[block]
-                & (0..LANES).fold(0, |b, lane| b | u32::from(items[lane] != NOTHING) << lane);
-            surfaces.hit[block] = rest;
+            let mut rest = tile.live[block] & !items.equal(simd, NOTHING);
+            self.hit[block] = rest;
             if rest == 0 {
                 continue;
             }
+            let direction = tile.directions(simd, block);
             let first = rest.trailing_zeros() as usize;
             while rest != 0 {
-                let item = items[rest.trailing_zeros() as usize];
-                let lanes = each_bit(rest).fold(0, |b, lane| b | u32::from(items[lane] == item) << lane);
+                let item = items.0[rest.trailing_zeros() as usize];
+                let lanes = rest & items.equal(simd, item);
                 rest &= !lanes;
-                surfaces.fill(simd, tile, visible, block, item, lanes);
+                let group = Group { tile, block, lanes, alone: lanes == self.hit[block], direction };
+                self.fill(simd, &group, visible, item, &mut space);
             }
-            let material = surfaces.material[block][first];
-            for lane in each_bit(0xffff & !surfaces.hit[block]) {
-                surfaces.material[block][lane] = material;
+            if self.hit[block] != 0xffff {
+                let material = self.material[block].0[first];
+                self.material[block].put(simd, mask_of(simd, 0xffff & !self.hit[block]), material);
             }
-            let view = tile.directions(simd, block).normalize(simd);
-            view.scale(splat(simd, -1.0)).store(&mut surfaces.to_viewer[block]);
+            if tile.frame.features.specular {
+                let backwards = splat(simd, -1.0) / direction.dot(direction).sqrt();
+                direction.scale(backwards).store(&mut self.to_viewer[block]);
+            }
         }
-        surfaces
     }
 
-    /// The lanes of a block that see one item.
+    /// The lanes of a block that see one item. `space` is kept for the next block that sees it.
     #[inline(always)]
     fn fill<S: Simd>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        group: &Group<'_, S>,
         visible: &Visible,
-        block: usize,
         item: u32,
-        lanes: u32,
+        space: &mut Option<(u32, Space)>,
     ) {
+        let &Group { tile, block, lanes, .. } = group;
         let frame = tile.frame;
         if item >= frame.items.first_plane() {
             let index = (item - frame.items.first_plane()) as usize;
@@ -94,118 +108,111 @@ impl Surfaces {
                 |_| normal,
             );
         }
-        match frame.items.get(item) {
+        let (corners, normals, space) = match frame.items.get(item) {
             Item::Sphere(index) => {
                 let sphere = frame.spheres[index];
                 let material = frame.scene().spheres[index].material;
-                self.fill_analytic(tile, block, item, lanes, material, |point| sphere.normal(point));
+                return self.fill_analytic(tile, block, item, lanes, material, |point| sphere.normal(point));
             }
             Item::Triangle(index) => {
-                let corners = frame.triangles[index].corners.map(|corner| corner.as_vec3().to_array());
-                let corners = corners.map(|corner| corner.map(|c| Lanes([c; LANES])));
-                for lane in each_bit(lanes) {
-                    self.material[block][lane] = frame.scene().triangles[index].material;
-                }
-                self.fill_triangles(simd, tile, block, lanes, &Space::of_eye(tile), &corners, None);
+                let corners = frame.triangles[index].corners;
+                let corners = three!(k => Vec3x16::splat(simd, corners[k].as_vec3().to_array()));
+                self.material[block].put(simd, mask_of(simd, lanes), frame.scene().triangles[index].material);
+                (corners, None, space_of(space, item, || Space::of_eye(tile)))
             }
             Item::Model(index) => {
                 let instance = &frame.instances[index];
                 let slots = &frame.scene().models[index].materials;
-                let (corners, normals) = self.gather(instance, slots, &visible.triangle[block], block, lanes);
-                let space = Space::of_instance(tile, instance);
-                self.fill_triangles(simd, tile, block, lanes, &space, &corners, normals.as_ref());
+                let (corners, normals) =
+                    self.gather(simd, instance, slots, &visible.triangle[block], block, lanes);
+                (corners, normals, space_of(space, item, || Space::of_instance(tile, instance)))
             }
-        }
+        };
+        self.fill_triangles(simd, group, space, corners, normals);
     }
 
-    /// Corners, and for smooth models normals, of the triangles that lanes see.
+    /// Corners, and for smooth models normals, of the triangles that lanes see: triangle by triangle, because neighbours
+    /// often see the same one.
     #[inline(always)]
-    fn gather(
+    fn gather<S: Simd>(
         &mut self,
+        simd: S,
         instance: &Instance,
         slots: &[u32],
-        triangles: &[u32; LANES],
+        triangles: &Indices,
         block: usize,
         lanes: u32,
-    ) -> ([[Lanes; 3]; 3], Option<[[Lanes; 3]; 3]>) {
-        let mut corners = [[Lanes::ZERO; 3]; 3];
-        let mut normals = instance.smooth.then_some([[Lanes::ZERO; 3]; 3]);
-        for lane in each_bit(lanes) {
-            let triangle = triangles[lane];
-            // `CompiledScene::new` made sure that there is one per slot.
-            self.material[block][lane] = slots[instance.mesh.slot(triangle) as usize];
-            put(&mut corners, lane, instance.mesh.corners(triangle));
-            if let Some(normals) = &mut normals {
-                put(normals, lane, instance.mesh.corner_normals(triangle).unwrap_or_default());
+    ) -> (ThreeVectors<S>, Option<ThreeVectors<S>>) {
+        let nothing = Vec3x16::splat(simd, [0.0; 3]);
+        let (mut corners, mut normals) = ([nothing; 3], [nothing; 3]);
+        let leaves = instance.mesh.blocks();
+        let mut rest = lanes;
+        while rest != 0 {
+            let triangle = triangles.0[rest.trailing_zeros() as usize];
+            let same = rest & triangles.equal(simd, triangle);
+            rest &= !same;
+            let mask = mask_of(simd, same);
+            let leaf = &leaves[triangle as usize / WIDTH];
+            put(simd, mask, leaf.corners(triangle as usize % WIDTH), &mut corners);
+            if instance.smooth {
+                put(simd, mask, instance.mesh.corner_normals(triangle).unwrap_or_default(), &mut normals);
+            }
+            if slots.len() > 1 {
+                self.material[block].put(simd, mask, slot_of(&instance.mesh, slots, triangle));
             }
         }
-        (corners, normals)
+        if let &[slot] = slots {
+            self.material[block].put(simd, mask_of(simd, lanes), slot);
+        }
+        (corners, instance.smooth.then_some(normals))
     }
 
     /// Points on the planes of triangles, by the planes' own equations; the rays are known to hit them.
     #[inline(always)]
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one call, split off so that both kinds of triangle share it"
-    )]
     fn fill_triangles<S: Simd>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
-        block: usize,
-        lanes: u32,
+        group: &Group<'_, S>,
         space: &Space,
-        corners: &[[Lanes; 3]; 3],
-        normals: Option<&[[Lanes; 3]; 3]>,
+        [a, b, c]: ThreeVectors<S>,
+        normals: Option<ThreeVectors<S>>,
     ) {
-        let [a, b, c] = three!(k => Vec3x16::load(simd, &corners[k]));
-        let origin = Vec3x16::splat(simd, space.origin);
-        let (x, y) = (tile.rays.x[block].load(simd), tile.rays.y[block].load(simd));
-        let [center, right, down] = three!(i => Vec3x16::splat(simd, space.directions[i]));
-        let direction = center.add(right.scale(x)).add(down.scale(y));
+        let &Group { tile, block, lanes, direction, .. } = group;
+        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+        let to_a = a.sub(Vec3x16::splat(simd, space.origin));
         let (ab, ac) = (b.sub(a), c.sub(a));
         let normal = ab.cross(ac);
-        let normal = normal.scale(splat(simd, 1.0) / normal.size());
-        let to_a = a.sub(origin);
-        let t = normal.dot(to_a) / normal.dot(direction);
-        let eye_direction = tile.directions(simd, block);
-        let point = eye_direction.scale(t);
-        let ng = normal.transform(simd, &space.normals).normalize(simd);
-        let backwards = ng.dot(eye_direction).simd_gt(splat(simd, 0.0));
-        let ng = Vec3x16(three!(i => select(backwards, -ng.0[i], ng.0[i])));
-        let ns = match normals {
-            None => ng,
-            Some(normals) => {
-                let at = direction.scale(t).sub(to_a);
-                // Barycentric weights by areas, clamped: rounding must not leave the triangle.
-                let full = ab.cross(ac);
-                let whole = splat(simd, 1.0) / full.dot(full);
-                let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-                let u = (at.cross(ac).dot(full) * whole).max_precise(zero).min_precise(one);
-                let v = (ab.cross(at).dot(full) * whole).max_precise(zero).min_precise(one - u);
-                let [na, nb, nc] = three!(k => Vec3x16::load(simd, &normals[k]));
-                let blended = na.scale(one - u - v).add(nb.scale(u)).add(nc.scale(v));
-                let smooth = blended.transform(simd, &space.normals).normalize(simd);
-                let usable = smooth.dot(smooth).simd_gt(splat(simd, 0.5));
-                let against = smooth.dot(ng).simd_lt(zero);
-                Vec3x16(three!(i => {
-                    let turned = select(against, -smooth.0[i], smooth.0[i]);
-                    select(usable, turned, ng.0[i])
-                }))
-            }
-        };
+        let normal = normal.scale(to_unit(simd, normal.size()));
+        // The plane's normal in eye space meets the ray there as the normal in mesh space meets it here.
+        let eye_normal = normal.transform(simd, &space.normals);
+        let along = eye_normal.dot(direction);
+        let t = normal.dot(to_a) * splat(simd, space.normals_scale) / along;
+        let point = direction.scale(t);
+        let length = eye_normal.dot(eye_normal).sqrt();
+        let turned = one.copysign(-along) / length;
+        let ng = eye_normal.scale(turned);
         let lift = (point.size() + splat(simd, space.reach)) * splat(simd, LIFT);
-        let sound = bits(point.size().simd_le(splat(simd, f32::MAX)) & ng.dot(ng).simd_gt(splat(simd, 0.5)));
-        let mask = mask_of(simd, lanes);
-        for (new, old) in
-            [(point, &mut self.point[block]), (ng, &mut self.ng[block]), (ns, &mut self.ns[block])]
-        {
-            let before = Vec3x16::load(simd, old);
-            Vec3x16(three!(i => select(mask, new.0[i], before.0[i]))).store(old);
+        group.keep(simd, point, &mut self.point[block]);
+        group.keep(simd, ng, &mut self.ng[block]);
+        group.keep_one(simd, lift, &mut self.lift[block]);
+        if let Some(normals) = normals {
+            let at = space.direction(simd, tile, block).scale(t).sub(to_a);
+            let [u, v] = barycentric(simd, at, ab, ac);
+            let [na, nb, nc] = normals;
+            let blended = na.scale(one - u - v).add(nb.scale(u)).add(nc.scale(v));
+            let smooth = blended.transform(simd, &space.normals).normalize(simd);
+            let usable = smooth.dot(smooth).simd_gt(splat(simd, 0.5));
+            let against = smooth.dot(ng).simd_lt(zero);
+            let ns = Vec3x16(three!(i => {
+                let turned = select(against, -smooth.0[i], smooth.0[i]);
+                select(usable, turned, ng.0[i])
+            }));
+            group.keep(simd, ns, &mut self.ns[block]);
+        } else if tile.frame.features.smooth {
+            group.keep(simd, ng, &mut self.ns[block]);
         }
-        let lifted = select(mask, lift, self.lift[block].load(simd));
-        self.lift[block].store(lifted);
-        for lane in each_bit(lanes & !sound) {
+        let sound = lift.simd_le(splat(simd, f32::MAX)) & turned.abs().simd_le(splat(simd, f32::MAX));
+        for lane in each_bit(lanes & !bits(sound)) {
             self.repair(tile, block, lane, space, a, ab, ac);
         }
     }
@@ -253,7 +260,7 @@ impl Surfaces {
             let ng = normal(point);
             let ng = if ng.dot(ray.direction) > 0.0 { -ng } else { ng };
             self.set(block, lane, point, ng);
-            self.material[block][lane] = material;
+            self.material[block].0[lane] = material;
         }
     }
 
@@ -267,12 +274,61 @@ impl Surfaces {
     }
 }
 
-fn put(lanes: &mut [[Lanes; 3]; 3], lane: usize, vectors: [Vec3; 3]) {
-    for (lanes, vector) in lanes.iter_mut().zip(vectors) {
+/// Three vectors a lane.
+type ThreeVectors<S> = [Vec3x16<S>; 3];
+
+/// Barycentric weights of the second and the third corner, by areas; clamped, because rounding must not leave the triangle.
+/// `at` is relative to the first corner, as `ab` and `ac` are.
+#[inline(always)]
+fn barycentric<S: Simd>(simd: S, at: Vec3x16<S>, ab: Vec3x16<S>, ac: Vec3x16<S>) -> [f32x16<S>; 2] {
+    let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+    let full = ab.cross(ac);
+    let whole = one / full.dot(full);
+    let u = (at.cross(ac).dot(full) * whole).max_precise(zero).min_precise(one);
+    let v = (ab.cross(at).dot(full) * whole).max_precise(zero).min_precise(one - u);
+    [u, v]
+}
+
+/// The lanes of a block that see one item.
+struct Group<'a, S: Simd> {
+    tile: &'a EyeTile<'a>,
+    block: usize,
+    lanes: u32,
+    /// No other lane of the block hits anything.
+    alone: bool,
+    /// Of the rays in eye space.
+    direction: Vec3x16<S>,
+}
+
+impl<S: Simd> Group<'_, S> {
+    /// Replaces these lanes.
+    #[inline(always)]
+    fn keep(&self, simd: S, new: Vec3x16<S>, old: &mut [Lanes; 3]) {
         for axis in 0..3 {
-            lanes[axis].0[lane] = vector[axis];
+            self.keep_one(simd, new.0[axis], &mut old[axis]);
         }
     }
+
+    #[inline(always)]
+    fn keep_one(&self, simd: S, new: f32x16<S>, old: &mut Lanes) {
+        let kept = if self.alone { new } else { select(mask_of(simd, self.lanes), new, old.load(simd)) };
+        old.store(kept);
+    }
+}
+
+/// Puts three vectors into the lanes of a mask.
+#[inline(always)]
+fn put<S: Simd>(simd: S, mask: mask32x16<S>, vectors: [Vec3; 3], lanes: &mut ThreeVectors<S>) {
+    for k in 0..3 {
+        for axis in 0..3 {
+            lanes[k].0[axis] = select(mask, splat(simd, vectors[k][axis]), lanes[k].0[axis]);
+        }
+    }
+}
+
+/// `CompiledScene::new` made sure that there is one per slot.
+fn slot_of(mesh: &CompiledMesh, slots: &[u32], triangle: u32) -> u32 {
+    slots[mesh.slot(triangle) as usize]
 }
 
 /// The rays of a tile in the space of a mesh.
@@ -281,27 +337,46 @@ struct Space {
     origin: [f32; 3],
     /// Through the tile's centre, and what a step right and a step down add.
     directions: [[f32; 3]; 3],
-    /// Columns of the matrix that takes normals to eye space.
+    /// Columns of the matrix that takes normals to eye space, divided by `normals_scale`.
     normals: [[f32; 3]; 3],
+    normals_scale: f32,
     /// Largest coordinate that placed the mesh.
     reach: f32,
 }
 
+/// The space of an item: the one that is kept, if it is this item's.
+fn space_of(kept: &mut Option<(u32, Space)>, item: u32, make: impl FnOnce() -> Space) -> &Space {
+    if kept.as_ref().is_none_or(|(of, _)| *of != item) {
+        *kept = None;
+    }
+    &kept.get_or_insert_with(|| (item, make())).1
+}
+
 impl Space {
     fn of_eye(tile: &EyeTile<'_>) -> Self {
-        let directions = tile.steps.map(|step| step.as_vec3().to_array());
-        let normals = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| axis.to_array());
-        Self { origin: [0.0; 3], directions, normals, reach: 0.0 }
+        let directions = three!(i => tile.steps[i].as_vec3().to_array());
+        let normals = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Self { origin: [0.0; 3], directions, normals, normals_scale: 1.0, reach: 0.0 }
+    }
+
+    /// Of the rays of a block.
+    #[inline(always)]
+    fn direction<S: Simd>(&self, simd: S, tile: &EyeTile<'_>, block: usize) -> Vec3x16<S> {
+        let (x, y) = (tile.rays.x[block].load(simd), tile.rays.y[block].load(simd));
+        let [center, right, down] = three!(i => Vec3x16::splat(simd, self.directions[i]));
+        center.add(right.scale(x)).add(down.scale(y))
     }
 
     fn of_instance(tile: &EyeTile<'_>, instance: &Instance) -> Self {
         let single = |v: DVec3| v.as_vec3().to_array();
         // Normals are normalised afterwards: their scale is free, and kept near one.
-        let size = instance.normals.to_cols_array().into_iter().fold(0.0, |size: f64, n| size.max(n.abs()));
+        let [x, y, z] = three!(i => instance.normals.col(i).abs());
+        let size = x.max(y).max(z).max_element();
         Self {
             origin: single(instance.inverse * -instance.translation),
-            directions: tile.steps.map(|step| single(instance.inverse * step)),
-            normals: [0, 1, 2].map(|i| single(instance.normals.col(i) / size)),
+            directions: three!(i => single(instance.inverse * tile.steps[i])),
+            normals: three!(i => single(instance.normals.col(i) / size)),
+            normals_scale: (1.0 / size) as f32,
             reach: instance.translation.abs().max_element() as f32,
         }
     }

@@ -13,7 +13,7 @@ pub(crate) mod vector;
 
 use std::sync::LazyLock;
 
-pub(crate) use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
+pub(crate) use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
 /// Lanes of every vector here.
 pub(crate) const LANES: usize = 16;
@@ -37,6 +37,37 @@ impl Lanes {
     }
 }
 
+/// Sixteen indices in memory, aligned for a full-width load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C, align(64))]
+pub(crate) struct Indices(pub(crate) [u32; LANES]);
+
+impl Indices {
+    pub(crate) const ZERO: Indices = Indices([0; LANES]);
+
+    #[inline(always)]
+    pub(crate) fn load<S: Simd>(&self, simd: S) -> u32x16<S> {
+        u32x16::load_array_ref(simd, &self.0)
+    }
+
+    /// Puts a number into the lanes of a mask.
+    #[inline(always)]
+    pub(crate) fn put<S: Simd>(&mut self, simd: S, lanes: mask32x16<S>, number: u32) {
+        self.store(select_indices(lanes, u32x16::splat(simd, number), self.load(simd)));
+    }
+
+    #[inline(always)]
+    pub(crate) fn store<S: Simd>(&mut self, value: u32x16<S>) {
+        value.store_array(&mut self.0);
+    }
+
+    /// Bits of the lanes that hold a number.
+    #[inline(always)]
+    pub(crate) fn equal<S: Simd>(&self, simd: S, number: u32) -> u32 {
+        bits(self.load(simd).simd_eq(u32x16::splat(simd, number)))
+    }
+}
+
 /// a * b + c, rounded once or twice: for filters only.
 #[inline(always)]
 pub(crate) fn fma<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> f32x16<S> {
@@ -54,6 +85,12 @@ pub(crate) fn select<S: Simd>(mask: mask32x16<S>, a: f32x16<S>, b: f32x16<S>) ->
     mask.select(a, b)
 }
 
+/// `a` where the mask is set, else `b`.
+#[inline(always)]
+pub(crate) fn select_indices<S: Simd>(mask: mask32x16<S>, a: u32x16<S>, b: u32x16<S>) -> u32x16<S> {
+    mask.select(a, b)
+}
+
 /// The mask of these bits.
 #[inline(always)]
 pub(crate) fn mask_of<S: Simd>(simd: S, bits: u32) -> mask32x16<S> {
@@ -66,10 +103,16 @@ pub(crate) fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// Bits of the lanes that hold a number.
+/// Has a value brought into the cache: a hint, and nothing where there is no such instruction.
 #[inline(always)]
-pub(crate) fn equal<S: Simd>(simd: S, lanes: &[u32; LANES], number: u32) -> u32 {
-    bits(u32x16::load_array_ref(simd, lanes).simd_eq(u32x16::splat(simd, number)))
+pub(crate) fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    for offset in (0..size_of::<T>()).step_by(64) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let line = std::ptr::from_ref(value).cast::<i8>().wrapping_add(offset);
+        // SAFETY: a prefetch neither reads nor faults, whatever the address; SSE is part of x86-64.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line) };
+    }
 }
 
 /// Goes through the bits that are set, lowest first.
@@ -95,8 +138,8 @@ impl Iterator for Bits {
     }
 }
 
-/// `three!(i => f(i))` is `[f(0), f(1), f(2)]`. A closure would do the same, but code in closures is not compiled for the
-/// level: whatever touches vectors must be inlined, always, up to the dispatch.
+/// `three!(i => f(i))` is `[f(0), f(1), f(2)]`. `array::map` would do the same, but closures and the library's own loops
+/// are not compiled for the level, and often not inlined either: each is then a call that empties all vector registers.
 macro_rules! three {
     ($i:ident => $value:expr) => {
         [

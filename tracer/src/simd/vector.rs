@@ -2,6 +2,7 @@
 
 use fearless_simd::{Simd, SimdBase, SimdFloat, f32x16};
 
+use super::math::to_unit;
 use super::{Lanes, splat, three};
 
 /// a b - c d with both roundings made up for (Kahan).
@@ -29,9 +30,9 @@ impl<S: Simd> Vec3x16<S> {
 
     #[inline(always)]
     pub(crate) fn store(self, lanes: &mut [Lanes; 3]) {
-        for (lanes, component) in lanes.iter_mut().zip(self.0) {
-            lanes.store(component);
-        }
+        lanes[0].store(self.0[0]);
+        lanes[1].store(self.0[1]);
+        lanes[2].store(self.0[2]);
     }
 
     #[inline(always)]
@@ -77,8 +78,8 @@ impl<S: Simd> Vec3x16<S> {
     /// Unit length; NaN for vectors of no length.
     #[inline(always)]
     pub(crate) fn normalize(self, simd: S) -> Self {
-        // First by the largest component: squares of small numbers would vanish.
-        let near_one = self.scale(splat(simd, 1.0) / self.size());
+        // First by a power of two: squares of small numbers would vanish.
+        let near_one = self.scale(to_unit(simd, self.size()));
         near_one.scale(splat(simd, 1.0) / near_one.dot(near_one).sqrt())
     }
 

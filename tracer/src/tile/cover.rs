@@ -2,71 +2,113 @@
 
 use super::Rays;
 use super::lens::Lens;
-use super::setup::{Flat, Flats, flat_exact, through};
-use super::walk::{Interest, Walk};
+use super::setup::{Flats, through};
+use super::walk::{Frontier, Interest, Leaf, Walk, WalkStack, open_blocks};
 use crate::bvh::WIDTH;
-use crate::mesh::CompiledMesh;
-use crate::simd::{Simd, each_bit};
+use crate::mesh::{CompiledMesh, TriangleBlock};
+use crate::simd::{Simd, each_bit, prefetch};
 
 /// What a tile asks of triangles.
 pub(super) trait Question<S: Simd>: Interest<S> {
-    /// Whether rays stand on a grid with step 1, so that triangles between them can be left out.
-    const ON_GRID: bool;
-
-    /// Triangles must be at least this close to matter; infinity when nothing matters any more.
-    fn least_closeness(&self) -> f32;
-
-    /// Blocks of rays that triangles of this closeness or less still matter to.
-    fn open_blocks(&self, simd: S, z_most: f32) -> u32;
-
-    /// A triangle against one block of rays.
-    fn cover(&mut self, simd: S, flat: &Flat, triangle: u32, block: usize);
-
-    /// All triangles of a leaf are done: time to look at what has been found.
-    fn settle(&mut self, simd: S);
+    /// The triangles of `flats` that are seen, against the rays of some blocks. Lane i holds triangle `first` + i.
+    fn cover(&mut self, simd: S, flats: &Flats, first: u32, blocks: u32);
 }
 
-/// Asks all triangles of a mesh that may matter.
+/// How many leaves ahead memory is asked for the next: a leaf takes some hundred cycles, memory several hundred.
+const PREFETCH: usize = 2;
+
+/// Asks all triangles of a mesh that may matter, nearer ones earlier.
 #[inline(always)]
-pub(super) fn cover_mesh<S: Simd, Q: Question<S>>(
+pub(super) fn cover_nearest_first<S: Simd, Q: Question<S>>(
     simd: S,
     mesh: &CompiledMesh,
     lens: &Lens,
     rays: &Rays,
+    stack: &mut WalkStack,
+    flats: &mut Flats,
     question: &mut Q,
 ) {
-    let mut walk = Walk::new(mesh, lens, rays.union);
-    let mut flats = Flats::EMPTY;
-    while let Some(index) = walk.next(simd, question, question.least_closeness()) {
-        let block = &mesh.blocks()[index as usize];
-        if Q::ON_GRID {
-            flats.set_up::<S, true>(simd, block, lens, rays, question.least_closeness());
-        } else {
-            flats.set_up::<S, false>(simd, block, lens, rays, question.least_closeness());
-        }
-        for lane in each_bit(flats.seen) {
-            cover_flat(simd, &flats.get(lane), index * WIDTH as u32 + lane as u32, rays, question);
-        }
-        for lane in each_bit(flats.crossing) {
-            if let Some(flat) = flat_exact(lens.parallel, through(lens, block.corners(lane)), rays) {
-                cover_flat(simd, &flat, index * WIDTH as u32 + lane as u32, rays, question);
-            }
-        }
-        question.settle(simd);
+    let leaves = mesh.blocks();
+    let mut walk = Walk::new(mesh.nodes(), leaves, lens, rays, stack);
+    while let Some((index, blocks)) = walk.next(simd, question) {
+        cover_leaf(simd, &leaves[index as usize], index, blocks, lens, rays, flats, question);
     }
 }
 
-/// Asks one triangle.
+/// Asks all triangles of a mesh that may matter, until nothing matters any more.
 #[inline(always)]
-pub(super) fn cover_flat<S: Simd, Q: Question<S>>(
+pub(super) fn cover_any_order<S: Simd, Q: Question<S>>(
     simd: S,
-    flat: &Flat,
-    triangle: u32,
+    mesh: &CompiledMesh,
+    lens: &Lens,
     rays: &Rays,
+    frontier: &mut Frontier,
+    flats: &mut Flats,
     question: &mut Q,
 ) {
-    let blocks = flat.blocks_touched(simd, rays) & question.open_blocks(simd, flat.z_most);
-    for block in each_bit(blocks) {
-        question.cover(simd, flat, triangle, block);
+    let leaves = mesh.blocks();
+    frontier.find(simd, mesh.nodes(), lens, rays, question);
+    for (at, &Leaf { index, blocks, z_most }) in frontier.leaves.iter().enumerate() {
+        if let Some(next) = frontier.leaves.get(at + PREFETCH) {
+            prefetch(&leaves[next.index as usize]);
+        }
+        // Much may be known by now.
+        let blocks = blocks & open_blocks(simd, question.least(), z_most);
+        if blocks != 0 {
+            cover_leaf(simd, &leaves[index as usize], index, blocks, lens, rays, flats, question);
+        }
+    }
+}
+
+/// The triangles of one leaf. A function of its own on each level: inlined wherever it is needed, it would fill the
+/// instruction cache.
+#[inline(never)]
+#[expect(clippy::too_many_arguments, reason = "what both walks have at hand")]
+fn cover_leaf<S: Simd, Q: Question<S>>(
+    simd: S,
+    leaf: &TriangleBlock,
+    index: u32,
+    blocks: u32,
+    lens: &Lens,
+    rays: &Rays,
+    flats: &mut Flats,
+    question: &mut Q,
+) {
+    let first = index * WIDTH as u32;
+    let least_closeness = question.least_closeness();
+    let crossing = simd.vectorize(
+        #[inline(always)]
+        || {
+            let crossing = if Q::ON_GRID {
+                flats.set_up::<S, true>(simd, leaf, lens, rays, least_closeness)
+            } else {
+                flats.set_up::<S, false>(simd, leaf, lens, rays, least_closeness)
+            };
+            if flats.seen != 0 {
+                question.cover(simd, flats, first, blocks);
+            }
+            crossing
+        },
+    );
+    for lane in each_bit(crossing) {
+        flats.set_up_exactly(lane, lens.parallel, through(lens, leaf.corners(lane)), rays);
+        cover_set_up(simd, flats, first, blocks, question);
+    }
+}
+
+/// Triangles that are set up already.
+#[inline(never)]
+pub(super) fn cover_set_up<S: Simd, Q: Question<S>>(
+    simd: S,
+    flats: &Flats,
+    first: u32,
+    blocks: u32,
+    question: &mut Q,
+) {
+    if flats.seen != 0 {
+        simd.vectorize(
+            #[inline(always)]
+            || question.cover(simd, flats, first, blocks),
+        );
     }
 }

@@ -5,10 +5,57 @@
 //! Either way z is linear over the picture of a plane, and what is closer has more of it. The map to (a, b, g) is affine, so a lens for a mesh is a lens for eye space after the
 //! placement of the mesh: made in `f64`, once per mesh and tile, then rounded.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3};
+
+use crate::simd::three;
 
 /// Relative error of a number that went through a handful of `f32` operations.
 pub(super) const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
+
+/// Of one space into another: a row for each coordinate there, three factors and a constant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Affine(pub [[f64; 4]; 3]);
+
+impl Affine {
+    /// p -> `linear` p + `constant`.
+    pub(crate) fn new(linear: DMat3, constant: DVec3) -> Self {
+        Self([0, 1, 2].map(|i| linear.row(i).extend(constant[i]).to_array()))
+    }
+
+    /// First `inner`, then this.
+    #[inline(always)]
+    pub(crate) fn after(&self, inner: &Affine) -> Affine {
+        let mut rows = [[0.0; 4]; 3];
+        for i in 0..3 {
+            let outer = self.0[i];
+            for column in 0..4 {
+                rows[i][column] = outer[0] * inner.0[0][column]
+                    + outer[1] * inner.0[1][column]
+                    + outer[2] * inner.0[2][column];
+            }
+            rows[i][3] += outer[3];
+        }
+        Affine(rows)
+    }
+
+    /// Of a map to (a, b, g): the same with the place (x, y) of the picture in its middle.
+    #[inline(always)]
+    pub(crate) fn centered(&self, x: f64, y: f64) -> Affine {
+        let [mut a, mut b, g] = self.0;
+        for column in 0..4 {
+            a[column] -= x * g[column];
+            b[column] -= y * g[column];
+        }
+        Affine([a, b, g])
+    }
+
+    fn apply(&self, point: DVec3) -> DVec3 {
+        DVec3::from_array(three!(i => {
+            let [x, y, z, constant] = self.0[i];
+            x * point.x + y * point.y + z * point.z + constant
+        }))
+    }
+}
 
 /// See the module.
 #[derive(Clone, Copy, Debug)]
@@ -19,54 +66,58 @@ pub(crate) struct Lens {
     pub error: [f32; 2],
     /// Seen along parallel rays, not from a point.
     pub parallel: bool,
-    linear: DMat3,
-    constant: DVec3,
+    exact: Affine,
 }
 
 impl Lens {
-    /// (a, b, g) = `linear` p + `constant`, for points with coordinates of at most `reach`.
-    pub(crate) fn new(linear: DMat3, constant: DVec3, reach: f64) -> Self {
-        let row = |i: usize| linear.row(i).extend(constant[i]);
-        let size = |i: usize| linear.row(i).abs().element_sum() * reach + constant[i].abs();
-        Self {
-            rows: [0, 1, 2].map(|i| row(i).as_vec4().to_array()),
-            error: [size(0).max(size(1)) as f32 * ROUNDING, size(2) as f32 * ROUNDING],
-            parallel: false,
-            linear,
-            constant,
+    /// A lens for points with coordinates of at most `reach`.
+    #[inline(always)]
+    pub(crate) fn new(exact: Affine, reach: f64, parallel: bool) -> Self {
+        let mut size = [0.0; 3];
+        for i in 0..3 {
+            let row = exact.0[i];
+            size[i] = (row[0].abs() + row[1].abs() + row[2].abs()) * reach + row[3].abs();
         }
+        Self::with_sizes(exact, size, parallel)
     }
 
-    /// The same, seen along parallel rays.
-    pub(crate) fn parallel(linear: DMat3, constant: DVec3, reach: f64) -> Self {
-        Self { parallel: true, ..Self::new(linear, constant, reach) }
-    }
-
-    /// The same picture of another space: p = `linear` q + `translation`.
-    pub(crate) fn of(&self, linear: DMat3, translation: DVec3, reach: f64) -> Lens {
-        let (linear, constant) = (self.linear * linear, self.linear * translation + self.constant);
-        Lens { parallel: self.parallel, ..Lens::new(linear, constant, reach) }
-    }
-
-    /// No closeness in a box is greater, given a depth that nothing in it is nearer than.
-    pub(super) fn z_most(&self, depth: f32) -> f32 {
-        if self.parallel {
-            -depth
-        } else if depth > 0.0 {
-            1.0 / depth
-        } else {
-            f32::INFINITY
+    /// `size` bounds the numbers that go into each row.
+    #[inline(always)]
+    fn with_sizes(exact: Affine, size: [f64; 3], parallel: bool) -> Self {
+        let mut rows = [[0.0; 4]; 3];
+        for i in 0..3 {
+            for column in 0..4 {
+                rows[i][column] = exact.0[i][column] as f32;
+            }
         }
+        let error = [size[0].max(size[1]) as f32 * ROUNDING, size[2] as f32 * ROUNDING];
+        Self { rows, error, parallel, exact }
     }
 
-    /// Rounded twice only, for triangles that need more digits.
-    pub(super) fn exact(&self, point: Vec3) -> DVec3 {
-        self.linear * point.as_dvec3() + self.constant
+    /// The same picture of another space, of which `placement` is the place in this one.
+    #[inline(always)]
+    pub(crate) fn of(&self, placement: &Affine, reach: f64) -> Lens {
+        Lens::new(self.exact.after(placement), reach, self.parallel)
     }
 
-    /// For points with more digits than a mesh has.
-    pub(crate) fn exact_point(&self, point: DVec3) -> DVec3 {
-        self.linear * point + self.constant
+    /// The same picture, of points given relative to a place of this space, at most `reach` from it on each axis: their few
+    /// digits are then all spent on where they differ.
+    #[inline(always)]
+    pub(super) fn relative_to(&self, place: DVec3, reach: DVec3) -> Lens {
+        let mut exact = self.exact;
+        let here = self.exact.apply(place);
+        let mut size = [0.0; 3];
+        for i in 0..3 {
+            let row = &mut exact.0[i];
+            row[3] = here[i];
+            size[i] = row[0].abs() * reach.x + row[1].abs() * reach.y + row[2].abs() * reach.z + row[3].abs();
+        }
+        Lens::with_sizes(exact, size, self.parallel)
+    }
+
+    /// (a, b, g) of a point, to the last digit.
+    pub(crate) fn exact(&self, point: DVec3) -> DVec3 {
+        self.exact.apply(point)
     }
 }
 
@@ -85,8 +136,14 @@ impl Frustum {
     pub(super) fn new(lens: &Lens, [x_lo, x_hi, y_lo, y_hi]: [f32; 4]) -> Self {
         let [a, b, g] = lens.rows;
         let scale = if lens.parallel { [0.0, 0.0, 0.0, 1.0] } else { g };
-        let side =
-            |row: [f32; 4], sign: f32, at: f32| std::array::from_fn(|i| sign * (row[i] - at * scale[i]));
+        let side = |row: [f32; 4], sign: f32, at: f32| {
+            [
+                sign * (row[0] - at * scale[0]),
+                sign * (row[1] - at * scale[1]),
+                sign * (row[2] - at * scale[2]),
+                sign * (row[3] - at * scale[3]),
+            ]
+        };
         let error = |at: f32| 4.0 * (lens.error[0] + at.abs() * (lens.error[1] + ROUNDING));
         Self {
             planes: [side(a, 1.0, x_hi), side(a, -1.0, x_lo), side(b, 1.0, y_hi), side(b, -1.0, y_lo), g],

@@ -22,21 +22,27 @@
 //! they are wide.
 
 mod cover;
-mod lens;
+pub(crate) mod lens;
 mod setup;
 pub(crate) mod shadow;
 pub(crate) mod visible;
 mod walk;
 
-use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, splat};
+use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat};
 
-pub(crate) use lens::Lens;
+pub(crate) use lens::Affine;
+use setup::Flats;
+use shadow::Points;
+use walk::{Frontier, WalkStack};
 
 /// Rays along a side of a tile.
 pub(crate) const SIDE: usize = 16;
 
 /// Blocks of a tile.
 pub(crate) const BLOCKS: usize = 16;
+
+/// A bit for each.
+const ALL_BLOCKS: u32 = (1 << BLOCKS) - 1;
 
 /// The rays of a tile where they pierce the picture of a lens, and rectangles around the blocks.
 #[derive(Clone)]
@@ -51,6 +57,34 @@ pub(crate) struct Rays {
     pub error: f32,
 }
 
+/// Room that tiles need while they are traced, kept from tile to tile.
+pub(crate) struct Scratch {
+    /// The walk through the scene's tree, and that through a mesh's.
+    scene_stack: WalkStack,
+    mesh_stack: WalkStack,
+    /// The same of shadow rays.
+    scene_frontier: Frontier,
+    mesh_frontier: Frontier,
+    flats: Flats,
+    /// Of shadow rays, as the light sees them.
+    shadow_rays: Rays,
+    shadow: Points,
+}
+
+impl Scratch {
+    pub(crate) fn new() -> Self {
+        Self {
+            scene_stack: WalkStack::EMPTY,
+            mesh_stack: WalkStack::EMPTY,
+            scene_frontier: Frontier::EMPTY,
+            mesh_frontier: Frontier::EMPTY,
+            flats: Flats::EMPTY,
+            shadow_rays: Rays::empty(),
+            shadow: Points::NONE,
+        }
+    }
+}
+
 /// Column and row of a ray in its tile.
 #[inline(always)]
 pub(crate) const fn place(block: usize, lane: usize) -> (usize, usize) {
@@ -59,59 +93,59 @@ pub(crate) const fn place(block: usize, lane: usize) -> (usize, usize) {
 
 impl Rays {
     /// The rays of the eye: a regular grid with step 1 around the tile's centre.
-    pub(crate) fn grid() -> Self {
+    #[inline(always)]
+    pub(crate) fn grid<S: Simd>(simd: S) -> Self {
         let position = |index: usize| index as f32 - (SIDE as f32 - 1.0) / 2.0;
         let lanes = |of: fn((usize, usize)) -> usize| {
             std::array::from_fn(|block| Lanes(std::array::from_fn(|lane| position(of(place(block, lane))))))
         };
-        let mut rays = Self {
-            x: lanes(|(column, _)| column),
-            y: lanes(|(_, row)| row),
-            bounds: [Lanes::ZERO; 4],
-            union: [0.0; 4],
-            error: 0.0,
-        };
-        rays.bound([u32::MAX; BLOCKS], (1 << BLOCKS) - 1);
+        let mut rays = Self { x: lanes(|(column, _)| column), y: lanes(|(_, row)| row), ..Self::empty() };
+        rays.bound(simd, &[0xffff; BLOCKS]);
         rays
     }
 
     /// None yet.
-    fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         let nowhere = [Lanes::ZERO; BLOCKS];
         Self { x: nowhere, y: nowhere, bounds: [Lanes::ZERO; 4], union: [0.0; 4], error: 0.0 }
     }
 
-    /// Puts rectangles around the lanes of `live` (a bit a lane), and around the blocks of `blocks` together.
-    pub(crate) fn bound(&mut self, live: [u32; BLOCKS], blocks: u32) {
-        let empty = [f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY];
-        self.union = empty;
+    /// Puts rectangles around the lanes of `live` (a bit a lane).
+    #[inline(always)]
+    pub(crate) fn bound<S: Simd>(&mut self, simd: S, live: &[u32; BLOCKS]) {
+        let infinite = splat(simd, f32::INFINITY);
         for block in 0..BLOCKS {
-            let mut rectangle = empty;
-            for lane in (0..LANES).filter(|lane| live[block] >> lane & 1 == 1) {
-                let (x, y) = (self.x[block].0[lane], self.y[block].0[lane]);
-                rectangle =
-                    [rectangle[0].min(x), rectangle[1].max(x), rectangle[2].min(y), rectangle[3].max(y)];
+            let mask = mask_of(simd, live[block]);
+            for (axis, at) in [&self.x[block], &self.y[block]].into_iter().enumerate() {
+                let at = at.load(simd);
+                self.bounds[2 * axis].0[block] = select(mask, at, infinite).reduce_min();
+                self.bounds[2 * axis + 1].0[block] = select(mask, at, -infinite).reduce_max();
             }
-            for side in 0..4 {
-                self.bounds[side].0[block] = rectangle[side];
-                if blocks >> block & 1 == 1 {
-                    let wider: fn(f32, f32) -> f32 = if side % 2 == 0 { f32::min } else { f32::max };
-                    self.union[side] = wider(self.union[side], rectangle[side]);
-                }
-            }
+        }
+        for axis in 0..2 {
+            self.union[2 * axis] = self.bounds[2 * axis].load(simd).reduce_min();
+            self.union[2 * axis + 1] = self.bounds[2 * axis + 1].load(simd).reduce_max();
+        }
+        self.error = 0.0;
+    }
+
+    /// Makes all rectangles wider by the error of the places.
+    #[inline(always)]
+    pub(crate) fn widen<S: Simd>(&mut self, simd: S, error: f32) {
+        self.error = error;
+        for side in 0..4 {
+            let out = if side % 2 == 0 { -error } else { error };
+            self.union[side] += out;
+            let wider = self.bounds[side].load(simd) + splat(simd, out);
+            self.bounds[side].store(wider);
         }
     }
 
-    /// Blocks with a ray that may stand in a rectangle.
+    /// The rectangle around the rays of a block.
     #[inline(always)]
-    pub(crate) fn blocks_in<S: Simd>(&self, simd: S, [x_from, x_to, y_from, y_to]: [f32; 4]) -> u32 {
+    pub(crate) fn around(&self, block: usize) -> [f32; 4] {
         let [x_lo, x_hi, y_lo, y_hi] = &self.bounds;
-        bits(
-            x_lo.load(simd).simd_le(splat(simd, x_to))
-                & x_hi.load(simd).simd_ge(splat(simd, x_from))
-                & y_lo.load(simd).simd_le(splat(simd, y_to))
-                & y_hi.load(simd).simd_ge(splat(simd, y_from)),
-        )
+        [x_lo.0[block], x_hi.0[block], y_lo.0[block], y_hi.0[block]]
     }
 
     /// Rays of a block that stand in a rectangle. Their own error must have been added to it.
@@ -133,6 +167,7 @@ impl Rays {
 
     /// Largest coordinate of any ray that counts.
     pub(crate) fn reach(&self) -> f32 {
-        self.union.iter().fold(0.0, |reach, side| reach.max(side.abs()))
+        let [x_lo, x_hi, y_lo, y_hi] = self.union;
+        x_lo.abs().max(x_hi.abs()).max(y_lo.abs()).max(y_hi.abs())
     }
 }

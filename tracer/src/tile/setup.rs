@@ -10,43 +10,26 @@ use glam::{DVec3, Vec3};
 use super::Rays;
 use super::lens::{Lens, ROUNDING};
 use crate::mesh::TriangleBlock;
-use crate::simd::{Lanes, Simd, SimdBase, SimdFloat, bits, f32x16, fma, splat, three};
+use crate::simd::{Lanes, Simd, SimdBase, SimdFloat, bits, f32x16, fma, mask_of, select, splat, three};
 
-/// A triangle in the picture.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Flat {
-    /// Constants of the three lines, with `slack` added: below zero is outside for certain.
-    pub e: [f32; 3],
-    pub ex: [f32; 3],
-    pub ey: [f32; 3],
-    /// Twice the error of each line: above it is inside for certain.
-    pub slack: [f32; 3],
-    /// Closeness: constant, and per x and y.
-    pub z: [f32; 3],
-    /// Error of the closeness.
-    pub z_error: f32,
-    /// Rectangle around it: x from and to, y from and to.
-    pub around: [f32; 4],
-    /// No point of it is closer.
-    pub z_most: f32,
-    /// Its lines are needed to tell which blocks it touches: the rectangle says little.
-    pub large: bool,
-}
-
-/// Sixteen of them, lane by lane.
+/// Sixteen triangles in the picture, lane by lane.
 pub(super) struct Flats {
+    /// Constants of the three lines, with their errors added: below zero is outside for certain.
     e: [Lanes; 3],
     ex: [Lanes; 3],
     ey: [Lanes; 3],
-    slack: [Lanes; 3],
+    /// Twice the largest error of the three: above it is inside for certain.
+    slack: Lanes,
+    /// Closeness: constant, and per x and y.
     z: [Lanes; 3],
-    z_error: Lanes,
-    around: [Lanes; 4],
-    z_most: Lanes,
-    /// Bits of those to be covered.
+    /// Error of the closeness.
+    pub z_error: Lanes,
+    /// Rectangles around them: x from and to, y from and to.
+    pub around: [Lanes; 4],
+    /// No point of a triangle is closer.
+    pub z_most: Lanes,
+    /// Bits of those to be covered. All other lanes mean nothing.
     pub seen: u32,
-    /// Bits of those that reach behind the lens.
-    pub crossing: u32,
 }
 
 impl Flats {
@@ -54,34 +37,17 @@ impl Flats {
         e: [Lanes::ZERO; 3],
         ex: [Lanes::ZERO; 3],
         ey: [Lanes::ZERO; 3],
-        slack: [Lanes::ZERO; 3],
+        slack: Lanes::ZERO,
         z: [Lanes::ZERO; 3],
         z_error: Lanes::ZERO,
         around: [Lanes::ZERO; 4],
         z_most: Lanes::ZERO,
         seen: 0,
-        crossing: 0,
     };
 
-    #[inline(always)]
-    pub(super) fn get(&self, lane: usize) -> Flat {
-        let [x_lo, x_hi, y_lo, y_hi] = &self.around;
-        let around = [x_lo.0[lane], x_hi.0[lane], y_lo.0[lane], y_hi.0[lane]];
-        Flat {
-            e: three!(edge => self.e[edge].0[lane]),
-            ex: three!(edge => self.ex[edge].0[lane]),
-            ey: three!(edge => self.ey[edge].0[lane]),
-            slack: three!(edge => self.slack[edge].0[lane]),
-            z: three!(i => self.z[i].0[lane]),
-            z_error: self.z_error.0[lane],
-            around,
-            z_most: self.z_most.0[lane],
-            large: (around[1] - around[0]).min(around[3] - around[2]) > 6.0,
-        }
-    }
-
     /// Sets up a block of triangles. Those beside the rays, or nowhere as close as `least_closeness`, are not seen. With
-    /// `ON_GRID`, neither are those that lie between the rays of a grid with step 1.
+    /// `ON_GRID`, neither are those that lie between the rays of a grid with step 1. Returns the bits of those that reach
+    /// behind the lens: they want [`Flats::set_up_exactly`].
     #[inline(always)]
     pub(super) fn set_up<S: Simd, const ON_GRID: bool>(
         &mut self,
@@ -90,7 +56,7 @@ impl Flats {
         lens: &Lens,
         rays: &Rays,
         least_closeness: f32,
-    ) {
+    ) -> u32 {
         let zero = splat(simd, 0.0);
         let g = three!(k => row(simd, lens.rows[2], &block.0[k]));
         let g_error = splat(simd, 8.0 * lens.error[1]);
@@ -102,7 +68,6 @@ impl Flats {
         } else {
             (bits(g_least.simd_gt(g_error)), bits(g_least.simd_le(g_error) & g_most.simd_ge(-g_error)))
         };
-        self.crossing = crossing;
 
         let one = splat(simd, 1.0);
         let scale = three!(k => if lens.parallel { one } else { one / g[k] });
@@ -137,7 +102,7 @@ impl Flats {
         }
         self.seen = before & bits(inside);
         if self.seen == 0 {
-            return;
+            return crossing;
         }
 
         let [abx, aby, acx, acy] = [x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]];
@@ -145,6 +110,7 @@ impl Flats {
         let sign = one.copysign(area);
         let near_zero = splat(simd, ROUNDING);
         let local = splat(simd, rays.reach());
+        let mut slack = zero;
         for (edge, (from, to)) in [(0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
             let ex = (y[from] - y[to]) * sign;
             let ey = (x[to] - x[from]) * sign;
@@ -155,8 +121,9 @@ impl Flats {
             self.e[edge].store(e + error);
             self.ex[edge].store(ex);
             self.ey[edge].store(ey);
-            self.slack[edge].store(error * splat(simd, 2.0));
+            slack = slack.max(error * splat(simd, 2.0));
         }
+        self.slack.store(slack);
         let (ab, ac) = (z[1] - z[0], z[2] - z[0]);
         let inverse = one / area;
         let zx = (ab * acy - ac * aby) * inverse;
@@ -177,10 +144,121 @@ impl Flats {
         self.z[1].store(zx);
         self.z[2].store(zy);
         self.z_error.store(z_error.max(zero));
-        for (lanes, side) in self.around.iter_mut().zip([x_lo, x_hi, y_lo, y_hi]) {
-            lanes.store(side);
-        }
+        self.around[0].store(x_lo);
+        self.around[1].store(x_hi);
+        self.around[2].store(y_lo);
+        self.around[3].store(y_hi);
         self.z_most.store(z_most);
+        crossing
+    }
+
+    /// The long way for one triangle that reaches behind the lens, or has more digits than a mesh: in `f64`, with lines from
+    /// the cross products of (a, b, g), which need no division. It is not seen if it has no area in the picture, or lies
+    /// beside it.
+    pub(super) fn set_up_exactly(&mut self, lane: usize, parallel: bool, corners: [DVec3; 3], rays: &Rays) {
+        self.seen = 0;
+        // z g at the corners, with g = 1 for parallel rays.
+        let closeness = three!(k => if parallel { -corners[k].z } else { 1.0 });
+        let [a, b, c] = three!(k => if parallel { corners[k].with_z(1.0) } else { corners[k] });
+        let normals = [b.cross(c), c.cross(a), a.cross(b)];
+        let determinant = a.dot(normals[0]);
+        let scale = normals[0].abs().max(normals[1].abs()).max(normals[2].abs()).max_element();
+        if determinant == 0.0 || scale == 0.0 || !scale.is_finite() {
+            // Edge-on, to the last digit: no ray hits it.
+            return;
+        }
+        let reach = rays.reach();
+        let size = |[e, ex, ey]: [f32; 3]| e.abs() + reach * (ex.abs() + ey.abs());
+        let mut slack = 0.0_f32;
+        for (edge, normal) in normals.into_iter().enumerate() {
+            let line = normal * (determinant.signum() / scale);
+            let [ex, ey, e] = line.as_vec3().to_array();
+            let error = 4.0 * ROUNDING * size([e, ex, ey]) + (ex.abs() + ey.abs()) * rays.error;
+            let x = rays.union[usize::from(ex > 0.0)];
+            let y = rays.union[2 + usize::from(ey > 0.0)];
+            if e + error + ex * x + ey * y < 0.0 {
+                return;
+            }
+            self.e[edge].0[lane] = e + error;
+            self.ex[edge].0[lane] = ex;
+            self.ey[edge].0[lane] = ey;
+            slack = slack.max(2.0 * error);
+        }
+        self.slack.0[lane] = slack;
+        let z =
+            (normals[0] * closeness[0] + normals[1] * closeness[1] + normals[2] * closeness[2]) / determinant;
+        let [zx, zy, z0] = z.as_vec3().to_array();
+        for (lanes, number) in self.z.iter_mut().zip([z0, zx, zy]) {
+            lanes.0[lane] = number;
+        }
+        let z_error = 4.0 * ROUNDING * size([z0, zx, zy]) + (zx.abs() + zy.abs()) * rays.error;
+        self.z_error.0[lane] = z_error;
+        for (lanes, side) in self.around.iter_mut().zip(rays.union) {
+            lanes.0[lane] = side;
+        }
+        // Of the plane over the tile: the triangle itself may reach behind the lens.
+        let [x_lo, x_hi, y_lo, y_hi] = rays.union;
+        self.z_most.0[lane] = z0 + (zx * x_lo).max(zx * x_hi) + (zy * y_lo).max(zy * y_hi) + z_error;
+        self.seen = 1 << lane;
+    }
+
+    /// The rectangle around all triangles that are seen (with the error of the rays), and a closeness that none of them
+    /// exceeds.
+    #[inline(always)]
+    pub(super) fn hull<S: Simd>(&self, simd: S) -> ([f32; 4], f32) {
+        let seen = mask_of(simd, self.seen);
+        let infinite = splat(simd, f32::INFINITY);
+        let [x_lo, x_hi, y_lo, y_hi] = &self.around;
+        let around = [
+            select(seen, x_lo.load(simd), infinite).reduce_min(),
+            select(seen, x_hi.load(simd), -infinite).reduce_max(),
+            select(seen, y_lo.load(simd), infinite).reduce_min(),
+            select(seen, y_hi.load(simd), -infinite).reduce_max(),
+        ];
+        (around, select(seen, self.z_most.load(simd), -infinite).reduce_max())
+    }
+
+    /// Triangles that may touch a rectangle (x from and to, y from and to) and are somewhere as close as `least_closeness`.
+    #[inline(always)]
+    pub(super) fn touching<S: Simd>(&self, simd: S, rectangle: [f32; 4], least_closeness: f32) -> u32 {
+        let [x_lo, x_hi, y_lo, y_hi] = &self.around;
+        self.seen
+            & bits(
+                x_lo.load(simd).simd_le(splat(simd, rectangle[1]))
+                    & x_hi.load(simd).simd_ge(splat(simd, rectangle[0]))
+                    & y_lo.load(simd).simd_le(splat(simd, rectangle[3]))
+                    & y_hi.load(simd).simd_ge(splat(simd, rectangle[2]))
+                    & self.z_most.load(simd).simd_ge(splat(simd, least_closeness)),
+            )
+    }
+
+    /// A line of a triangle at sixteen places.
+    #[inline(always)]
+    fn line<S: Simd>(&self, simd: S, triangle: usize, edge: usize, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+        let (e, ex, ey) = (self.e[edge].0[triangle], self.ex[edge].0[triangle], self.ey[edge].0[triangle]);
+        fma(splat(simd, ex), x, fma(splat(simd, ey), y, splat(simd, e)))
+    }
+
+    /// One triangle at sixteen places.
+    #[inline(always)]
+    pub(super) fn triangle_at<S: Simd>(&self, simd: S, triangle: usize, x: f32x16<S>, y: f32x16<S>) -> At<S> {
+        let lines = three!(edge => self.line(simd, triangle, edge, x, y));
+        let slack = splat(simd, self.slack.0[triangle]);
+        let z = three!(i => splat(simd, self.z[i].0[triangle]));
+        At::of(simd, lines, slack, z, x, y)
+    }
+
+    /// All sixteen triangles at one place.
+    #[inline(always)]
+    pub(super) fn all_at<S: Simd>(&self, simd: S, x: f32, y: f32) -> At<S> {
+        let (x, y) = (splat(simd, x), splat(simd, y));
+        let lines = three!(edge => {
+            let [e, ex, ey] = [self.e[edge].load(simd), self.ex[edge].load(simd), self.ey[edge].load(simd)];
+            fma(ex, x, fma(ey, y, e))
+        });
+        let slack = self.slack.load(simd);
+        let z = three!(i => self.z[i].load(simd));
+        At::of(simd, lines, slack, z, x, y)
     }
 }
 
@@ -192,79 +270,12 @@ fn row<S: Simd>(simd: S, row: [f32; 4], corner: &[Lanes; 3]) -> f32x16<S> {
     fma(splat(simd, row[0]), corner[0].load(simd), z)
 }
 
-/// A line of a triangle at sixteen places.
-#[inline(always)]
-fn line<S: Simd>(simd: S, flat: &Flat, edge: usize, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
-    fma(splat(simd, flat.ex[edge]), x, fma(splat(simd, flat.ey[edge]), y, splat(simd, flat.e[edge])))
-}
-
-/// The long way for a triangle that reaches behind the lens, or has more digits than a mesh: in `f64`, with lines from
-/// the cross products of (a, b, g), which need no division. `None` if it has no area in the picture, or lies beside it.
-pub(super) fn flat_exact(parallel: bool, corners: [DVec3; 3], rays: &Rays) -> Option<Flat> {
-    // z g at the corners, with g = 1 for parallel rays.
-    let closeness = corners.map(|corner| if parallel { -corner.z } else { 1.0 });
-    let [a, b, c] = corners.map(|corner| if parallel { corner.with_z(1.0) } else { corner });
-    let normals = [b.cross(c), c.cross(a), a.cross(b)];
-    let determinant = a.dot(normals[0]);
-    let scale = normals.iter().map(|n| n.abs().max_element()).fold(0.0, f64::max);
-    if determinant == 0.0 || scale == 0.0 || !scale.is_finite() {
-        // Edge-on, to the last digit: no ray hits it.
-        return None;
-    }
-    let reach = rays.reach();
-    let size = |[e, ex, ey]: [f32; 3]| e.abs() + reach * (ex.abs() + ey.abs());
-    let lines = normals.map(|n| n * (determinant.signum() / scale));
-    let z = (normals[0] * closeness[0] + normals[1] * closeness[1] + normals[2] * closeness[2]) / determinant;
-    let [zx, zy, z0] = z.as_vec3().to_array();
-    let mut flat = Flat {
-        e: [0.0; 3],
-        ex: [0.0; 3],
-        ey: [0.0; 3],
-        slack: [0.0; 3],
-        z: [z0, zx, zy],
-        z_error: 4.0 * ROUNDING * size([z0, zx, zy]) + (zx.abs() + zy.abs()) * rays.error,
-        around: rays.union,
-        z_most: f32::INFINITY,
-        large: true,
-    };
-    for (edge, line) in lines.into_iter().enumerate() {
-        let [ex, ey, e] = line.as_vec3().to_array();
-        let error = 4.0 * ROUNDING * size([e, ex, ey]) + (ex.abs() + ey.abs()) * rays.error;
-        (flat.e[edge], flat.ex[edge], flat.ey[edge], flat.slack[edge]) = (e + error, ex, ey, 2.0 * error);
-    }
-    let [x_lo, x_hi, y_lo, y_hi] = rays.union;
-    let beside = |edge: usize| {
-        let x = if flat.ex[edge] > 0.0 { x_hi } else { x_lo };
-        let y = if flat.ey[edge] > 0.0 { y_hi } else { y_lo };
-        flat.e[edge] + flat.ex[edge] * x + flat.ey[edge] * y < 0.0
-    };
-    (!(beside(0) || beside(1) || beside(2))).then_some(flat)
-}
-
 /// Corners of a mesh's triangle, seen through a lens.
 pub(super) fn through(lens: &Lens, corners: [Vec3; 3]) -> [DVec3; 3] {
-    corners.map(|corner| lens.exact(corner))
+    three!(k => lens.exact(corners[k].as_dvec3()))
 }
 
-impl Flat {
-    /// Which blocks of the tile it may touch.
-    #[inline(always)]
-    pub(super) fn blocks_touched<S: Simd>(&self, simd: S, rays: &Rays) -> u32 {
-        let mut touched = rays.blocks_in(simd, self.around);
-        if self.large {
-            let [x_lo, x_hi, y_lo, y_hi] = &rays.bounds;
-            for edge in 0..3 {
-                let x = if self.ex[edge] > 0.0 { x_hi } else { x_lo };
-                let y = if self.ey[edge] > 0.0 { y_hi } else { y_lo };
-                let most = line(simd, self, edge, x.load(simd), y.load(simd));
-                touched &= bits(most.simd_ge(splat(simd, 0.0)));
-            }
-        }
-        touched
-    }
-}
-
-/// The lines and the closeness of a triangle at the rays of a block.
+/// The lines and the closeness of triangles at places: one triangle at sixteen, or sixteen at one.
 pub(super) struct At<S: Simd> {
     /// Inside, or too close to a line to tell.
     pub maybe: u32,
@@ -273,18 +284,19 @@ pub(super) struct At<S: Simd> {
     pub z: f32x16<S>,
 }
 
-/// Evaluates a triangle at the rays of a block.
-#[inline(always)]
-pub(super) fn at<S: Simd>(simd: S, flat: &Flat, x: f32x16<S>, y: f32x16<S>) -> Option<At<S>> {
-    let lines = three!(edge => line(simd, flat, edge, x, y));
-    let zero = splat(simd, 0.0);
-    let least = lines[0].min(lines[1]).min(lines[2]);
-    let maybe = bits(least.simd_ge(zero));
-    if maybe == 0 {
-        return None;
+impl<S: Simd> At<S> {
+    #[inline(always)]
+    fn of(
+        simd: S,
+        lines: [f32x16<S>; 3],
+        slack: f32x16<S>,
+        z: [f32x16<S>; 3],
+        x: f32x16<S>,
+        y: f32x16<S>,
+    ) -> Self {
+        let least = lines[0].min(lines[1]).min(lines[2]);
+        let maybe = bits(least.simd_ge(splat(simd, 0.0)));
+        let certain = bits(least.simd_gt(slack));
+        Self { maybe, certain, z: fma(z[1], x, fma(z[2], y, z[0])) }
     }
-    let sure = three!(edge => lines[edge] - splat(simd, flat.slack[edge]));
-    let certain = bits(sure[0].min(sure[1]).min(sure[2]).simd_gt(zero));
-    let z = fma(splat(simd, flat.z[1]), x, fma(splat(simd, flat.z[2]), y, splat(simd, flat.z[0])));
-    Some(At { maybe, certain, z })
 }

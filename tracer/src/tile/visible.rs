@@ -1,17 +1,19 @@
 //! What each ray of a tile sees first.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::cover::{Question, cover_flat, cover_mesh};
-use super::lens::{Frustum, Lens, ROUNDING};
-use super::setup::{At, Flat, at, flat_exact};
-use super::walk::Interest;
-use super::{BLOCKS, Rays, SIDE};
-use crate::bvh::Child;
+use super::cover::{Question, cover_nearest_first, cover_set_up};
+use super::lens::{Lens, ROUNDING};
+use super::setup::{At, Flats};
+use super::walk::{Interest, Walk};
+use super::{ALL_BLOCKS, BLOCKS, Rays, SIDE, Scratch};
 use crate::compile::Item;
-use crate::frame::PreparedFrame;
+use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, each_bit, mask_of, select, splat, three};
+use crate::simd::{
+    Indices, LANES, Lanes, Simd, SimdBase, bits, each_bit, f32x16, mask_of, select, select_indices, splat,
+    three, u32x16,
+};
 use crate::trace::{Hit, PrimitiveId, Ray};
 
 /// No item: a ray that sees nothing.
@@ -20,30 +22,74 @@ pub(crate) const NOTHING: u32 = u32::MAX;
 /// What the rays of a tile see.
 pub(crate) struct Visible {
     /// Index of the item, or [`NOTHING`].
-    pub item: [[u32; LANES]; BLOCKS],
+    pub item: [Indices; BLOCKS],
     /// Index of the triangle in its mesh.
-    pub triangle: [[u32; LANES]; BLOCKS],
+    pub triangle: [Indices; BLOCKS],
     /// Closeness (1 / depth) of what is seen lies between these. Rays that do not count have infinity.
     low: [Lanes; BLOCKS],
     high: [Lanes; BLOCKS],
     /// Least of `low` in each block.
     least: Lanes,
-    changed: u32,
+    /// Least of `least`.
+    least_of_all: f32,
 }
 
 impl Visible {
-    /// Nothing seen yet; rays without their bit in `live` do not count.
-    pub(crate) fn new(live: &[u32; BLOCKS]) -> Self {
-        let start = live.map(|live| {
-            Lanes(std::array::from_fn(|lane| if live >> lane & 1 == 1 { 0.0 } else { f32::INFINITY }))
-        });
+    /// For [`EyeTile::find_visible`] to fill.
+    pub(crate) fn empty() -> Self {
         Self {
-            item: [[NOTHING; LANES]; BLOCKS],
-            triangle: [[0; LANES]; BLOCKS],
-            low: start,
-            high: start,
-            least: Lanes(live.map(|live| if live == 0 { f32::INFINITY } else { 0.0 })),
-            changed: 0,
+            item: [Indices::ZERO; BLOCKS],
+            triangle: [Indices::ZERO; BLOCKS],
+            low: [Lanes::ZERO; BLOCKS],
+            high: [Lanes::ZERO; BLOCKS],
+            least: Lanes::ZERO,
+            least_of_all: 0.0,
+        }
+    }
+
+    /// Nothing seen yet; rays without their bit in `live` do not count.
+    #[inline(always)]
+    fn clear<S: Simd>(&mut self, simd: S, live: &[u32; BLOCKS]) {
+        let infinite = splat(simd, f32::INFINITY);
+        self.least_of_all = f32::INFINITY;
+        for block in 0..BLOCKS {
+            let start = select(mask_of(simd, live[block]), splat(simd, 0.0), infinite);
+            self.low[block].store(start);
+            self.high[block].store(start);
+            self.item[block] = Indices([NOTHING; LANES]);
+            self.triangle[block] = Indices::ZERO;
+            self.least.0[block] = if live[block] == 0 { f32::INFINITY } else { 0.0 };
+            self.least_of_all = self.least_of_all.min(self.least.0[block]);
+        }
+    }
+
+    /// Writes back what the rays of a block see; `changed` are the bits of those that now see `item`.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "what was held in registers")]
+    fn keep<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
+        low: f32x16<S>,
+        high: f32x16<S>,
+        triangles: u32x16<S>,
+        changed: u32,
+        item: u32,
+    ) {
+        self.low[block].store(low);
+        self.high[block].store(high);
+        self.triangle[block].store(triangles);
+        self.item[block].put(simd, mask_of(simd, changed), item);
+    }
+
+    /// Brings `least` of some blocks up to date.
+    #[inline(always)]
+    fn settle<S: Simd>(&mut self, simd: S, blocks: u32) {
+        for block in each_bit(blocks) {
+            self.least.0[block] = self.low[block].load(simd).reduce_min();
+        }
+        if blocks != 0 {
+            self.least_of_all = self.least.load(simd).reduce_min();
         }
     }
 
@@ -51,9 +97,8 @@ impl Visible {
         let closeness = (1.0 / hit.t) as f32;
         self.low[block].0[lane] = closeness * (1.0 - ROUNDING);
         self.high[block].0[lane] = closeness * (1.0 + ROUNDING);
-        self.item[block][lane] = hit.primitive.item;
-        self.triangle[block][lane] = hit.primitive.triangle;
-        self.changed |= 1 << block;
+        self.item[block].0[lane] = hit.primitive.item;
+        self.triangle[block].0[lane] = hit.primitive.triangle;
     }
 }
 
@@ -67,6 +112,8 @@ pub(crate) struct EyeTile<'a> {
     pub live: [u32; BLOCKS],
     /// Column and row of sample (0, 0) of the tile.
     pub corner: (u32, u32),
+    /// The tile's centre, in samples from the corner of the picture.
+    center: [f64; 2],
     /// Direction through the tile's centre, and what a step right and a step down add.
     pub steps: [DVec3; 3],
     rounded_steps: [[f32; 3]; 3],
@@ -81,11 +128,19 @@ impl<'a> EyeTile<'a> {
     ) -> Self {
         let half = SIDE as f64 / 2.0;
         let n = f64::from(frame.rays.grid());
-        let (across, along) = ((f64::from(corner.0) + half) / n, (f64::from(corner.1) + half) / n);
+        let center = [f64::from(corner.0) + half, f64::from(corner.1) + half];
         let [right, down] = frame.rays.steps();
-        let steps = [frame.rays.through(across, along), right, down];
-        let rounded_steps = steps.map(|step| step.as_vec3().to_array());
-        Self { frame, rays, lens: frame.rays.lens(across, along), live, corner, steps, rounded_steps }
+        let steps = [frame.rays.through(center[0] / n, center[1] / n), right, down];
+        let rounded_steps = three!(i => steps[i].as_vec3().to_array());
+        let lens = Lens::new(frame.projection.centered(center[0], center[1]), 1.0, false);
+        Self { frame, rays, lens, center, live, corner, steps, rounded_steps }
+    }
+
+    /// How the tile sees a mesh.
+    #[inline(always)]
+    fn lens_of(&self, instance: &Instance) -> Lens {
+        let [x, y] = self.center;
+        Lens::new(instance.projection.centered(x, y), 1.0, false)
     }
 
     /// The ray of a lane, exactly.
@@ -105,80 +160,43 @@ impl<'a> EyeTile<'a> {
 
     /// Finds what each ray sees.
     #[inline(always)]
-    pub(crate) fn visible<S: Simd>(&self, simd: S) -> Visible {
-        let mut visible = Visible::new(&self.live);
-        let mut items = self.items_in_sight();
-        // Nearest first.
-        items.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (depth, item) in items {
-            let mut nearest = Nearest { tile: self, item, visible: &mut visible };
-            if self.lens.z_most(depth) < nearest_least(&nearest) {
-                break;
-            }
-            match self.frame.items.get(item) {
-                Item::Model(index) => {
-                    let instance = &self.frame.instances[index];
-                    let lens = self.lens.of(instance.linear, instance.translation, 1.0);
-                    cover_mesh(simd, &instance.mesh, &lens, self.rays, &mut nearest);
-                }
-                Item::Triangle(index) => {
-                    let corners = self.frame.triangles[index].corners.map(|p| self.lens.exact_point(p));
-                    if let Some(flat) = flat_exact(false, corners, self.rays) {
-                        cover_flat(simd, &flat, 0, self.rays, &mut nearest);
+    pub(crate) fn find_visible<S: Simd>(&self, simd: S, visible: &mut Visible, scratch: &mut Scratch) {
+        visible.clear(simd, &self.live);
+        let Scratch { scene_stack, mesh_stack, flats, .. } = scratch;
+        let mut nearest = Nearest { tile: self, item: NOTHING, visible };
+        let mut walk = Walk::new(&self.frame.nodes, &[], &self.lens, self.rays, scene_stack).around_last();
+        while let Some((leaf, _)) = walk.next(simd, &nearest) {
+            for &item in self.frame.items_of(leaf) {
+                nearest.item = item;
+                match self.frame.items.get(item) {
+                    Item::Model(index) => {
+                        let instance = &self.frame.instances[index];
+                        let lens = self.lens_of(instance);
+                        cover_nearest_first(
+                            simd,
+                            &instance.mesh,
+                            &lens,
+                            self.rays,
+                            mesh_stack,
+                            flats,
+                            &mut nearest,
+                        );
                     }
+                    Item::Triangle(index) => {
+                        let corners = self.frame.triangles[index].corners;
+                        let corners = three!(k => self.lens.exact(corners[k]));
+                        flats.set_up_exactly(0, false, corners, self.rays);
+                        cover_set_up(simd, flats, 0, ALL_BLOCKS, &mut nearest);
+                    }
+                    Item::Sphere(_) => nearest.ask_every_ray(simd),
                 }
-                Item::Sphere(_) => nearest.ask_every_ray(),
             }
-            nearest.settle(simd);
         }
         for plane in 0..self.frame.planes.len() as u32 {
-            let item = self.frame.items.first_plane() + plane;
-            Nearest { tile: self, item, visible: &mut visible }.ask_every_ray();
+            nearest.item = self.frame.items.first_plane() + plane;
+            nearest.ask_every_ray(simd);
         }
-        visible
     }
-
-    /// Items whose boxes may be in sight, with a depth that nothing in them is nearer than.
-    fn items_in_sight(&self) -> Vec<(f32, u32)> {
-        let frustum = Frustum::new(&self.lens, self.rays.union);
-        let mut found = Vec::new();
-        let mut pending = vec![0_u32];
-        while let Some(index) = pending.pop() {
-            let node = &self.frame.nodes[index as usize];
-            for side in 0..2 {
-                let Some(depth) = depth_in_sight(&frustum, node.child_bounds(side)) else { continue };
-                match node.child(side) {
-                    Child::Empty => {}
-                    Child::Inner(inner) => pending.push(inner),
-                    Child::Leaf { first, count } => {
-                        found.extend((first..first + count).map(|at| (depth, self.frame.item_at(at))));
-                    }
-                }
-            }
-        }
-        found
-    }
-}
-
-fn nearest_least(nearest: &Nearest<'_, '_>) -> f32 {
-    nearest.visible.least.0.iter().fold(f32::INFINITY, |least, &of_block| least.min(of_block))
-}
-
-/// Least depth of a box, or `None` if it is out of sight.
-pub(super) fn depth_in_sight(frustum: &Frustum, (lo, hi): (Vec3, Vec3)) -> Option<f32> {
-    if !(lo.x <= hi.x) {
-        return None;
-    }
-    let corner = |plane: [f32; 4], opposite: bool| {
-        (0..3).fold(plane[3], |sum, axis| {
-            let at = if (plane[axis] < 0.0) != opposite { hi[axis] } else { lo[axis] };
-            sum + plane[axis] * at
-        })
-    };
-    let outside = (0..4).any(|side| corner(frustum.planes[side], false) > frustum.error[side]);
-    let farthest = corner(frustum.planes[4], true) + frustum.error[4];
-    let behind = !frustum.parallel && farthest < 0.0;
-    (!outside && !behind).then(|| corner(frustum.planes[4], false) - frustum.error[4])
 }
 
 /// Asks for the nearest triangle.
@@ -189,19 +207,15 @@ struct Nearest<'a, 'b> {
 }
 
 impl Nearest<'_, '_> {
-    /// Blocks with a ray that sees nothing closer than `z_most`.
-    #[inline(always)]
-    fn open_blocks<S: Simd>(&self, simd: S, z_most: f32) -> u32 {
-        bits(self.visible.least.load(simd).simd_le(splat(simd, z_most)))
-    }
-
     /// Items without lines in the picture: exactly, ray by ray.
-    fn ask_every_ray(&mut self) {
+    #[inline(always)]
+    fn ask_every_ray<S: Simd>(&mut self, simd: S) {
         for block in 0..BLOCKS {
             for lane in each_bit(self.tile.live[block]) {
                 self.ask(block, lane, 0);
             }
         }
+        self.visible.settle(simd, ALL_BLOCKS);
     }
 
     /// Whether a primitive is what a ray sees, to the last digit.
@@ -210,9 +224,9 @@ impl Nearest<'_, '_> {
         let ray = self.tile.ray(block, lane);
         let frame = self.tile.frame;
         let Some(hit) = frame.hit_of(&ray, PrimitiveId { item: self.item, triangle }, None) else { return };
-        let seen = self.visible.item[block][lane];
+        let seen = self.visible.item[block].0[lane];
         let best = (seen != NOTHING)
-            .then(|| PrimitiveId { item: seen, triangle: self.visible.triangle[block][lane] })
+            .then(|| PrimitiveId { item: seen, triangle: self.visible.triangle[block].0[lane] })
             .and_then(|seen| frame.hit_of(&ray, seen, None));
         if best.is_none_or(|best| hit.wins_over(&best)) {
             self.visible.see(block, lane, &hit);
@@ -221,64 +235,77 @@ impl Nearest<'_, '_> {
 }
 
 impl<S: Simd> Interest<S> for Nearest<'_, '_> {
+    const ON_GRID: bool = true;
+
+    fn least(&self) -> &Lanes {
+        &self.visible.least
+    }
+
+    fn least_closeness(&self) -> f32 {
+        self.visible.least_of_all
+    }
+
     #[inline(always)]
-    fn wants(&self, simd: S, around: [f32; 4], z_most: f32) -> bool {
-        let [x_from, x_to, y_from, y_to] = around;
-        // Rays stand at whole numbers and a half.
-        (x_to - 0.5).floor() >= x_from - 0.5
-            && (y_to - 0.5).floor() >= y_from - 0.5
-            && self.tile.rays.blocks_in(simd, around) & self.open_blocks(simd, z_most) != 0
+    fn refine(&self, _: S, _: [f32; 4], _: f32, blocks: u32) -> u32 {
+        blocks
     }
 }
 
 impl<S: Simd> Question<S> for Nearest<'_, '_> {
-    const ON_GRID: bool = true;
-
-    fn least_closeness(&self) -> f32 {
-        nearest_least(self)
-    }
-
+    /// Block by block, so that what a block sees stays in registers.
     #[inline(always)]
-    fn open_blocks(&self, simd: S, z_most: f32) -> u32 {
-        self.open_blocks(simd, z_most)
-    }
-
-    #[inline(always)]
-    fn cover(&mut self, simd: S, flat: &Flat, triangle: u32, block: usize) {
-        let Some(At { maybe, certain, z }) =
-            at(simd, flat, self.tile.rays.x[block].load(simd), self.tile.rays.y[block].load(simd))
-        else {
-            return;
-        };
-        let error = splat(simd, flat.z_error);
-        let (z_low, z_high) = (z - error, z + error);
-        let (low, high) = (self.visible.low[block].load(simd), self.visible.high[block].load(simd));
-        // What is not certain to be farther, even where a number is NaN.
-        let maybe = maybe & !bits(z_high.simd_lt(low));
-        if maybe == 0 {
-            return;
-        }
-        let certain = maybe & certain & bits(z_low.simd_gt(high));
-        if certain != 0 {
-            let mask = mask_of(simd, certain);
-            self.visible.low[block].store(select(mask, z_low, low));
-            self.visible.high[block].store(select(mask, z_high, high));
-            for lane in each_bit(certain) {
-                self.visible.item[block][lane] = self.item;
-                self.visible.triangle[block][lane] = triangle;
+    fn cover(&mut self, simd: S, flats: &Flats, first: u32, blocks: u32) {
+        let mut changed = 0;
+        for block in each_bit(blocks) {
+            let triangles = flats.touching(simd, self.tile.rays.around(block), self.visible.least.0[block]);
+            if triangles != 0 {
+                let any = self.cover_block(simd, flats, first, triangles, block);
+                changed |= u32::from(any) << block;
             }
-            self.visible.changed |= 1 << block;
         }
-        for lane in each_bit(maybe & !certain) {
-            self.ask(block, lane, triangle);
-        }
+        self.visible.settle(simd, changed);
     }
+}
 
+impl Nearest<'_, '_> {
+    /// Some triangles against one block of rays. Returns whether a ray may see another one now.
     #[inline(always)]
-    fn settle(&mut self, simd: S) {
-        for block in each_bit(self.visible.changed) {
-            self.visible.least.0[block] = self.visible.low[block].load(simd).reduce_min();
+    fn cover_block<S: Simd>(
+        &mut self,
+        simd: S,
+        flats: &Flats,
+        first: u32,
+        triangles: u32,
+        block: usize,
+    ) -> bool {
+        let rays = self.tile.rays;
+        let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
+        let (mut low, mut high) = (self.visible.low[block].load(simd), self.visible.high[block].load(simd));
+        let mut seen = self.visible.triangle[block].load(simd);
+        let (mut changed, mut asked) = (0, 0);
+        for lane in each_bit(triangles) {
+            let At { maybe, certain, z } = flats.triangle_at(simd, lane, x, y);
+            let error = splat(simd, flats.z_error.0[lane]);
+            let (z_low, z_high) = (z - error, z + error);
+            // What is not certain to be farther, even where a number is NaN.
+            let maybe = maybe & !bits(z_high.simd_lt(low));
+            let certain = maybe & certain & bits(z_low.simd_gt(high));
+            let mask = mask_of(simd, certain);
+            low = select(mask, z_low, low);
+            high = select(mask, z_high, high);
+            seen = select_indices(mask, u32x16::splat(simd, first + lane as u32), seen);
+            changed |= certain;
+            asked |= maybe & !certain;
+            if maybe & !certain != 0 {
+                self.visible.keep(simd, block, low, high, seen, changed, self.item);
+                for ray in each_bit(maybe & !certain) {
+                    self.ask(block, ray, first + lane as u32);
+                }
+                (low, high) = (self.visible.low[block].load(simd), self.visible.high[block].load(simd));
+                seen = self.visible.triangle[block].load(simd);
+            }
         }
-        self.visible.changed = 0;
+        self.visible.keep(simd, block, low, high, seen, changed, self.item);
+        changed | asked != 0
     }
 }

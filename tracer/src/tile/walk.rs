@@ -1,82 +1,311 @@
-//! A tile against the tree of a mesh.
+//! A tile against a tree: that of the scene, over its items, or that of a mesh, over blocks of triangles.
+//!
+//! [`Walk`] hands out leaves nearest first, so that what is found hides what comes later. [`Frontier`] finds them all,
+//! level by level: nodes of one level do not wait for each other, which suits a question that any triangle answers.
 
 use super::lens::{Frustum, Lens, ROUNDING};
+use super::{ALL_BLOCKS, Rays};
 use crate::bvh::{MAX_WIDE_DEPTH, WIDTH, WideChild, WideNode};
-use crate::mesh::CompiledMesh;
-use crate::simd::{Lanes, Simd, SimdBase, bits, each_bit, f32x16, fma, select, splat};
+use crate::mesh::TriangleBlock;
+use crate::simd::{
+    Indices, Lanes, Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, fma, prefetch, select, select_indices,
+    splat, u32x16,
+};
 
 /// What a walk is for: whether a box is worth opening.
 pub(super) trait Interest<S: Simd> {
-    /// A box within this rectangle of the picture (x from and to, y from and to), nowhere closer than `z_most`.
-    fn wants(&self, simd: S, around: [f32; 4], z_most: f32) -> bool;
+    /// Whether rays stand on a grid with step 1, so that what lies between them can be left out.
+    const ON_GRID: bool;
+
+    /// What must be at least how close to matter to each block of rays; infinity where nothing matters any more.
+    fn least(&self) -> &Lanes;
+
+    /// The least of these.
+    fn least_closeness(&self) -> f32;
+
+    /// Looks closer at a box within this rectangle of the picture (x from and to, y from and to), nowhere closer than
+    /// `z_most`: which of `blocks`, whose rectangles it overlaps, do want it.
+    fn refine(&self, simd: S, around: [f32; 4], z_most: f32, blocks: u32) -> u32;
 }
 
-/// A walk under way.
-pub(super) struct Walk<'a> {
+/// Blocks with a ray that something of this closeness still matters to.
+#[inline(always)]
+pub(super) fn open_blocks<S: Simd>(simd: S, least: &Lanes, z_most: f32) -> u32 {
+    bits(least.load(simd).simd_le(splat(simd, z_most)))
+}
+
+/// A child that a walk has yet to visit.
+#[derive(Clone, Copy)]
+struct Pending {
+    /// See [`WideChild::of`].
+    link: u32,
+    z_most: f32,
+    /// Blocks that want it.
+    blocks: u32,
+}
+
+impl Pending {
+    const ROOT: Pending = Pending { link: 0, z_most: f32::INFINITY, blocks: ALL_BLOCKS };
+}
+
+/// Room for the children that a walk has yet to visit. Kept from walk to walk: nobody need clear it.
+pub(crate) struct WalkStack([Pending; MAX_WIDE_DEPTH * (WIDTH - 1) + 1]);
+
+impl WalkStack {
+    pub(crate) const EMPTY: WalkStack = WalkStack([Pending::ROOT; MAX_WIDE_DEPTH * (WIDTH - 1) + 1]);
+}
+
+/// The nodes of a tree as a tile sees them.
+struct Sight<'a> {
     nodes: &'a [WideNode],
+    /// What stands in the leaves, to be asked of memory in time; empty where that is not known.
+    leaves: &'a [TriangleBlock],
     lens: &'a Lens,
-    frustum: Frustum,
-    stack: [(WideChild, f32); MAX_WIDE_DEPTH * (WIDTH - 1) + 1],
+    rows: [Row; 3],
+    rays: &'a Rays,
+}
+
+/// Children of a node that are wanted.
+struct Opened {
+    /// Their bits.
+    wanted: u32,
+    /// Which blocks of rays want each.
+    blocks: Indices,
+    /// No point of each is closer.
+    z_most: Lanes,
+}
+
+impl<'a> Sight<'a> {
+    #[inline(always)]
+    fn new(nodes: &'a [WideNode], leaves: &'a [TriangleBlock], lens: &'a Lens, rays: &'a Rays) -> Self {
+        let [a, b, g] = lens.rows;
+        Self { nodes, leaves, lens, rows: [Row::new(a), Row::new(b), Row::new(g)], rays }
+    }
+
+    /// Memory takes some hundred cycles, and a node less: what will be visited is asked for when it is found.
+    #[inline(always)]
+    fn prefetch(&self, child: WideChild) {
+        match child {
+            WideChild::Inner(index) => prefetch(&self.nodes[index as usize]),
+            WideChild::Block(index) => {
+                if let Some(leaf) = self.leaves.get(index as usize) {
+                    prefetch(leaf);
+                }
+            }
+        }
+    }
+
+    /// Opens a node that some blocks want. A function of its own on each level: inlined wherever it is needed, it would fill
+    /// the instruction cache.
+    #[inline(never)]
+    fn open<S: Simd, I: Interest<S>>(&self, simd: S, node: &WideNode, blocks: u32, interest: &I) -> Opened {
+        simd.vectorize(
+            #[inline(always)]
+            || self.open_here(simd, node, blocks, interest),
+        )
+    }
+
+    #[inline(always)]
+    fn open_here<S: Simd, I: Interest<S>>(
+        &self,
+        simd: S,
+        node: &WideNode,
+        blocks: u32,
+        interest: &I,
+    ) -> Opened {
+        let around = Around::new(simd, node, self.lens, &self.rows);
+        let near_enough = around.z_most.load(simd).simd_ge(splat(simd, interest.least_closeness()));
+        let mut wanted = node.present() & bits(near_enough);
+        let crossing = wanted & around.crossing;
+        if crossing != 0 {
+            // A box that reaches behind the lens has no rectangle around it.
+            wanted &= !crossing | in_sight(simd, node, &Frustum::new(self.lens, self.rays.union));
+        }
+        let mut by_block = around.blocks(simd, self.rays, blocks, interest);
+        let overlapping = bits(by_block.load(simd).simd_ne(u32x16::splat(simd, 0)));
+        wanted &= crossing | overlapping;
+        for lane in each_bit(wanted) {
+            if crossing >> lane & 1 == 1 {
+                by_block.0[lane] = ALL_BLOCKS;
+                continue;
+            }
+            let (rectangle, z_most) = around.get(lane);
+            by_block.0[lane] = interest.refine(simd, rectangle, z_most, by_block.0[lane]);
+            wanted &= !(u32::from(by_block.0[lane] == 0) << lane);
+        }
+        Opened { wanted, blocks: by_block, z_most: around.z_most }
+    }
+}
+
+/// A walk under way, nearest first.
+pub(super) struct Walk<'a> {
+    sight: Sight<'a>,
+    stack: &'a mut WalkStack,
     height: usize,
+    /// What reaches behind the lens comes last, not first.
+    around_last: bool,
 }
 
 impl<'a> Walk<'a> {
     #[inline(always)]
-    pub(super) fn new(mesh: &'a CompiledMesh, lens: &'a Lens, union: [f32; 4]) -> Self {
-        let stack = [(WideChild::Inner(0), f32::INFINITY); MAX_WIDE_DEPTH * (WIDTH - 1) + 1];
-        Self { nodes: mesh.nodes(), lens, frustum: Frustum::new(lens, union), stack, height: 1 }
+    pub(super) fn new(
+        nodes: &'a [WideNode],
+        leaves: &'a [TriangleBlock],
+        lens: &'a Lens,
+        rays: &'a Rays,
+        stack: &'a mut WalkStack,
+    ) -> Self {
+        stack.0[0] = Pending::ROOT;
+        Self { sight: Sight::new(nodes, leaves, lens, rays), stack, height: 1, around_last: false }
     }
 
-    /// The next block of triangles whose box stands in the frustum at a closeness (1 / depth) of at least
-    /// `least_closeness`, and is wanted; nearer ones earlier.
+    /// Visits what reaches behind the lens last: among the items of a scene it is what surrounds the others.
     #[inline(always)]
-    pub(super) fn next<S: Simd>(
-        &mut self,
-        simd: S,
-        interest: &impl Interest<S>,
-        least_closeness: f32,
-    ) -> Option<u32> {
+    pub(super) fn around_last(self) -> Self {
+        Self { around_last: true, ..self }
+    }
+
+    /// The next leaf whose box stands in the tile, near enough and wanted, and by which blocks; nearer ones earlier.
+    #[inline(always)]
+    pub(super) fn next<S: Simd, I: Interest<S>>(&mut self, simd: S, interest: &I) -> Option<(u32, u32)> {
+        let least_closeness = interest.least_closeness();
         while self.height > 0 {
             self.height -= 1;
-            let (child, z_most) = self.stack[self.height];
+            let Pending { link, z_most, blocks } = self.stack.0[self.height];
             if z_most < least_closeness {
                 continue;
             }
-            match child {
+            match WideChild::of(link) {
                 WideChild::Inner(index) => {
-                    self.open(simd, &self.nodes[index as usize], interest, least_closeness);
+                    let node = &self.sight.nodes[index as usize];
+                    let opened = self.sight.open(simd, node, blocks, interest);
+                    self.push(simd, node, &opened);
                 }
-                WideChild::Block(index) => return Some(index),
+                WideChild::Block(index) => return Some((index, blocks)),
             }
         }
         None
     }
 
+    /// Each to its rank, so that the nearest ends on top.
     #[inline(always)]
-    fn open<S: Simd>(&mut self, simd: S, node: &WideNode, interest: &impl Interest<S>, least_closeness: f32) {
-        let seen = in_sight(simd, node, &self.frustum);
-        if seen == 0 {
-            return;
+    fn push<S: Simd>(&mut self, simd: S, node: &WideNode, opened: &Opened) {
+        let mut order = opened.z_most;
+        if self.around_last {
+            let closeness = order.load(simd);
+            let around = closeness.simd_eq(splat(simd, f32::INFINITY));
+            order.store(select(around, splat(simd, 0.0), closeness));
         }
-        let around = Around::new(simd, node, self.lens);
-        let first = self.height;
-        for lane in each_bit(seen) {
-            let (rectangle, z_most) = around.get(lane);
-            // A box that reaches behind the lens has no rectangle around it.
-            if z_most < least_closeness
-                || (z_most < f32::INFINITY && !interest.wants(simd, rectangle, z_most))
-            {
-                continue;
-            }
-            // Sorted so that the nearest ends on top.
-            let mut at = self.height;
-            while at > first && self.stack[at - 1].1 > z_most {
-                self.stack[at] = self.stack[at - 1];
-                at -= 1;
-            }
-            self.stack[at] = (node.child(lane), z_most);
-            self.height += 1;
+        let closeness = order.load(simd);
+        for lane in each_bit(opened.wanted) {
+            let z_most = opened.z_most.0[lane];
+            let (own, earlier) = (splat(simd, order.0[lane]), (1 << lane) - 1);
+            let below =
+                opened.wanted & (bits(closeness.simd_lt(own)) | bits(closeness.simd_eq(own)) & earlier);
+            let at = self.height + below.count_ones() as usize;
+            let link = node.link(lane);
+            self.sight.prefetch(WideChild::of(link));
+            self.stack.0[at] = Pending { link, z_most, blocks: opened.blocks.0[lane] };
         }
+        self.height += opened.wanted.count_ones() as usize;
+    }
+}
+
+/// Nodes and leaves that a tile may want, level by level. Kept from walk to walk.
+pub(crate) struct Frontier {
+    /// And the blocks that want them.
+    nodes: Vec<(u32, u32)>,
+    pub(super) leaves: Vec<Leaf>,
+}
+
+/// A leaf that a tile wants.
+#[derive(Clone, Copy)]
+pub(super) struct Leaf {
+    pub index: u32,
+    /// Which blocks of rays want it.
+    pub blocks: u32,
+    /// No point of it is closer.
+    pub z_most: f32,
+}
+
+impl Frontier {
+    pub(crate) const EMPTY: Frontier = Frontier { nodes: Vec::new(), leaves: Vec::new() };
+
+    /// Finds the leaves of a tree whose boxes stand in the tile, near enough and wanted.
+    #[inline(always)]
+    pub(super) fn find<S: Simd, I: Interest<S>>(
+        &mut self,
+        simd: S,
+        nodes: &[WideNode],
+        lens: &Lens,
+        rays: &Rays,
+        interest: &I,
+    ) {
+        let sight = Sight::new(nodes, &[], lens, rays);
+        self.leaves.clear();
+        self.nodes.clear();
+        self.nodes.push((0, ALL_BLOCKS));
+        let mut next = 0;
+        while next < self.nodes.len() {
+            let (index, blocks) = self.nodes[next];
+            let node = &nodes[index as usize];
+            next += 1;
+            let opened = sight.open(simd, node, blocks, interest);
+            for lane in each_bit(opened.wanted) {
+                match node.child(lane) {
+                    WideChild::Inner(index) => {
+                        sight.prefetch(WideChild::Inner(index));
+                        self.nodes.push((index, opened.blocks.0[lane]));
+                    }
+                    WideChild::Block(index) => {
+                        let (blocks, z_most) = (opened.blocks.0[lane], opened.z_most.0[lane]);
+                        self.leaves.push(Leaf { index, blocks, z_most });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A linear function of places, and at which corners of boxes it is least and greatest.
+struct Row {
+    factors: [f32; 4],
+    /// Sides of boxes (see [`WideNode::sides`]) on each axis.
+    least: [usize; 3],
+    greatest: [usize; 3],
+}
+
+impl Row {
+    #[inline(always)]
+    fn new(factors: [f32; 4]) -> Self {
+        let [mut least, mut greatest] = [[0; 3]; 2];
+        for axis in 0..3 {
+            let falls = usize::from(factors[axis] < 0.0);
+            least[axis] = axis + 3 * falls;
+            greatest[axis] = axis + 3 * (1 - falls);
+        }
+        Self { factors, least, greatest }
+    }
+
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, node: &WideNode, corner: [usize; 3]) -> f32x16<S> {
+        let mut sum = splat(simd, self.factors[3]);
+        for axis in 0..3 {
+            sum = fma(splat(simd, self.factors[axis]), node.sides()[corner[axis]].load(simd), sum);
+        }
+        sum
+    }
+
+    /// The least value in each box.
+    #[inline(always)]
+    fn least<S: Simd>(&self, simd: S, node: &WideNode) -> f32x16<S> {
+        self.at(simd, node, self.least)
+    }
+
+    /// The greatest value in each box.
+    #[inline(always)]
+    fn greatest<S: Simd>(&self, simd: S, node: &WideNode) -> f32x16<S> {
+        self.at(simd, node, self.greatest)
     }
 }
 
@@ -85,41 +314,32 @@ impl<'a> Walk<'a> {
 fn in_sight<S: Simd>(simd: S, node: &WideNode, frustum: &Frustum) -> u32 {
     let mut outside = splat(simd, 0.0).simd_gt(splat(simd, 1.0));
     for side in 0..4 {
-        let least = extreme(simd, node, frustum.planes[side], false);
+        let least = Row::new(frustum.planes[side]).least(simd, node);
         outside |= least.simd_gt(splat(simd, frustum.error[side]));
     }
     if !frustum.parallel {
-        let farthest = extreme(simd, node, frustum.planes[4], true);
+        let farthest = Row::new(frustum.planes[4]).greatest(simd, node);
         outside |= farthest.simd_lt(splat(simd, -frustum.error[4]));
     }
-    node.present() & !bits(outside)
-}
-
-/// Least (or greatest) value of a linear function over each box: at the corner against (or along) its gradient.
-#[inline(always)]
-fn extreme<S: Simd>(simd: S, node: &WideNode, plane: [f32; 4], greatest: bool) -> f32x16<S> {
-    let mut sum = splat(simd, plane[3]);
-    for axis in 0..3 {
-        let corner = if (plane[axis] < 0.0) != greatest { &node.hi[axis] } else { &node.lo[axis] };
-        sum = fma(splat(simd, plane[axis]), corner.load(simd), sum);
-    }
-    sum
+    !bits(outside)
 }
 
 /// Rectangles around the boxes of a node in the picture.
 struct Around {
     sides: [Lanes; 4],
+    /// Infinity where the box reaches behind the lens: then the rectangle means nothing.
     z_most: Lanes,
+    /// Bits of those.
+    crossing: u32,
 }
 
 impl Around {
     #[inline(always)]
-    fn new<S: Simd>(simd: S, node: &WideNode, lens: &Lens) -> Self {
-        let [a, b, g] = lens.rows;
+    fn new<S: Simd>(simd: S, node: &WideNode, lens: &Lens, [a, b, g]: &[Row; 3]) -> Self {
         let one = splat(simd, 1.0);
         let [error, g_error] = [splat(simd, lens.error[0]), splat(simd, lens.error[1])];
-        let nearest = extreme(simd, node, g, false) - g_error;
-        let mut around = Self { sides: [Lanes::ZERO; 4], z_most: Lanes::ZERO };
+        let nearest = g.least(simd, node) - g_error;
+        let mut around = Self { sides: [Lanes::ZERO; 4], z_most: Lanes::ZERO, crossing: 0 };
         let (z_most, z_least) = if lens.parallel {
             around.z_most.store(-nearest);
             (one, one)
@@ -128,11 +348,11 @@ impl Around {
             let before = nearest.simd_gt(splat(simd, 0.0));
             let widened = z_most * splat(simd, 1.0 + 8.0 * ROUNDING);
             around.z_most.store(select(before, widened, splat(simd, f32::INFINITY)));
-            (z_most, one / (extreme(simd, node, g, true) + g_error))
+            around.crossing = !bits(before);
+            (z_most, one / (g.greatest(simd, node) + g_error))
         };
         for (axis, row) in [a, b].into_iter().enumerate() {
-            let (from, to) =
-                (extreme(simd, node, row, false) - error, extreme(simd, node, row, true) + error);
+            let (from, to) = (row.least(simd, node) - error, row.greatest(simd, node) + error);
             let (from, to) = ((from * z_most).min(from * z_least), (to * z_most).max(to * z_least));
             let margin = from.abs().max(to.abs()) * splat(simd, ROUNDING);
             around.sides[2 * axis].store(from - margin);
@@ -141,8 +361,37 @@ impl Around {
         around
     }
 
-    /// Rectangle and greatest closeness of one box. If it reaches behind the lens, that is infinity, and the rectangle
-    /// means nothing.
+    /// Which of some blocks of rays each box may matter to: their rectangles overlap, and it is near enough.
+    #[inline(always)]
+    fn blocks<S: Simd, I: Interest<S>>(&self, simd: S, rays: &Rays, blocks: u32, interest: &I) -> Indices {
+        let [x_from, x_to, y_from, y_to] = &self.sides;
+        let [x_from, x_to] = [x_from.load(simd), x_to.load(simd)];
+        let [y_from, y_to] = [y_from.load(simd), y_to.load(simd)];
+        let z_most = self.z_most.load(simd);
+        let none = u32x16::splat(simd, 0);
+        let mut found = none;
+        for block in each_bit(blocks) {
+            let [x_lo, x_hi, y_lo, y_hi] = rays.around(block);
+            let overlap = x_from.simd_le(splat(simd, x_hi))
+                & x_to.simd_ge(splat(simd, x_lo))
+                & y_from.simd_le(splat(simd, y_hi))
+                & y_to.simd_ge(splat(simd, y_lo))
+                & z_most.simd_ge(splat(simd, interest.least().0[block]));
+            found = found | select_indices(overlap, u32x16::splat(simd, 1 << block), none);
+        }
+        if I::ON_GRID {
+            // Rays stand at whole numbers and a half.
+            let half = splat(simd, 0.5);
+            let between =
+                (x_to - half).floor().simd_ge(x_from - half) & (y_to - half).floor().simd_ge(y_from - half);
+            found = select_indices(between, found, none);
+        }
+        let mut by_box = Indices::ZERO;
+        by_box.store(found);
+        by_box
+    }
+
+    /// Rectangle and greatest closeness of one box.
     #[inline(always)]
     fn get(&self, lane: usize) -> ([f32; 4], f32) {
         let [x_from, x_to, y_from, y_to] = &self.sides;

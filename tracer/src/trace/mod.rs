@@ -163,12 +163,12 @@ impl PreparedFrame {
             self.offer_item(ray, self.items.first_plane() + plane, search)?;
         }
         let mut items = ItemLeaves { frame: self, ray, stack: Stack::new(), search };
-        if self.wide_nodes[0].count == 1 && self.wide_nodes.len() == 1 {
+        if self.nodes[0].count == 1 && self.nodes.len() == 1 {
             return items.visit_items(simd, 0);
         }
-        let bounds = || self.wide_nodes[0].bounds();
+        let bounds = || self.nodes[0].bounds();
         let Some(near) = NearRay::new(*ray, bounds) else { return Continue(()) };
-        walk(simd, &self.wide_nodes, &near, &mut Stack::new(), &mut items)
+        walk(simd, &self.nodes, &near, &mut Stack::new(), &mut items)
     }
 
     /// A sphere, a plane or a triangle of the scene file.
