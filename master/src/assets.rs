@@ -1,4 +1,4 @@
-//! What workers fetch once and keep: the scene body and the meshes it names, each under the hash of its bytes.
+//! What workers fetch once and keep: the scene body, the meshes and the textures it names, each under the hash of its bytes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,6 +9,7 @@ use rayfarm_protocol::codec::{self, CodecError};
 use rayfarm_protocol::limits::{MAX_ASSET_BYTES, MAX_DECODE_BYTES};
 use rayfarm_tracer::mesh::{CompiledMesh, MeshId};
 use rayfarm_tracer::scene::Scene;
+use rayfarm_tracer::texture::{Texture, TextureId};
 
 /// Why a scene cannot be sent.
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +44,10 @@ pub enum AssetError {
     /// The scene names a mesh that was not given.
     #[error("the scene names the mesh {0}, which was not loaded with it")]
     MissingMesh(AssetId),
+
+    /// The scene names a texture that was not given.
+    #[error("the scene names the texture {0}, which was not loaded with it")]
+    MissingTexture(AssetId),
 }
 
 /// The assets of one scene. Bytes are shared with whoever sends them, never copied.
@@ -61,9 +66,22 @@ impl AsRef<[u8]> for MeshBytes {
     }
 }
 
+/// A texture, likewise.
+struct TextureBytes(Arc<Texture>);
+
+impl AsRef<[u8]> for TextureBytes {
+    fn as_ref(&self) -> &[u8] {
+        self.0.bytes()
+    }
+}
+
 impl Assets {
-    /// The scene's body, and those of `meshes` that it names.
-    pub(crate) fn new(scene: &Scene, meshes: Vec<Arc<CompiledMesh>>) -> Result<Self, AssetError> {
+    /// The scene's body, and those of `meshes` and `textures` that it names.
+    pub(crate) fn new(
+        scene: &Scene,
+        meshes: Vec<Arc<CompiledMesh>>,
+        textures: Vec<Arc<Texture>>,
+    ) -> Result<Self, AssetError> {
         let body = codec::encode(scene)?;
         if body.len() > MAX_DECODE_BYTES {
             return Err(AssetError::SceneTooLong { bytes: body.len(), limit: MAX_DECODE_BYTES });
@@ -78,8 +96,16 @@ impl Assets {
             }
             blobs.insert(id, Bytes::from_owner(MeshBytes(mesh)));
         }
+        if let Some(id) = missing.first() {
+            return Err(AssetError::MissingMesh(AssetId(id.0)));
+        }
+        let mut missing: BTreeSet<TextureId> = scene.texture_ids();
+        // The tracer's own bound on textures is far below that on assets.
+        for texture in textures.into_iter().filter(|texture| missing.remove(&texture.id())) {
+            blobs.insert(AssetId(texture.id().0), Bytes::from_owner(TextureBytes(texture)));
+        }
         match missing.first() {
-            Some(id) => Err(AssetError::MissingMesh(AssetId(id.0))),
+            Some(id) => Err(AssetError::MissingTexture(AssetId(id.0))),
             None => Ok(Self { scene: scene_id, blobs }),
         }
     }
@@ -98,8 +124,9 @@ impl Assets {
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
+    use rayfarm_tracer::image::RgbImage;
     use rayfarm_tracer::mesh::{Mesh, NamedMaterial};
-    use rayfarm_tracer::scene::{Material, Model, NormalMode};
+    use rayfarm_tracer::scene::{Filter, Material, Model, NormalMode, TextureMap};
 
     use super::*;
     use crate::test_scene;
@@ -109,7 +136,11 @@ mod tests {
             positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
             triangles: vec![[0, 1, 2]],
             triangle_materials: vec![0],
-            materials: vec![NamedMaterial { name: "plain".into(), material: Material::NEUTRAL }],
+            materials: vec![NamedMaterial {
+                name: "plain".into(),
+                material: Material::NEUTRAL,
+                texture: None,
+            }],
             ..Mesh::default()
         };
         Arc::new(CompiledMesh::compile(&mesh).unwrap().0)
@@ -131,7 +162,7 @@ mod tests {
     fn assets_bear_the_hash_of_their_bytes_and_share_the_mesh() {
         let mesh = triangle();
         let scene = scene_with(mesh.id());
-        let assets = Assets::new(&scene, vec![mesh.clone(), mesh.clone()]).unwrap();
+        let assets = Assets::new(&scene, vec![mesh.clone(), mesh.clone()], Vec::new()).unwrap();
         let bytes = assets.get(AssetId(mesh.id().0)).unwrap();
         assert_eq!(bytes.as_ptr(), mesh.bytes().as_ptr());
         assert_eq!(AssetId::of(&bytes).0, mesh.id().0);
@@ -142,13 +173,31 @@ mod tests {
     #[test]
     fn meshes_that_nobody_names_are_left_out() {
         let mesh = triangle();
-        let assets = Assets::new(&test_scene::scene(), vec![mesh.clone()]).unwrap();
+        let assets = Assets::new(&test_scene::scene(), vec![mesh.clone()], Vec::new()).unwrap();
         assert_eq!(assets.get(AssetId(mesh.id().0)), None);
     }
 
     #[test]
+    fn textures_that_the_scene_names_are_shared_and_missing_ones_named() {
+        let texture = |red| {
+            let picture = RgbImage { width: 1, height: 1, pixels: vec![red, 0, 0] };
+            Arc::new(Texture::new(&picture).unwrap())
+        };
+        let (named, other) = (texture(1), texture(2));
+        let maps = vec![TextureMap { texture: named.id(), filter: Filter::Nearest }];
+        let scene = Scene { textures: maps, ..test_scene::scene() };
+        let assets = Assets::new(&scene, Vec::new(), vec![named.clone(), other.clone()]).unwrap();
+        let bytes = assets.get(AssetId(named.id().0)).unwrap();
+        assert_eq!(bytes.as_ptr(), named.bytes().as_ptr());
+        assert_eq!(AssetId::of(&bytes).0, named.id().0);
+        assert_eq!(assets.get(AssetId(other.id().0)), None);
+        let error = Assets::new(&scene, Vec::new(), vec![other]).unwrap_err();
+        assert!(error.to_string().contains(&named.id().to_string()), "{error}");
+    }
+
+    #[test]
     fn a_missing_mesh_is_named() {
-        let error = Assets::new(&scene_with(MeshId([0xab; 32])), Vec::new()).unwrap_err();
+        let error = Assets::new(&scene_with(MeshId([0xab; 32])), Vec::new(), Vec::new()).unwrap_err();
         assert!(error.to_string().contains("abababab"), "{error}");
     }
 }

@@ -21,6 +21,7 @@ use std::time::Duration;
 
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{FrameView, Scene, ValidateError};
+use rayfarm_tracer::texture::Texture;
 use tokio::net::TcpListener;
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tokio_util::task::TaskTracker;
@@ -58,6 +59,8 @@ pub struct FarmScene {
     pub scene: Scene,
     /// The meshes that it names; others are neither kept nor sent.
     pub meshes: Vec<Arc<CompiledMesh>>,
+    /// The textures that it names, likewise.
+    pub textures: Vec<Arc<Texture>>,
 }
 
 /// A running farm. Dropped without [`Farm::shut_down`], it ends its sessions and its local workers all the same,
@@ -197,7 +200,7 @@ impl Farm {
         scene: FarmScene,
         program: PathBuf,
     ) -> Result<Farm, FarmError> {
-        let assets = Assets::new(&scene.scene, scene.meshes)?;
+        let assets = Assets::new(&scene.scene, scene.meshes, scene.textures)?;
         let (listener, address) = listen(options.listen).await?;
         let driver = Arc::new(Driver::new(options.policy, assets));
         let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());

@@ -21,7 +21,9 @@ const PATIENCE: Duration = Duration::from_secs(60);
 async fn farm(policy: SegmentPolicy) -> Farm {
     let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
     let options = FarmOptions { listen, policy, ..FarmOptions::default() };
-    Farm::start(options, FarmScene { scene: scene(), meshes: Vec::new() }).await.unwrap()
+    Farm::start(options, FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() })
+        .await
+        .unwrap()
 }
 
 async fn patiently<T>(what: impl Future<Output = T>) -> T {
@@ -303,14 +305,15 @@ async fn a_taken_port_is_named_with_a_way_out() {
     let taken = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = taken.local_addr().unwrap();
     let options = FarmOptions { listen: Some(address), ..FarmOptions::default() };
-    let refused = Farm::start(options, FarmScene { scene: scene(), meshes: Vec::new() }).await;
+    let refused =
+        Farm::start(options, FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() }).await;
     let message = refused.err().unwrap().to_string();
     assert!(message.contains(&address.port().to_string()) && message.contains("--listen"), "{message}");
 }
 
 #[tokio::test]
 async fn the_usual_port_gives_way_when_nobody_asked_for_it() {
-    let scene = || FarmScene { scene: scene(), meshes: Vec::new() };
+    let scene = || FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
     let first = Farm::start(FarmOptions::default(), scene()).await.unwrap();
     let second = Farm::start(FarmOptions::default(), scene()).await.unwrap();
     assert_ne!(first.address(), second.address());
@@ -332,7 +335,7 @@ async fn local_workers_that_cannot_live_end_the_waiting() {
     tokio::time::pause();
     let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
     let options = FarmOptions { listen, local_workers: 2, ..FarmOptions::default() };
-    let scene = FarmScene { scene: scene(), meshes: Vec::new() };
+    let scene = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
     let mut farm =
         Farm::start_with_worker_program(options, scene, "/nonexistent/worker".into()).await.unwrap();
     farm.request(view());

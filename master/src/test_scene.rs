@@ -11,6 +11,7 @@ pub(crate) fn scene() -> Scene {
         background: Background::Color(Vec3::ONE),
         lights: Vec::new(),
         materials: vec![Material::NEUTRAL],
+        textures: Vec::new(),
         models: Vec::new(),
         spheres: Vec::new(),
         planes: Vec::new(),

@@ -8,7 +8,8 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::bvh::{self, BuildQuality};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Material, Model, NormalMode, Scene, ValidateError, rotation};
+use crate::scene::{Filter, Material, Model, NormalMode, Scene, ValidateError, rotation};
+use crate::texture::{Texture, TextureId};
 
 /// Why a scene cannot be traced.
 #[derive(Debug, thiserror::Error)]
@@ -20,6 +21,12 @@ pub enum CompileError {
         model: usize,
         /// The mesh.
         id: MeshId,
+    },
+    /// A texture that the scene names was not given.
+    #[error("the scene names texture {id}, which is not at hand")]
+    MissingTexture {
+        /// The texture.
+        id: TextureId,
     },
     /// A model and its mesh do not fit.
     #[error("model {model} does not fit its mesh: {what}")]
@@ -34,12 +41,16 @@ pub enum CompileError {
     Frame(#[from] ValidateError),
 }
 
-/// A scene with its meshes, and the shape of the tree over its instances. Immutable; share it between threads.
+/// A scene with its meshes and textures, and the shape of the tree over its instances. Immutable; share it between threads.
 #[derive(Debug)]
 pub struct CompiledScene {
     scene: Scene,
     /// One per model.
     meshes: Vec<Arc<CompiledMesh>>,
+    /// Which models have a texture on them.
+    textured: Vec<bool>,
+    /// One per texture of the scene.
+    textures: Vec<(Arc<Texture>, Filter)>,
     /// Over all finite items; its boxes are those of no frame in particular.
     tree: bvh::WideTree,
     bounds: Option<(DVec3, DVec3)>,
@@ -106,13 +117,15 @@ impl Items {
 }
 
 impl CompiledScene {
-    /// Puts a scene and its meshes together. `meshes` may hold more than the scene names.
+    /// Puts a scene, its meshes and its textures together. There may be more of them than the scene names.
     ///
     /// # Errors
-    /// A mesh is missing, or has more material slots than the model assigns, or no normals where smooth ones are asked for.
+    /// A mesh or texture is missing, or a mesh has more material slots than the model assigns, or no normals where smooth ones
+    /// are asked for, or no texture coordinates where a material has a texture.
     pub fn new(
         scene: Scene,
         meshes: impl IntoIterator<Item = Arc<CompiledMesh>>,
+        textures: impl IntoIterator<Item = Arc<Texture>>,
     ) -> Result<Self, CompileError> {
         let by_id: BTreeMap<MeshId, Arc<CompiledMesh>> =
             meshes.into_iter().map(|mesh| (mesh.id(), mesh)).collect();
@@ -120,14 +133,16 @@ impl CompiledScene {
             .models
             .iter()
             .enumerate()
-            .map(|(model, description)| fitting_mesh(&by_id, model, description))
+            .map(|(model, description)| fitting_mesh(&scene, &by_id, model, description))
             .collect::<Result<_, _>>()?;
+        let textured = scene.models.iter().map(|model| has_texture(&scene, model)).collect();
+        let textures = textures_of(&scene, textures)?;
         let items = Items::of(&scene);
         let boxes: Vec<(DVec3, DVec3)> =
             items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let tree = bvh::build_wide(relative_boxes(&boxes, bounds), 1, BuildQuality::Default);
-        Ok(Self { scene, meshes, tree, bounds })
+        Ok(Self { scene, meshes, textured, textures, tree, bounds })
     }
 
     /// What was compiled.
@@ -151,13 +166,38 @@ impl CompiledScene {
         &self.meshes
     }
 
+    /// For each model, whether a material of it has a texture.
+    pub(crate) fn textured(&self) -> &[bool] {
+        &self.textured
+    }
+
+    /// The scene's textures, and how they are looked up.
+    pub(crate) fn textures(&self) -> &[(Arc<Texture>, Filter)] {
+        &self.textures
+    }
+
     /// Over the items, one a leaf.
     pub(crate) fn tree(&self) -> &bvh::WideTree {
         &self.tree
     }
 }
 
+fn textures_of(
+    scene: &Scene,
+    textures: impl IntoIterator<Item = Arc<Texture>>,
+) -> Result<Vec<(Arc<Texture>, Filter)>, CompileError> {
+    let by_id: BTreeMap<TextureId, Arc<Texture>> =
+        textures.into_iter().map(|texture| (texture.id(), texture)).collect();
+    let find = |id: TextureId| by_id.get(&id).cloned().ok_or(CompileError::MissingTexture { id });
+    scene.textures.iter().map(|map| Ok((find(map.texture)?, map.filter))).collect()
+}
+
+fn has_texture(scene: &Scene, model: &Model) -> bool {
+    model.materials.iter().any(|&index| scene.materials[index as usize].texture.is_some())
+}
+
 fn fitting_mesh(
+    scene: &Scene,
     meshes: &BTreeMap<MeshId, Arc<CompiledMesh>>,
     model: usize,
     description: &Model,
@@ -176,6 +216,11 @@ fn fitting_mesh(
         return mismatch(
             "it asks for smooth normals, the mesh was compiled without; compile it again, or ask for flat ones"
                 .into(),
+        );
+    }
+    if has_texture(scene, description) && !mesh.has_uvs() {
+        return mismatch(
+            "a material of it has a texture, the mesh was compiled without texture coordinates; compile it again".into(),
         );
     }
     Ok(Arc::clone(mesh))

@@ -14,9 +14,10 @@ use crate::compile::{CompileError, CompiledScene, Features, Item, Items, orienta
 use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
-use crate::scene::{Camera, FrameView, Model, NormalMode, Scene};
+use crate::scene::{Camera, Filter, FrameView, Model, NormalMode, Scene};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
+use crate::texture::Texture;
 use crate::tile::Affine;
 
 /// Widening of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
@@ -60,6 +61,8 @@ pub(crate) struct Instance {
     pub placement: Affine,
     /// Where the camera sees the mesh.
     pub projection: Affine,
+    /// Whether a material of it has a texture.
+    pub textured: bool,
 }
 
 /// A triangle of the scene file.
@@ -84,7 +87,11 @@ impl PreparedFrame {
             .models
             .iter()
             .zip(scene.meshes())
-            .map(|(model, mesh)| Instance::new(model, mesh, view.spin, to_eye, unit, &projection))
+            .zip(scene.textured())
+            .map(|((model, mesh), &textured)| Instance {
+                textured,
+                ..Instance::new(model, mesh, view.spin, to_eye, unit, &projection)
+            })
             .collect();
         let mut frame = Self {
             view: *view,
@@ -129,6 +136,11 @@ impl PreparedFrame {
     /// The scene as plain data.
     pub fn scene(&self) -> &Scene {
         self.scene.scene()
+    }
+
+    /// The scene's textures, and how they are looked up.
+    pub(crate) fn textures(&self) -> &[(Arc<Texture>, Filter)] {
+        self.scene.textures()
     }
 
     /// The items in a leaf of the scene's tree.
@@ -181,6 +193,7 @@ impl Instance {
             inverse,
             normals: inverse.transpose(),
             smooth: model.normals == NormalMode::Smooth,
+            textured: false,
         }
     }
 }

@@ -15,9 +15,9 @@
 //! #     material = { red = { diffuse = [0.8, 0.1, 0.1] } }
 //! #     sphere = [{ center = [0, 0, 0], radius = 1, material = 'red' }]
 //! # ")?;
-//! let loaded = scene::load(&path)?;                                      // file -> plain data and meshes
+//! let loaded = scene::load(&path)?;                                      // file -> plain data, meshes, textures
 //! let view = scene::FrameView::of(&loaded.scene);                        // camera, size, samples
-//! let scene = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes)?);
+//! let scene = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures)?);
 //! let frame = PreparedFrame::new(scene, &view)?;                         // everything in eye space
 //! let mut picture = image::RgbImage::new(view.width, view.height);
 //! render_rows(&frame, 0..view.height, &mut picture.pixels, &|| false)?;  // any rows, in any order
@@ -41,6 +41,7 @@ mod shade;
 mod simd;
 mod sphere;
 pub mod srgb;
+pub mod texture;
 mod tile;
 mod trace;
 mod triangle;

@@ -5,12 +5,15 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 
 use crate::image::RgbImage;
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Attenuation, Background, FrameView, Light, LightKind, Material, NormalMode, Scene};
+use crate::scene::{
+    Attenuation, Background, Filter, FrameView, Light, LightKind, Material, NormalMode, Scene, TextureMap,
+};
 use crate::srgb;
+use crate::texture::Texture;
 
 /// Nothing nearer than this share of the scene's size is in a shadow ray's way: it is where the ray starts.
 const NEAR: f64 = 1e-11;
@@ -22,6 +25,7 @@ const BEFORE_LIGHT: f64 = 1.0 - 1e-9;
 pub struct Oracle {
     scene: Scene,
     view: FrameView,
+    textures: Vec<Arc<Texture>>,
     primitives: Vec<Primitive>,
     size: f64,
 }
@@ -32,21 +36,29 @@ struct Primitive {
 }
 
 enum Shape {
-    Triangle { corners: [DVec3; 3], normals: Option<[DVec3; 3]> },
+    Triangle { corners: [DVec3; 3], normals: Option<[DVec3; 3]>, uvs: Option<[Vec2; 3]> },
     Sphere { center: DVec3, radius: f64 },
     Plane { point: DVec3, normal: DVec3 },
 }
 
-struct Hit {
+/// Where a ray meets a shape.
+struct Crossing {
     t: f64,
-    primitive: usize,
     normal: DVec3,
     shading_normal: DVec3,
+    /// Texture coordinates; zero where there are none.
+    uv: DVec2,
 }
 
 impl Oracle {
-    /// Flattens a scene. Meshes that it names must be among `meshes`; a model whose mesh is missing is not drawn.
-    pub fn new(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameView) -> Self {
+    /// Flattens a scene. Meshes and textures that it names must be among those given; a model whose mesh is missing is not
+    /// drawn, a texture that is missing is white.
+    pub fn new(
+        scene: &Scene,
+        meshes: &[Arc<CompiledMesh>],
+        textures: &[Arc<Texture>],
+        view: &FrameView,
+    ) -> Self {
         let eye = view.camera.position;
         let mut primitives = Vec::new();
         for model in &scene.models {
@@ -60,7 +72,8 @@ impl Oracle {
             for i in mesh.triangles() {
                 let smooth = model.normals == NormalMode::Smooth;
                 let normals = mesh.corner_normals(i).filter(|_| smooth).map(|n| n.map(turn_normal));
-                let shape = Shape::Triangle { corners: mesh.corners(i).map(place), normals };
+                let (corners, uvs) = (mesh.corners(i).map(place), mesh.corner_uvs(i));
+                let shape = Shape::Triangle { corners, normals, uvs };
                 primitives.push(Primitive { shape, material: model.materials[mesh.slot(i) as usize] });
             }
         }
@@ -69,7 +82,8 @@ impl Oracle {
             primitives.push(Primitive { shape, material: sphere.material });
         }
         for triangle in &scene.triangles {
-            let shape = Shape::Triangle { corners: triangle.vertices.map(|v| v - eye), normals: None };
+            let corners = triangle.vertices.map(|v| v - eye);
+            let shape = Shape::Triangle { corners, normals: None, uvs: triangle.uvs };
             primitives.push(Primitive { shape, material: triangle.material });
         }
         for plane in &scene.planes {
@@ -77,7 +91,7 @@ impl Oracle {
             primitives.push(Primitive { shape, material: plane.material });
         }
         let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
-        Self { scene: scene.clone(), view: *view, primitives, size }
+        Self { scene: scene.clone(), view: *view, textures: textures.to_vec(), primitives, size }
     }
 
     /// Linear RGB of a pixel: the mean over its samples.
@@ -121,7 +135,7 @@ impl Oracle {
     }
 
     fn radiance(&self, direction: DVec3) -> DVec3 {
-        let Some(hit) = self.closest(direction) else {
+        let Some((primitive, hit)) = self.closest(direction) else {
             return match self.scene.background {
                 Background::Color(color) => color.as_dvec3(),
                 Background::Gradient { bottom, top } => {
@@ -129,15 +143,45 @@ impl Oracle {
                 }
             };
         };
-        let material = &self.scene.materials[self.primitives[hit.primitive].material as usize];
+        let mut material = self.scene.materials[self.primitives[primitive].material as usize];
+        if let Some(index) = material.texture {
+            material.diffuse *= self.texel(self.scene.textures[index as usize], hit.uv).as_vec3();
+        }
         let point = direction * hit.t;
         let ng = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
         let n = if hit.shading_normal.dot(ng) < 0.0 { -hit.shading_normal } else { hit.shading_normal };
         let mut sum = material.diffuse.as_dvec3() * self.scene.ambient.as_dvec3();
         for light in &self.scene.lights {
-            sum += self.light_term(light, material, point, n, -direction, hit.primitive);
+            sum += self.light_term(light, &material, point, n, -direction, primitive);
         }
         sum
+    }
+
+    /// Linear RGB of a texture at texture coordinates. The picture repeats; texel (i, j), counted from the bottom left, has
+    /// its centre at ((i + 1/2) / width, (j + 1/2) / height).
+    fn texel(&self, map: TextureMap, uv: DVec2) -> DVec3 {
+        let Some(texture) = self.textures.iter().find(|texture| texture.id() == map.texture) else {
+            return DVec3::ONE;
+        };
+        let (width, height) = (f64::from(texture.width()), f64::from(texture.height()));
+        let color_of = |i: f64, j: f64| {
+            let bytes = texture.texel(i.rem_euclid(width) as u32, j.rem_euclid(height) as u32);
+            DVec3::from_array(bytes.map(srgb::decode))
+        };
+        let (x, y) = (uv.x * width, uv.y * height);
+        match map.filter {
+            Filter::Nearest => color_of(x.floor(), y.floor()),
+            Filter::Bilinear => {
+                let (left, bottom) = ((x - 0.5).floor(), (y - 0.5).floor());
+                let mut sum = DVec3::ZERO;
+                for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                    let (i, j) = (left + i, bottom + j);
+                    let weight = (1.0 - (x - 0.5 - i).abs()) * (1.0 - (y - 0.5 - j).abs());
+                    sum += color_of(i, j) * weight;
+                }
+                sum
+            }
+        }
     }
 
     /// S A B I ( c_d N.L + c_s (N.H)^p ) of one light.
@@ -179,15 +223,14 @@ impl Oracle {
         light.color.as_dvec3() * reflected * strength
     }
 
-    /// The nearest hit of a ray from the camera; of equal ones the first.
-    fn closest(&self, direction: DVec3) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
+    /// The nearest hit of a ray from the camera, with its primitive; of equal ones the first.
+    fn closest(&self, direction: DVec3) -> Option<(usize, Crossing)> {
+        let mut best: Option<(usize, Crossing)> = None;
         for (index, primitive) in self.primitives.iter().enumerate() {
-            let hit = primitive.shape.hit(DVec3::ZERO, direction, 0.0);
-            if let Some((t, normal, shading_normal)) = hit
-                && best.as_ref().is_none_or(|best| t < best.t)
+            if let Some(hit) = primitive.shape.hit(DVec3::ZERO, direction, 0.0)
+                && best.as_ref().is_none_or(|(_, best)| hit.t < best.t)
             {
-                best = Some(Hit { t, primitive: index, normal, shading_normal });
+                best = Some((index, hit));
             }
         }
         best
@@ -200,7 +243,7 @@ impl Oracle {
             if index == leaving && flat {
                 return false;
             }
-            primitive.shape.hit(point, to_light, near).is_some_and(|(t, ..)| t < reach)
+            primitive.shape.hit(point, to_light, near).is_some_and(|hit| hit.t < reach)
         })
     }
 }
@@ -243,10 +286,10 @@ impl Shape {
         }
     }
 
-    /// Distance, normal and shading normal of the nearest hit with t > `near`.
-    fn hit(&self, origin: DVec3, direction: DVec3, near: f64) -> Option<(f64, DVec3, DVec3)> {
+    /// The nearest hit with t > `near`.
+    fn hit(&self, origin: DVec3, direction: DVec3, near: f64) -> Option<Crossing> {
         match *self {
-            Shape::Triangle { corners: [a, b, c], normals } => {
+            Shape::Triangle { corners: [a, b, c], normals, uvs } => {
                 let (ab, ac) = (b - a, c - a);
                 let p = direction.cross(ac);
                 let determinant = ab.dot(p);
@@ -259,7 +302,9 @@ impl Shape {
                 let ng = ab.cross(ac).normalize_or_zero();
                 let ns =
                     normals.and_then(|[na, nb, nc]| (na * (1.0 - u - v) + nb * u + nc * v).try_normalize());
-                (inside && t > near).then(|| (t, ng, ns.unwrap_or(ng)))
+                let [a, b, c] = uvs.unwrap_or_default().map(Vec2::as_dvec2);
+                let uv = a + (b - a) * u + (c - a) * v;
+                (inside && t > near).then(|| Crossing { t, normal: ng, shading_normal: ns.unwrap_or(ng), uv })
             }
             Shape::Sphere { center, radius } => {
                 let from_center = origin - center;
@@ -270,11 +315,12 @@ impl Shape {
                 let [t0, t1] = [-half_chord, half_chord].map(|half| (middle + half) / direction.length());
                 let t = if t0 > near { t0 } else { t1 };
                 let normal = (origin + direction * t - center).normalize_or_zero();
-                (t > near).then_some((t, normal, normal))
+                (t > near).then_some(Crossing { t, normal, shading_normal: normal, uv: DVec2::ZERO })
             }
             Shape::Plane { point, normal } => {
                 let t = (point - origin).dot(normal) / direction.dot(normal);
-                (t > near && t.is_finite()).then_some((t, normal, normal))
+                let crossing = Crossing { t, normal, shading_normal: normal, uv: DVec2::ZERO };
+                (t > near && t.is_finite()).then_some(crossing)
             }
         }
     }

@@ -81,7 +81,7 @@ fn tile_pixels(frame: &PreparedFrame) -> u32 {
 #[inline(always)]
 fn render_band<S: Simd>(simd: S, frame: &PreparedFrame, rows: Range<u32>, out: &mut [u8]) -> RayCounts {
     let rays = Rays::grid(simd);
-    let mut scratch = Scratch::new();
+    let mut scratch = Scratch::new(frame);
     let side = tile_pixels(frame);
     let mut counts = RayCounts::default();
     for left in (0..frame.width()).step_by(side as usize) {
@@ -105,8 +105,8 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn new() -> Self {
-        Self { visible: Visible::empty(), tile: tile::Scratch::new(), shade: shade::Scratch::new() }
+    fn new(frame: &PreparedFrame) -> Self {
+        Self { visible: Visible::empty(), tile: tile::Scratch::new(), shade: shade::Scratch::new(frame) }
     }
 }
 
@@ -263,14 +263,15 @@ mod tests {
     use crate::scene::FrameView;
     use crate::{CompiledScene, simd};
 
-    /// Every kind of light, primitive, normal and exponent, on every level that this machine has.
+    /// Every kind of light, primitive, normal, and exponent, on every level that this machine has.
     #[test]
     fn all_levels_of_simd_render_the_same_bytes() {
         for scene in ["lights.toml", "room.toml"] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(scene);
             let loaded = crate::scene::load(&path).unwrap();
             let view = FrameView { width: 150, height: 110, samples: 4, ..FrameView::of(&loaded.scene) };
-            let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes).unwrap());
+            let compiled =
+                Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap());
             let mut frame = PreparedFrame::new(compiled, &view).unwrap();
             let mut bytes_at = |level| {
                 frame.level = level;

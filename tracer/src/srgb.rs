@@ -69,6 +69,13 @@ fn code<S: Simd>(simd: S, linear: f32x16<S>) -> u32x16<S> {
     simd.cvt_u32_f32x16(srgb255(simd, positive.min(splat(simd, 1.0))).round_ties_even())
 }
 
+/// The linear values of all 8-bit sRGB codes: textures are made of them.
+pub(crate) fn decoded() -> &'static [f32; 256] {
+    static DECODED: LazyLock<[f32; 256]> =
+        LazyLock::new(|| std::array::from_fn(|code| decode(code as u8) as f32));
+    &DECODED
+}
+
 /// The linear value, 0..1, of an 8-bit sRGB code.
 pub fn decode(code: u8) -> f64 {
     decode_unit(f64::from(code) / 255.0)

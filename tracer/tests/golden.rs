@@ -27,7 +27,7 @@ fn lights(width: u32, height: u32, samples: u32) -> (LoadedScene, FrameView) {
 }
 
 fn render(loaded: LoadedScene, view: &FrameView) -> RgbImage {
-    let scene = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes).unwrap());
+    let scene = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap());
     let frame = PreparedFrame::new(scene, view).unwrap();
     let mut picture = RgbImage::new(view.width, view.height);
     render_rows(&frame, 0..view.height, &mut picture.pixels, &|| false).unwrap();
@@ -61,6 +61,6 @@ fn the_lights_are_those_of_the_stored_picture() {
 #[test]
 fn the_lights_are_those_of_the_oracle() {
     let (loaded, view) = lights(60, 45, 1);
-    let expected = Oracle::new(&loaded.scene, &loaded.meshes, &view).render();
+    let expected = Oracle::new(&loaded.scene, &loaded.meshes, &loaded.textures, &view).render();
     assert_close(&render(loaded, &view), &expected);
 }

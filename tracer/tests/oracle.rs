@@ -25,7 +25,7 @@ fn off(a: &RgbImage, b: &RgbImage) -> usize {
 fn off_from_oracle(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameView) -> usize {
     let (image, counts) = render(scene, meshes, view);
     assert_eq!(counts.primary, u64::from(view.width * view.height * view.samples));
-    off(&image, &Oracle::new(scene, meshes, view).render())
+    off(&image, &Oracle::new(scene, meshes, &[], view).render())
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn workload_w1_every_97th_pixel() {
     let loaded = rayfarm_tracer::scene::load(&path).unwrap();
     let view = FrameView { width: 256, height: 192, ..FrameView::of(&loaded.scene) };
     let (image, _) = render(&loaded.scene, &loaded.meshes, &view);
-    let oracle = Oracle::new(&loaded.scene, &loaded.meshes, &view);
+    let oracle = Oracle::new(&loaded.scene, &loaded.meshes, &loaded.textures, &view);
     let tested: Vec<u32> = (0..view.width * view.height).step_by(97).collect();
     let wrong = tested.iter().filter(|&&i| {
         let (x, y) = (i % view.width, i / view.width);

@@ -40,21 +40,32 @@ fn lit_sphere(material: Material) -> Scene {
 
 #[test]
 fn a_ball_lit_from_the_eye_shows_its_albedo_and_its_highlight() {
-    let material = Material { diffuse: Vec3::splat(0.25), specular: Vec3::ZERO, exponent: 1.0 };
+    let material =
+        Material { diffuse: Vec3::splat(0.25), specular: Vec3::ZERO, exponent: 1.0, texture: None };
     assert_eq!(middle(&lit_sphere(material)), [code(0.25); 3]);
     assert_eq!(middle(&lit_sphere(Material { specular: Vec3::splat(0.5), ..material })), [code(0.75); 3]);
 }
 
 #[test]
 fn inverse_square_divides_by_the_distance_to_the_surface() {
-    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.9), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material {
+        diffuse: Vec3::splat(0.9),
+        specular: Vec3::ZERO,
+        exponent: 1.0,
+        texture: None,
+    });
     scene.lights[0].attenuation = Attenuation::InverseSquare;
     assert_eq!(middle(&scene), [code(0.1); 3]);
 }
 
 #[test]
 fn ambient_counts_once_whatever_the_number_of_lights() {
-    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material {
+        diffuse: Vec3::splat(0.5),
+        specular: Vec3::ZERO,
+        exponent: 1.0,
+        texture: None,
+    });
     scene.ambient = Vec3::splat(0.4);
     scene.lights = vec![light(point(0.0, 0.0, -9.0), 1.0, Attenuation::None); 7];
     assert_eq!(middle(&scene), [code(0.2); 3]);
@@ -62,7 +73,8 @@ fn ambient_counts_once_whatever_the_number_of_lights() {
 
 #[test]
 fn a_slanted_plane_follows_the_cosine() {
-    let mut scene = lit_sphere(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene =
+        lit_sphere(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0, texture: None });
     scene.spheres.clear();
     scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, material: 0 }];
     let direction = DVec3::new(0.0, -libm::sqrt(0.75), -0.5);
@@ -72,7 +84,12 @@ fn a_slanted_plane_follows_the_cosine() {
 
 #[test]
 fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
-    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material {
+        diffuse: Vec3::splat(0.5),
+        specular: Vec3::ZERO,
+        exponent: 1.0,
+        texture: None,
+    });
     scene.lights[0].kind = point(0.0, 6.0, 6.0);
     let lit = middle(&scene);
     scene.spheres.push(Sphere { center: DVec3::new(0.0, 3.0, 3.5), radius: 0.4, material: 0 });
@@ -84,7 +101,12 @@ fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
 
 #[test]
 fn what_stands_behind_a_light_takes_nothing_away() {
-    let mut scene = lit_sphere(Material { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 1.0 });
+    let mut scene = lit_sphere(Material {
+        diffuse: Vec3::splat(0.5),
+        specular: Vec3::ZERO,
+        exponent: 1.0,
+        texture: None,
+    });
     let lit = middle(&scene);
     scene.spheres.push(Sphere { center: DVec3::new(0.0, 0.0, 9.0), radius: 1.0, material: 0 });
     assert_eq!(middle(&scene), lit);
@@ -120,8 +142,8 @@ fn no_acne_on_planes_spheres_and_coplanar_triangles_at_any_angle() {
         for (i, j) in (0..16).flat_map(|i| (0..16).map(move |j| (i, j))) {
             let [a, b] = [corner(grid(i), grid(j)), corner(grid(i + 1), grid(j))];
             let [d, e] = [corner(grid(i + 1), grid(j + 1)), corner(grid(i), grid(j + 1))];
-            scene.triangles.push(Triangle { vertices: [a, b, d], material: 1 });
-            scene.triangles.push(Triangle { vertices: [a, d, e], material: 1 });
+            scene.triangles.push(Triangle { vertices: [a, b, d], uvs: None, material: 1 });
+            scene.triangles.push(Triangle { vertices: [a, d, e], uvs: None, material: 1 });
         }
         let mut planar = scene.clone();
         planar.triangles.clear();
@@ -225,7 +247,7 @@ fn a_scene_far_from_the_origin_is_the_picture_of_the_near_one() {
 #[test]
 fn a_frame_that_cannot_be_rendered_is_refused_with_the_limit() {
     let scene = analytic(1, 1);
-    let compiled = Arc::new(CompiledScene::new(scene.clone(), []).unwrap());
+    let compiled = Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap());
     let refusal = |view: FrameView| PreparedFrame::new(Arc::clone(&compiled), &view).unwrap_err().to_string();
     let view = FrameView::of(&scene);
     assert!(refusal(FrameView { width: 0, ..view }).contains("16384"));
@@ -239,7 +261,7 @@ fn a_frame_that_cannot_be_rendered_is_refused_with_the_limit() {
 #[test]
 fn rendering_stops_when_it_is_told_to() {
     let scene = analytic(16, 64);
-    let compiled = Arc::new(CompiledScene::new(scene.clone(), []).unwrap());
+    let compiled = Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap());
     let frame = PreparedFrame::new(compiled, &FrameView::of(&scene)).unwrap();
     let asked = std::cell::Cell::new(0);
     let after_three = || {
@@ -259,7 +281,7 @@ proptest! {
         let (scene, mesh) = instanced(40, 60);
         let view = FrameView::of(&scene);
         let (whole, _) = render(&scene, std::slice::from_ref(&mesh), &view);
-        let frame = PreparedFrame::new(Arc::new(CompiledScene::new(scene, [mesh]).unwrap()), &view).unwrap();
+        let frame = PreparedFrame::new(Arc::new(CompiledScene::new(scene, [mesh], []).unwrap()), &view).unwrap();
         let mut pieces = RgbImage::new(40, 60);
         let mut start = 0;
         for end in cuts.into_iter().chain([60]) {

@@ -184,12 +184,12 @@ fn do_work<R: Renderer>(renderer: &R, work: Work<R>) -> Done<R> {
             let result = guarded(|| renderer.decode_scene(&body)).flatten();
             Done::Scene(SceneDone::SceneDecoded { id, result })
         }
-        Work::Scene(SceneWork::DecodeMesh { id, bytes }) => {
-            let result = guarded(|| renderer.decode_mesh(&bytes)).flatten();
-            Done::Scene(SceneDone::MeshDecoded { id, result })
+        Work::Scene(SceneWork::DecodePart { id, bytes }) => {
+            let result = guarded(|| renderer.decode_part(&bytes)).flatten();
+            Done::Scene(SceneDone::PartDecoded { id, result })
         }
-        Work::Scene(SceneWork::Compile { id, draft, meshes }) => {
-            let result = guarded(|| renderer.compile(draft, meshes)).flatten();
+        Work::Scene(SceneWork::Compile { id, draft, parts }) => {
+            let result = guarded(|| renderer.compile(draft, parts)).flatten();
             Done::Scene(SceneDone::Compiled { id, result })
         }
         Work::Prepare { announce, scene } => {

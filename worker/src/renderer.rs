@@ -25,11 +25,11 @@ pub struct Cancelled;
 /// Everything but [`render`](Self::render) runs on a blocking thread, never on one that serves the network. A panic
 /// anywhere is caught, and becomes such a reason.
 pub trait Renderer: Send + Sync + 'static {
-    /// A scene body, decoded, before its meshes are there.
+    /// A scene body, decoded, before its parts are there.
     type Draft: Send + 'static;
-    /// A mesh.
-    type Mesh: Send + Sync + 'static;
-    /// A scene with its meshes.
+    /// What a scene names by hash: a mesh, a texture.
+    type Part: Send + Sync + 'static;
+    /// A scene with its parts.
     type Scene: Send + Sync + 'static;
     /// One frame of it, shared by the render threads.
     type Frame: Send + Sync + 'static;
@@ -40,23 +40,23 @@ pub trait Renderer: Send + Sync + 'static {
     /// Most rows that should be rendered in one go.
     fn band_rows(&self) -> u32;
 
-    /// Decodes a scene body, and names the meshes it needs.
+    /// Decodes a scene body, and names the parts it needs.
     ///
     /// # Errors
     /// Bytes that are no scene, or one that breaks a rule.
     fn decode_scene(&self, body: &[u8]) -> Result<(Self::Draft, Vec<AssetId>), String>;
 
-    /// Takes a mesh in. The bytes are freed afterwards.
+    /// Takes a part in. The bytes are freed afterwards.
     ///
     /// # Errors
-    /// Bytes that are no mesh.
-    fn decode_mesh(&self, bytes: &[u8]) -> Result<Self::Mesh, String>;
+    /// Bytes that are no part of any kind.
+    fn decode_part(&self, bytes: &[u8]) -> Result<Self::Part, String>;
 
-    /// Puts a scene and all its meshes together.
+    /// Puts a scene and all its parts together.
     ///
     /// # Errors
     /// When they do not fit.
-    fn compile(&self, draft: Self::Draft, meshes: Vec<Arc<Self::Mesh>>) -> Result<Self::Scene, String>;
+    fn compile(&self, draft: Self::Draft, parts: Vec<Arc<Self::Part>>) -> Result<Self::Scene, String>;
 
     /// Prepares a frame: its view is decoded, and must agree with the announced size.
     ///

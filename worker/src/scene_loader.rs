@@ -1,5 +1,5 @@
-//! From the hash of a scene to a scene that can be rendered: ask for its body, decode it, ask for the meshes it names,
-//! compile. Pure: what has to be done comes out as [`Step`]s, and what became of it goes in again.
+//! From the hash of a scene to a scene that can be rendered: ask for its body, decode it, ask for the meshes and
+//! textures it names (its *parts*), compile. Pure: what has to be done comes out as [`Step`]s, and what became of it goes in again.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -32,20 +32,20 @@ pub(crate) enum Step<R: Renderer> {
 /// Work that takes its time.
 pub(crate) enum SceneWork<R: Renderer> {
     DecodeScene { id: AssetId, body: Vec<u8> },
-    DecodeMesh { id: AssetId, bytes: Vec<u8> },
-    Compile { id: AssetId, draft: R::Draft, meshes: Vec<Arc<R::Mesh>> },
+    DecodePart { id: AssetId, bytes: Vec<u8> },
+    Compile { id: AssetId, draft: R::Draft, parts: Vec<Arc<R::Part>> },
 }
 
 /// What became of it.
 pub(crate) enum SceneDone<R: Renderer> {
     SceneDecoded { id: AssetId, result: Result<(R::Draft, Vec<AssetId>), String> },
-    MeshDecoded { id: AssetId, result: Result<R::Mesh, String> },
+    PartDecoded { id: AssetId, result: Result<R::Part, String> },
     Compiled { id: AssetId, result: Result<R::Scene, String> },
 }
 
 enum Stored<R: Renderer> {
-    Mesh(Arc<R::Mesh>),
-    Scene { scene: Arc<R::Scene>, meshes: BTreeSet<AssetId> },
+    Part(Arc<R::Part>),
+    Scene { scene: Arc<R::Scene>, parts: BTreeSet<AssetId> },
 }
 
 /// An asset between the wish for it and its place in the store.
@@ -60,7 +60,7 @@ enum Incoming {
 struct Load<R: Renderer> {
     body_bytes: u64,
     draft: Option<R::Draft>,
-    meshes: BTreeSet<AssetId>,
+    parts: BTreeSet<AssetId>,
 }
 
 /// Fetches scenes and keeps them. The store outlives sessions; the rest begins anew with each.
@@ -117,17 +117,17 @@ impl<R: Renderer> SceneLoader<R> {
         } else if let Some(reason) = self.refused.get(&scene) {
             self.steps.push_back(Step::Failed(scene, reason.clone()));
         } else if let Entry::Vacant(entry) = self.loads.entry(scene) {
-            entry.insert(Load { body_bytes: 0, draft: None, meshes: BTreeSet::new() });
+            entry.insert(Load { body_bytes: 0, draft: None, parts: BTreeSet::new() });
             self.wish(scene);
         }
     }
 
-    /// Marks the scene and all its meshes as just used: a scene never outlives its meshes in the store.
+    /// Marks the scene and all its parts as just used: a scene never outlives its parts in the store.
     fn cached(&mut self, id: AssetId) -> Option<Arc<R::Scene>> {
-        let Some(Stored::Scene { scene, meshes }) = self.store.get(id) else { return None };
-        let (scene, meshes) = (Arc::clone(scene), meshes.clone());
-        for mesh in meshes {
-            self.store.get(mesh);
+        let Some(Stored::Scene { scene, parts }) = self.store.get(id) else { return None };
+        let (scene, parts) = (Arc::clone(scene), parts.clone());
+        for part in parts {
+            self.store.get(part);
         }
         Some(scene)
     }
@@ -209,7 +209,7 @@ impl<R: Renderer> SceneLoader<R> {
         let Incoming::Arriving(transfer) = std::mem::replace(state, Incoming::Decoding) else { return };
         match (transfer.finish(), self.loads.contains_key(&id)) {
             (Ok(body), true) => self.steps.push_back(Step::Work(SceneWork::DecodeScene { id, body })),
-            (Ok(bytes), false) => self.steps.push_back(Step::Work(SceneWork::DecodeMesh { id, bytes })),
+            (Ok(bytes), false) => self.steps.push_back(Step::Work(SceneWork::DecodePart { id, bytes })),
             (Err(error @ TransferError::Damaged { .. }), _) => {
                 self.fail(id, &format!("{error}; the master's memory or its software is at fault"));
             }
@@ -222,11 +222,11 @@ impl<R: Renderer> SceneLoader<R> {
     pub(crate) fn done(&mut self, done: SceneDone<R>) {
         match done {
             SceneDone::SceneDecoded { id, result } => match (self.arrived(id), result) {
-                (bytes, Ok((draft, meshes))) => self.scene_decoded(id, bytes, draft, meshes),
+                (bytes, Ok((draft, parts))) => self.scene_decoded(id, bytes, draft, parts),
                 (_, Err(reason)) => self.fail(id, &reason),
             },
-            SceneDone::MeshDecoded { id, result } => match (self.arrived(id), result) {
-                (bytes, Ok(mesh)) => self.mesh_decoded(id, bytes, mesh),
+            SceneDone::PartDecoded { id, result } => match (self.arrived(id), result) {
+                (bytes, Ok(part)) => self.part_decoded(id, bytes, part),
                 (_, Err(reason)) => self.fail(id, &reason),
             },
             SceneDone::Compiled { id, result } => match result {
@@ -240,21 +240,21 @@ impl<R: Renderer> SceneLoader<R> {
         self.incoming.remove(&id).map_or(0, |(_, bytes)| bytes)
     }
 
-    fn scene_decoded(&mut self, id: AssetId, body_bytes: u64, draft: R::Draft, meshes: Vec<AssetId>) {
+    fn scene_decoded(&mut self, id: AssetId, body_bytes: u64, draft: R::Draft, parts: Vec<AssetId>) {
         let Some(load) = self.loads.get_mut(&id) else { return };
-        let meshes: BTreeSet<AssetId> = meshes.into_iter().collect();
-        *load = Load { body_bytes, draft: Some(draft), meshes: meshes.clone() };
-        for mesh in meshes {
-            if self.store.get(mesh).is_none() {
-                self.wish(mesh);
+        let parts: BTreeSet<AssetId> = parts.into_iter().collect();
+        *load = Load { body_bytes, draft: Some(draft), parts: parts.clone() };
+        for part in parts {
+            if self.store.get(part).is_none() {
+                self.wish(part);
             }
         }
         self.compile_if_complete(id);
     }
 
-    fn mesh_decoded(&mut self, id: AssetId, bytes: u64, mesh: R::Mesh) {
-        self.store.insert(id, Stored::Mesh(Arc::new(mesh)), bytes);
-        let waiting = self.loads.iter().filter(|(_, load)| load.meshes.contains(&id));
+    fn part_decoded(&mut self, id: AssetId, bytes: u64, part: R::Part) {
+        self.store.insert(id, Stored::Part(Arc::new(part)), bytes);
+        let waiting = self.loads.iter().filter(|(_, load)| load.parts.contains(&id));
         for scene in waiting.map(|(scene, _)| *scene).collect::<Vec<_>>() {
             self.compile_if_complete(scene);
         }
@@ -262,25 +262,25 @@ impl<R: Renderer> SceneLoader<R> {
 
     fn compile_if_complete(&mut self, id: AssetId) {
         let Some(load) = self.loads.get_mut(&id) else { return };
-        let mesh_of = |mesh: &AssetId| match self.store.get(*mesh) {
-            Some(Stored::Mesh(mesh)) => Some(Arc::clone(mesh)),
+        let part_of = |part: &AssetId| match self.store.get(*part) {
+            Some(Stored::Part(part)) => Some(Arc::clone(part)),
             _ => None,
         };
-        let Some(meshes) = load.meshes.iter().map(mesh_of).collect::<Option<Vec<_>>>() else { return };
+        let Some(parts) = load.parts.iter().map(part_of).collect::<Option<Vec<_>>>() else { return };
         if let Some(draft) = load.draft.take() {
-            self.steps.push_back(Step::Work(SceneWork::Compile { id, draft, meshes }));
+            self.steps.push_back(Step::Work(SceneWork::Compile { id, draft, parts }));
         }
     }
 
     fn compiled(&mut self, id: AssetId, scene: R::Scene) {
-        let Some(Load { body_bytes, meshes, .. }) = self.loads.remove(&id) else { return };
+        let Some(Load { body_bytes, parts, .. }) = self.loads.remove(&id) else { return };
         let scene = Arc::new(scene);
         let reserved: u64 = self.incoming.values().map(|(_, bytes)| bytes).sum();
         let mut needed = self.in_use();
-        needed.extend(&meshes);
+        needed.extend(&parts);
         // Without room it is used all the same, and only not kept.
         if self.store.make_room(body_bytes, reserved, &needed) {
-            self.store.insert(id, Stored::Scene { scene: Arc::clone(&scene), meshes }, body_bytes);
+            self.store.insert(id, Stored::Scene { scene: Arc::clone(&scene), parts }, body_bytes);
         }
         self.steps.push_back(Step::Ready(id, scene));
     }
@@ -289,7 +289,7 @@ impl<R: Renderer> SceneLoader<R> {
     fn fail(&mut self, asset: AssetId, reason: &str) {
         self.incoming.remove(&asset);
         self.wishes.retain(|wish| *wish != asset);
-        let hit = self.loads.iter().filter(|(id, load)| **id == asset || load.meshes.contains(&asset));
+        let hit = self.loads.iter().filter(|(id, load)| **id == asset || load.parts.contains(&asset));
         for scene in hit.map(|(id, _)| *id).collect::<Vec<_>>() {
             self.loads.remove(&scene);
             if self.refused.len() >= MAX_REFUSED {
@@ -301,16 +301,16 @@ impl<R: Renderer> SceneLoader<R> {
         self.ask();
     }
 
-    /// Current scenes, scenes being loaded, and the meshes of both.
+    /// Current scenes, scenes being loaded, and the parts of both.
     fn in_use(&self) -> BTreeSet<AssetId> {
         let mut ids = self.current.clone();
         for (id, load) in &self.loads {
             ids.insert(*id);
-            ids.extend(&load.meshes);
+            ids.extend(&load.parts);
         }
         for scene in &self.current {
-            if let Some(Stored::Scene { meshes, .. }) = self.store.peek(*scene) {
-                ids.extend(meshes);
+            if let Some(Stored::Scene { parts, .. }) = self.store.peek(*scene) {
+                ids.extend(parts);
             }
         }
         ids

@@ -61,7 +61,7 @@ pub(crate) fn expected(scene: &[u8], view: &[u8], rows: Range<u32>) -> Vec<u8> {
 
 impl Renderer for Fake {
     type Draft = u8;
-    type Mesh = ();
+    type Part = ();
     type Scene = u8;
     type Frame = FakeFrame;
 
@@ -79,12 +79,12 @@ impl Renderer for Fake {
         Ok((*salt, meshes.chunks_exact(32).map(|id| AssetId(id.try_into().unwrap())).collect()))
     }
 
-    fn decode_mesh(&self, bytes: &[u8]) -> Result<(), String> {
+    fn decode_part(&self, bytes: &[u8]) -> Result<(), String> {
         assert!(bytes != b"mesh that panics", "this mesh is a trap");
         if bytes.starts_with(b"mesh") { Ok(()) } else { Err("this is no mesh".to_owned()) }
     }
 
-    fn compile(&self, draft: u8, _meshes: Vec<Arc<()>>) -> Result<u8, String> {
+    fn compile(&self, draft: u8, _parts: Vec<Arc<()>>) -> Result<u8, String> {
         Ok(draft)
     }
 

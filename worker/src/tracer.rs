@@ -7,18 +7,28 @@ use rayfarm_protocol::limits::{MAX_DECODE_BYTES, MAX_VIEW_BYTES};
 use rayfarm_protocol::{AssetId, FrameAnnounce, codec};
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{FrameView, Scene};
+use rayfarm_tracer::texture::{self, Texture};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, TILE_SIZE, render_rows};
 
 use crate::renderer::{Cancelled, Counts, Renderer};
 
 /// `rayfarm_tracer`, fed with bytes: scene bodies and views as the codec writes [`Scene`] and [`FrameView`], meshes as
-/// [`CompiledMesh::bytes`].
+/// [`CompiledMesh::bytes`], textures as [`Texture::bytes`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TracerRenderer;
 
+/// What a scene names by hash.
+#[derive(Debug)]
+pub enum Part {
+    /// Triangles.
+    Mesh(Arc<CompiledMesh>),
+    /// A picture.
+    Texture(Arc<Texture>),
+}
+
 impl Renderer for TracerRenderer {
     type Draft = Scene;
-    type Mesh = CompiledMesh;
+    type Part = Part;
     type Scene = CompiledScene;
     type Frame = PreparedFrame;
 
@@ -34,16 +44,33 @@ impl Renderer for TracerRenderer {
         let scene: Scene = codec::decode(body, MAX_DECODE_BYTES)
             .map_err(|error| format!("the scene does not decode: {error}"))?;
         scene.validate().map_err(|error| format!("the scene is not valid: {error}"))?;
-        let meshes = scene.mesh_ids().into_iter().map(|id| AssetId(id.0)).collect();
-        Ok((scene, meshes))
+        let meshes = scene.mesh_ids().into_iter().map(|id| AssetId(id.0));
+        let textures = scene.texture_ids().into_iter().map(|id| AssetId(id.0));
+        let parts = meshes.chain(textures).collect();
+        Ok((scene, parts))
     }
 
-    fn decode_mesh(&self, bytes: &[u8]) -> Result<CompiledMesh, String> {
-        CompiledMesh::from_bytes(bytes).map_err(|error| format!("a mesh is not valid: {error}"))
+    fn decode_part(&self, bytes: &[u8]) -> Result<Part, String> {
+        if bytes.starts_with(&texture::MAGIC) {
+            let texture =
+                Texture::from_bytes(bytes).map_err(|error| format!("a texture is not valid: {error}"))?;
+            return Ok(Part::Texture(Arc::new(texture)));
+        }
+        let mesh =
+            CompiledMesh::from_bytes(bytes).map_err(|error| format!("a mesh is not valid: {error}"))?;
+        Ok(Part::Mesh(Arc::new(mesh)))
     }
 
-    fn compile(&self, scene: Scene, meshes: Vec<Arc<CompiledMesh>>) -> Result<CompiledScene, String> {
-        CompiledScene::new(scene, meshes).map_err(|error| format!("the scene does not compile: {error}"))
+    fn compile(&self, scene: Scene, parts: Vec<Arc<Part>>) -> Result<CompiledScene, String> {
+        let (mut meshes, mut textures) = (Vec::new(), Vec::new());
+        for part in parts {
+            match part.as_ref() {
+                Part::Mesh(mesh) => meshes.push(Arc::clone(mesh)),
+                Part::Texture(texture) => textures.push(Arc::clone(texture)),
+            }
+        }
+        CompiledScene::new(scene, meshes, textures)
+            .map_err(|error| format!("the scene does not compile: {error}"))
     }
 
     fn prepare(&self, scene: Arc<CompiledScene>, announce: &FrameAnnounce) -> Result<PreparedFrame, String> {

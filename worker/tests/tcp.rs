@@ -31,7 +31,7 @@ async fn a_worker_renders_the_same_pixels_as_this_process() {
     for (frame, spin) in [(0, 0.0), (1, 10.0), (2, -35.5)] {
         link.check_frame(&stage, frame, spin).await;
     }
-    assert_eq!(link.asked, 2);
+    assert_eq!(link.asked, 3);
     link.out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
     worker.await.unwrap().unwrap();
 }

@@ -22,7 +22,9 @@ pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     refuse_the_model_itself(args)?;
     let options = CompileOptions { quality: build_quality(args.quality), ..CompileOptions::default() };
     let started = Instant::now();
-    let (mesh, warnings) = scene::load_model_with(&args.model, options).map_err(CommandError::wrong_input)?;
+    let folder = args.output.parent().unwrap_or(Path::new(""));
+    let (mesh, warnings) =
+        scene::compile_model(&args.model, folder, options).map_err(CommandError::wrong_input)?;
     let seconds = started.elapsed().as_secs_f64();
     for warning in warnings {
         tracing::warn!("{warning}");

@@ -53,7 +53,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         writer: FrameWriter::new(pattern),
         totals: Totals::new(triangles, log),
     };
-    let scene = FarmScene { scene: source.scene, meshes: source.meshes };
+    let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let report = super::runtime()?.block_on(run.carry_out(args.farm.options(), scene))?;
     if args.json {
         print_json(&report)?;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene};
+use rayfarm_tracer::texture::Texture;
 
 use crate::cli::PictureArgs;
 use crate::error::CommandError;
@@ -24,6 +25,8 @@ pub(super) struct Source {
     pub(super) scene: Scene,
     /// Its models.
     pub(super) meshes: Vec<Arc<CompiledMesh>>,
+    /// Its textures.
+    pub(super) textures: Vec<Arc<Texture>>,
 }
 
 impl Source {
@@ -32,12 +35,13 @@ impl Source {
     /// # Errors
     /// What is wrong with the file, with its line where there is one.
     pub(super) fn load(path: &Path) -> Result<Self, CommandError> {
-        let LoadedScene { scene, meshes, warnings } = scene::load(path).map_err(CommandError::wrong_input)?;
+        let LoadedScene { scene, meshes, textures, warnings } =
+            scene::load(path).map_err(CommandError::wrong_input)?;
         for warning in warnings {
             tracing::warn!("{warning}");
         }
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, scene, meshes })
+        Ok(Self { name, scene, meshes, textures })
     }
 
     /// What its first frame shows: the scene's own settings, or what the command line says instead.
@@ -59,7 +63,8 @@ impl Source {
     /// # Errors
     /// A scene that cannot be traced.
     pub(super) fn compiled(&self) -> Result<CompiledScene, CommandError> {
-        CompiledScene::new(self.scene.clone(), self.meshes.iter().cloned()).map_err(CommandError::wrong_input)
+        let (meshes, textures) = (self.meshes.iter().cloned(), self.textures.iter().cloned());
+        CompiledScene::new(self.scene.clone(), meshes, textures).map_err(CommandError::wrong_input)
     }
 }
 

@@ -65,7 +65,7 @@ async fn start(
     orders: Orders,
     stop: CancellationToken,
 ) -> Result<(Link, JoinHandle<Result<(), CommandError>>), CommandError> {
-    let scene = FarmScene { scene: source.scene, meshes: source.meshes };
+    let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let farm = Farm::start(args.farm.options(), scene).await.map_err(CommandError::failed)?;
     let link = Link { wanted, desk: NewsDesk::new(), address: farm.address(), stop };
     let task = tokio::spawn(feed::run(farm, orders, link.desk.clone(), link.stop.clone()));

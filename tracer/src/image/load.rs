@@ -16,8 +16,25 @@ const MAX_DECODE_BYTES: u64 = 4 * (MAX_SIDE as u64) * (MAX_SIDE as u64) + (64 <<
 /// # Errors
 /// A file that cannot be read, is no picture, is broken, or is larger than [`MAX_SIDE`] in either direction.
 pub fn load(path: &Path) -> Result<RgbImage, ImageError> {
+    let picture = open(path)?.decode().map_err(|source| broken(path, source))?.into_rgb8();
+    let (width, height) = picture.dimensions();
+    Ok(RgbImage { width, height, pixels: picture.into_raw() })
+}
+
+/// Pixels per row, and rows, that a picture announces, without decoding it.
+///
+/// # Errors
+/// As [`load`]; a picture may still turn out to be broken.
+pub fn size(path: &Path) -> Result<(u32, u32), ImageError> {
+    open(path)?.into_dimensions().map_err(|source| broken(path, source))
+}
+
+fn broken(path: &Path, source: ::image::ImageError) -> ImageError {
+    ImageError::Decode { path: path.to_owned(), source }
+}
+
+fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, ImageError> {
     let unreadable = |source| ImageError::Read { path: path.to_owned(), source };
-    let broken = |source| ImageError::Decode { path: path.to_owned(), source };
     let file = File::open(path).map_err(unreadable)?;
     let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(unreadable)?;
     let mut limits = Limits::default();
@@ -25,9 +42,7 @@ pub fn load(path: &Path) -> Result<RgbImage, ImageError> {
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_DECODE_BYTES);
     reader.limits(limits);
-    let picture = reader.decode().map_err(broken)?.into_rgb8();
-    let (width, height) = picture.dimensions();
-    Ok(RgbImage { width, height, pixels: picture.into_raw() })
+    Ok(reader)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ mod ssim;
 use std::path::PathBuf;
 
 pub use compare::{Difference, compare};
-pub use load::load;
+pub use load::{load, size};
 pub use save::{KNOWN_EXTENSIONS, save};
 
 /// Pixels per row, and rows, that a picture has at most.

@@ -80,7 +80,9 @@ pub(super) struct Header {
     pub normal_count: u32,
     pub material_count: u32,
     pub material_bytes: u32,
-    pub reserved: [u32; 4],
+    /// Lanes with texture coordinates: all of them, or none.
+    pub uv_count: u32,
+    pub reserved: [u32; 3],
 }
 
 const _: () = assert!(size_of::<Header>() == 128);
@@ -119,6 +121,13 @@ impl Header {
         if numbers.into_iter().any(|number| !number.is_finite()) {
             return Err(MeshError::Format("its centre or bounds are not finite".into()));
         }
+        if header.uv_count != 0 && header.uv_count != header.slots() {
+            return Err(MeshError::Format(format!(
+                "it has texture coordinates for {} lanes of {}",
+                header.uv_count,
+                header.slots()
+            )));
+        }
         let needed = header.sections().end as u64;
         if bytes.len() as u64 != needed {
             return Err(MeshError::Format(format!(
@@ -129,6 +138,11 @@ impl Header {
         Ok(header)
     }
 
+    /// Lanes of all blocks, with or without a triangle.
+    pub(super) fn slots(&self) -> u32 {
+        self.block_count.saturating_mul(WIDTH as u32)
+    }
+
     /// Byte offsets of the sections. `u32` counts of at most 64-byte elements cannot overflow 64-bit sizes.
     pub(super) fn sections(&self) -> Sections {
         let mut end = size_of::<Header>();
@@ -137,7 +151,7 @@ impl Header {
             end = start.saturating_add((count as usize).saturating_mul(element));
             start
         };
-        let slots = self.block_count.saturating_mul(WIDTH as u32);
+        let slots = self.slots();
         let with_normals = if self.normal_count > 0 { slots } else { 0 };
         Sections {
             nodes: place(self.node_count, size_of::<WideNode>()),
@@ -146,6 +160,7 @@ impl Header {
             slots: place(slots, 2),
             indices: place(with_normals, 12),
             normals: place(self.normal_count, 12),
+            uvs: place(self.uv_count, 24),
             materials: place(self.material_bytes, 1),
             end,
         }
@@ -167,6 +182,8 @@ pub(super) struct Sections {
     pub indices: usize,
     /// `Vec3` per vertex.
     pub normals: usize,
+    /// Three `Vec2` per lane; empty without texture coordinates.
+    pub uvs: usize,
     /// Material slots: see [`super::compiled`].
     pub materials: usize,
     /// Length of the whole.

@@ -6,7 +6,7 @@
 //! coordinates lie within [-1, 1] and `f32` spends its digits on the shape, wherever the model stands and however
 //! large it is. Both steps are exact up to one rounding to `f32` a coordinate.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{MAX_COORDINATE, MAX_MATERIALS, MAX_TRIANGLES, Mesh, MeshError, MeshReport};
@@ -21,6 +21,8 @@ pub(super) struct CleanMesh {
     pub sources: Vec<u32>,
     /// Material slot of each kept triangle.
     pub slots: Vec<u16>,
+    /// Texture coordinates of each kept triangle; empty where the source has none.
+    pub uvs: Vec<[Vec2; 3]>,
     /// Unit normal per source position; empty unless asked for.
     pub normals: Vec<Vec3>,
     /// model = center + mesh * 2^exponent.
@@ -49,6 +51,7 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
         indices: Vec::with_capacity(finite.len()),
         sources: Vec::with_capacity(finite.len()),
         slots: Vec::with_capacity(finite.len()),
+        uvs: Vec::with_capacity(if mesh.uvs.is_empty() { 0 } else { finite.len() }),
         normals: Vec::new(),
         center,
         exponent,
@@ -68,6 +71,7 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
             kept.indices.push(indices);
             kept.sources.push(source);
             kept.slots.push(mesh.triangle_materials[source as usize]);
+            kept.uvs.extend(mesh.uvs.get(source as usize));
         }
     }
     if kept.corners.is_empty() {
@@ -97,6 +101,12 @@ fn check_shape(mesh: &Mesh) -> Result<(), MeshError> {
         return Err(MeshError::Inconsistent(format!(
             "{triangles} triangles but {} material slots for them",
             mesh.triangle_materials.len()
+        )));
+    }
+    if !mesh.uvs.is_empty() && mesh.uvs.len() != triangles {
+        return Err(MeshError::Inconsistent(format!(
+            "{triangles} triangles but texture coordinates for {}",
+            mesh.uvs.len()
         )));
     }
     if !mesh.normals.is_empty() && mesh.normals.len() != mesh.positions.len() {

@@ -1,14 +1,15 @@
 //! A mesh ready to trace: triangles in the order of the tree's leaves, and the tree, in one blob.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::blob::{AlignedBytes, Header, NO_TRIANGLE, Sections, TriangleBlock};
 use super::clean::{CleanMesh, clean};
+use super::materials::{decode_materials, encode_materials};
 use super::{MAX_COORDINATE, Mesh, MeshError, MeshId, NamedMaterial};
 use crate::bvh::{self, BuildQuality, WIDTH, WideNode, WideTree};
-use crate::scene::Material;
 use crate::simd::Lanes;
+use crate::texture;
 
 /// What a compiled mesh should carry.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +61,7 @@ impl std::fmt::Debug for CompiledMesh {
 }
 
 impl CompiledMesh {
-    /// Cleans, centres and builds, with vertex normals.
+    /// Cleans, centres and builds, with vertex normals and the texture coordinates that the mesh has.
     ///
     /// # Errors
     /// A mesh that is inconsistent, too large, or has nothing left after cleaning.
@@ -84,6 +85,7 @@ impl CompiledMesh {
         header.block_count = tree.blocks.len() as u32;
         header.triangle_count = clean.corners.len() as u32;
         header.normal_count = clean.normals.len() as u32;
+        header.uv_count = if clean.uvs.is_empty() { 0 } else { header.slots() };
         header.material_count = mesh.materials.len() as u32;
         header.material_bytes = materials.len() as u32;
         let bytes = lay_out(&header, &clean, &tree, &materials);
@@ -106,8 +108,10 @@ impl CompiledMesh {
         let sections = header.sections();
         let id = MeshId(*blake3::Hasher::new().update_rayon(bytes.as_slice()).finalize().as_bytes());
         let start = sections.materials;
-        let materials =
-            decode_materials(&bytes.as_slice()[start..start + header.material_bytes as usize], &header)?;
+        let materials = decode_materials(
+            &bytes.as_slice()[start..start + header.material_bytes as usize],
+            header.material_count,
+        )?;
         let mesh = Self { bytes, header, sections, materials, id };
         mesh.check()?;
         Ok(mesh)
@@ -140,6 +144,9 @@ impl CompiledMesh {
         }
         if !normals.iter().copied().all(is_within_one) {
             return broken("a normal is longer than 1".into());
+        }
+        if !self.uvs().iter().flatten().copied().all(texture::is_usable) {
+            return broken("a texture coordinate is not finite, negative or too large".into());
         }
         Ok(())
     }
@@ -184,6 +191,24 @@ impl CompiledMesh {
         self.materials.clone()
     }
 
+    /// The same mesh with other material slots, as many as it has.
+    ///
+    /// # Errors
+    /// Slots that it does not take.
+    pub(crate) fn with_materials(&self, materials: &[NamedMaterial]) -> Result<Self, MeshError> {
+        let encoded = encode_materials(materials);
+        let mut header = self.header;
+        header.material_count = materials.len() as u32;
+        header.material_bytes = encoded.len() as u32;
+        // They are the last section: the others stay where they are.
+        let mut bytes = AlignedBytes::zeroed(header.sections().end);
+        let (before, last) = bytes.as_mut_slice().split_at_mut(self.sections.materials);
+        before.copy_from_slice(&self.bytes()[..self.sections.materials]);
+        before[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
+        last.copy_from_slice(&encoded);
+        Self::from_aligned(bytes)
+    }
+
     /// Bounds in the model's own space.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let [lo, hi] = self.header.bounds.map(DVec3::from_array);
@@ -193,6 +218,11 @@ impl CompiledMesh {
     /// Whether smooth shading has vertex normals to interpolate.
     pub fn has_normals(&self) -> bool {
         self.header.normal_count > 0
+    }
+
+    /// Whether textures can be laid on it.
+    pub fn has_uvs(&self) -> bool {
+        self.header.uv_count > 0
     }
 
     /// model = `center` + mesh * 2^`exponent`.
@@ -245,6 +275,11 @@ impl CompiledMesh {
         Some(indices.map(|index| self.normals()[index as usize]))
     }
 
+    /// Texture coordinates at the corners of triangle `i`, where the mesh carries them.
+    pub fn corner_uvs(&self, i: u32) -> Option<[Vec2; 3]> {
+        self.uvs().get(i as usize).copied()
+    }
+
     fn lanes(&self) -> usize {
         self.header.block_count as usize * WIDTH
     }
@@ -263,6 +298,10 @@ impl CompiledMesh {
 
     fn normals(&self) -> &[Vec3] {
         self.section(self.sections.normals, self.header.normal_count as usize)
+    }
+
+    fn uvs(&self) -> &[[Vec2; 3]] {
+        self.section(self.sections.uvs, self.header.uv_count as usize)
     }
 
     /// The section that starts at `start`. `Header::read` made sure that all sections lie inside, and they start on
@@ -309,6 +348,9 @@ fn lay_out(header: &Header, clean: &CleanMesh, tree: &WideTree, materials: &[u8]
         put(out, sections.indices, &in_lanes(tree, &clean.indices, [0; 3]));
         put(out, sections.normals, &clean.normals);
     }
+    if !clean.uvs.is_empty() {
+        put(out, sections.uvs, &in_lanes(tree, &clean.uvs, [Vec2::ZERO; 3]));
+    }
     out[sections.materials..sections.materials + materials.len()].copy_from_slice(materials);
     bytes
 }
@@ -339,49 +381,4 @@ fn in_lanes<T: Copy>(tree: &WideTree, items: &[T], empty: T) -> Vec<T> {
 fn put<T: bytemuck::NoUninit>(out: &mut [u8], start: usize, items: &[T]) {
     let bytes: &[u8] = bytemuck::cast_slice(items);
     out[start..start + bytes.len()].copy_from_slice(bytes);
-}
-
-/// Longest name of a material slot, in bytes; longer ones are cut.
-const MAX_NAME: usize = 255;
-
-/// Per slot: diffuse, specular, exponent (seven `f32`), the length of the name in bytes (`u8`), the name.
-fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    for NamedMaterial { name, material } in materials {
-        let numbers = material.diffuse.to_array().into_iter().chain(material.specular.to_array());
-        for number in numbers.chain([material.exponent]) {
-            bytes.extend_from_slice(&number.to_le_bytes());
-        }
-        let name = &name[..name.floor_char_boundary(MAX_NAME)];
-        bytes.push(name.len() as u8);
-        bytes.extend_from_slice(name.as_bytes());
-    }
-    bytes
-}
-
-fn decode_materials(mut bytes: &[u8], header: &Header) -> Result<Vec<NamedMaterial>, MeshError> {
-    let cut = || MeshError::Format("its material slots are cut short".into());
-    if header.material_count as usize > super::MAX_MATERIALS {
-        return Err(MeshError::Format(format!("it announces {} materials", header.material_count)));
-    }
-    let mut materials = Vec::new();
-    for _ in 0..header.material_count {
-        let (numbers, rest) = bytes.split_at_checked(7 * 4).ok_or_else(cut)?;
-        let (length, rest) = rest.split_first().ok_or_else(cut)?;
-        let (name, rest) = rest.split_at_checked(*length as usize).ok_or_else(cut)?;
-        bytes = rest;
-        let numbers: [f32; 7] = bytemuck::pod_read_unaligned(numbers);
-        if numbers.iter().any(|number| !(0.0..=1e9).contains(number)) {
-            return Err(MeshError::Format("a material has a number that is not in 0..1e9".into()));
-        }
-        let [dr, dg, db, sr, sg, sb, exponent] = numbers;
-        materials.push(NamedMaterial {
-            name: String::from_utf8_lossy(name).into_owned(),
-            material: Material { diffuse: Vec3::new(dr, dg, db), specular: Vec3::new(sr, sg, sb), exponent },
-        });
-    }
-    if !bytes.is_empty() {
-        return Err(MeshError::Format(format!("{} bytes follow its material slots", bytes.len())));
-    }
-    Ok(materials)
 }

@@ -6,12 +6,13 @@
 mod blob;
 mod clean;
 mod compiled;
+mod materials;
 #[cfg(test)]
 mod tests;
 
 use std::fmt;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 pub use crate::bvh::BuildQuality;
@@ -23,7 +24,7 @@ pub use compiled::{CompileOptions, CompiledMesh, MeshReport};
 pub const MAGIC: [u8; 6] = *b"RFMESH";
 
 /// Version of the layout of compiled meshes.
-pub const FORMAT_VERSION: u16 = 2;
+pub const FORMAT_VERSION: u16 = 3;
 
 /// Most triangles that one mesh may have: they fill at most 2^28 lanes of blocks, and their indices stay inside `u32`.
 pub const MAX_TRIANGLES: usize = 1 << 27;
@@ -33,6 +34,9 @@ pub const MAX_MATERIALS: usize = 1 << 16;
 
 /// Largest coordinate, in magnitude, that a mesh may have. Squares of squares of it stay finite in `f64`.
 pub const MAX_COORDINATE: f64 = 1e60;
+
+/// Longest name of a texture's file in a material slot, in bytes.
+pub const MAX_TEXTURE_NAME: usize = 4096;
 
 /// The name of a compiled mesh: BLAKE3 of its bytes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -61,6 +65,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// One index into `materials` per triangle.
     pub triangle_materials: Vec<u16>,
+    /// Texture coordinates of the corners of each triangle, as [`crate::texture::without_repeats`] leaves them; or empty.
+    pub uvs: Vec<[Vec2; 3]>,
     /// Material slots; never empty when there are triangles.
     pub materials: Vec<NamedMaterial>,
 }
@@ -70,8 +76,10 @@ pub struct Mesh {
 pub struct NamedMaterial {
     /// Name in the file, for messages.
     pub name: String,
-    /// What the file says of it.
+    /// What the file says of it, but for its texture: an index there means nothing without a scene.
     pub material: Material,
+    /// The file of its texture: a path with `/` between its parts, relative to the model's folder, or absolute.
+    pub texture: Option<String>,
 }
 
 /// Why a mesh cannot be compiled, or bytes are no compiled mesh.

@@ -1,13 +1,14 @@
 //! Cleaning, the round trip through bytes, and bytes that lie.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::*;
+use crate::texture::without_repeats;
 
 fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = vec![0; triangles.len()];
-    let materials = vec![NamedMaterial { name: "clay".into(), material: Material::NEUTRAL }];
+    let materials = vec![NamedMaterial { name: "clay".into(), material: Material::NEUTRAL, texture: None }];
     Mesh { positions, triangles, triangle_materials, materials, ..Mesh::default() }
 }
 
@@ -25,6 +26,15 @@ fn sheet(n: u32) -> Mesh {
         })
         .collect();
     mesh(positions, triangles)
+}
+
+/// The same with texture coordinates, and a slot with a texture.
+fn textured(n: u32) -> Mesh {
+    let mut mesh = sheet(n);
+    let uv = |v: u32| DVec2::new(mesh.positions[v as usize].x, mesh.positions[v as usize].z * 0.5);
+    mesh.uvs = mesh.triangles.iter().map(|t| without_repeats(t.map(uv)).unwrap()).collect();
+    mesh.materials[0].texture = Some("maps/clay.png".into());
+    mesh
 }
 
 /// All corners, in the order of the blocks.
@@ -93,6 +103,50 @@ fn normals_are_left_out_where_nobody_asks_for_them() {
     let (smooth, _) = CompiledMesh::compile(&sheet(20)).unwrap();
     assert!(flat.bytes().len() < smooth.bytes().len());
     assert_eq!((flat.has_normals(), flat.corner_normals(0)), (false, None));
+}
+
+#[test]
+fn texture_coordinates_and_names_come_back() {
+    let mut source = textured(9);
+    // Cleaning drops one of them, and its coordinates with it.
+    source.triangles[5] = [0; 3];
+    let (compiled, report) = CompiledMesh::compile(&source).unwrap();
+    assert_eq!(report.dropped_degenerate, 1);
+    let again = CompiledMesh::from_bytes(compiled.bytes()).unwrap();
+    assert!(again.has_uvs());
+    for triangle in again.triangles() {
+        assert_eq!(again.corner_uvs(triangle), Some(source.uvs[again.source(triangle) as usize]));
+    }
+    assert_eq!(again.materials()[0].texture.as_deref(), Some("maps/clay.png"));
+    let (plain, _) = CompiledMesh::compile(&sheet(9)).unwrap();
+    assert_eq!((plain.has_uvs(), plain.corner_uvs(0)), (false, None));
+    assert!(plain.bytes().len() < compiled.bytes().len());
+}
+
+#[test]
+fn other_material_slots_change_nothing_else() {
+    let (compiled, _) = CompiledMesh::compile(&textured(5)).unwrap();
+    let mut materials = compiled.materials();
+    materials[0].texture = Some("../elsewhere/a much longer name than before.png".into());
+    let changed = compiled.with_materials(&materials).unwrap();
+    assert_eq!(changed.materials(), materials);
+    assert_eq!(corners(&changed), corners(&compiled));
+    assert_eq!(changed.corner_uvs(3), compiled.corner_uvs(3));
+    assert_eq!(changed.with_materials(&compiled.materials()).unwrap().id(), compiled.id());
+}
+
+#[test]
+fn broken_texture_coordinates_are_refused() {
+    let mut short = textured(2);
+    short.uvs.pop();
+    let error = CompiledMesh::compile(&short).unwrap_err().to_string();
+    assert!(error.contains("8 triangles but texture coordinates for 7"), "{error}");
+    for odd in [f32::NAN, f32::INFINITY, -0.5, 1e8] {
+        let mut mesh = textured(2);
+        mesh.uvs[3][1] = Vec2::new(0.5, odd);
+        let error = CompiledMesh::compile(&mesh).unwrap_err().to_string();
+        assert!(error.contains("texture coordinate"), "{odd}: {error}");
+    }
 }
 
 #[test]
@@ -166,7 +220,7 @@ proptest! {
     fn changed_bytes_are_refused_or_still_a_sound_mesh(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
-        let (compiled, _) = CompiledMesh::compile(&sheet(4)).unwrap();
+        let (compiled, _) = CompiledMesh::compile(&textured(4)).unwrap();
         let mut bytes = compiled.bytes().to_vec();
         for (index, value) in changes {
             let at = index.index(bytes.len());
@@ -176,6 +230,9 @@ proptest! {
             for triangle in mesh.triangles() {
                 prop_assert!((mesh.slot(triangle) as usize) < mesh.material_count());
                 mesh.corner_normals(triangle);
+                for uv in mesh.corner_uvs(triangle).into_iter().flatten() {
+                    prop_assert!(uv.is_finite());
+                }
             }
         }
     }

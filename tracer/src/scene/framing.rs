@@ -45,6 +45,7 @@ pub(super) fn bare_model(mesh: &CompiledMesh) -> Scene {
             scale: DVec3::ONE,
         }],
         materials,
+        textures: Vec::new(),
         spheres: Vec::new(),
         planes: Vec::new(),
         triangles: Vec::new(),

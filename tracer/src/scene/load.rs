@@ -5,18 +5,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::file::TextureText;
 use super::file::{self, Aim, CameraText, ModelText, SceneText};
+use super::obj::Uvs;
 use super::read::{Kind, MAX_MODEL_BYTES, MAX_SCENE_BYTES, bytes};
+use super::textures::Textures;
 use super::{Camera, Material, Model, NormalMode, Scene, SceneError, framing, obj};
 use crate::mesh::{CompileOptions, CompiledMesh, MeshId, MeshReport};
+use crate::texture::Texture;
 
-/// A scene and the meshes it names.
+/// A scene, and the meshes and textures it names.
 #[derive(Debug)]
 pub struct LoadedScene {
     /// What to draw.
     pub scene: Scene,
     /// Every mesh of the scene, once.
     pub meshes: Vec<Arc<CompiledMesh>>,
+    /// Every texture of the scene, once.
+    pub textures: Vec<Arc<Texture>>,
     /// What was accepted although it looks unintended, ready to be shown, each with its place.
     pub warnings: Vec<String>,
 }
@@ -29,30 +35,43 @@ pub struct LoadedScene {
 pub fn load(path: &Path) -> Result<LoadedScene, SceneError> {
     let loaded = match Kind::of(path)? {
         Kind::Scene => load_scene_file(path)?,
-        Kind::Obj | Kind::Compiled => {
-            let (mesh, warnings) = load_model(path)?;
-            LoadedScene { scene: framing::bare_model(&mesh), meshes: vec![mesh], warnings }
-        }
+        Kind::Obj | Kind::Compiled => load_bare_model(path)?,
     };
     loaded.scene.validate().map_err(|fault| SceneError::in_file(path, fault.to_string()))?;
     Ok(loaded)
 }
 
-/// Loads and compiles a model, or takes a compiled one as it is. With it come warnings.
+/// Loads and compiles a model, or takes a compiled one as it is, to be kept in a file in `folder`: with all that a scene
+/// may ask of it, and with the pictures of its materials named as they are seen from there. With it come warnings.
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_model(path: &Path) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
-    load_model_with(path, CompileOptions::default())
+pub fn compile_model(
+    path: &Path,
+    folder: &Path,
+    options: CompileOptions,
+) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
+    let (mesh, warnings) = load_model(path, options, Uvs::Always)?;
+    let from = path.parent().unwrap_or(Path::new(""));
+    let moved = super::moved::texture_names(&mesh, from, folder)
+        .map_err(|source| SceneError::Mesh { path: path.to_owned(), source })?;
+    Ok((moved.map_or(mesh, Arc::new), warnings))
 }
 
-/// As [`load_model`], compiled as asked for; what is compiled already stays as it is.
-///
-/// # Errors
-/// As [`load`].
-pub fn load_model_with(
+fn load_bare_model(path: &Path) -> Result<LoadedScene, SceneError> {
+    let (mesh, mut warnings) = load_model(path, CompileOptions::default(), Uvs::Textured)?;
+    let mut scene = framing::bare_model(&mesh);
+    let mut textures = Textures::default();
+    scene.materials = textures.of_model(path, &mesh, &mut warnings);
+    let (maps, textures) = textures.into_parts();
+    scene.textures = maps;
+    Ok(LoadedScene { scene, meshes: vec![mesh], textures, warnings })
+}
+
+fn load_model(
     path: &Path,
     options: CompileOptions,
+    uvs: Uvs,
 ) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
     let failed = |source| SceneError::Mesh { path: path.to_owned(), source };
     match Kind::of(path)? {
@@ -62,7 +81,7 @@ pub fn load_model_with(
             Ok((Arc::new(mesh), Vec::new()))
         }
         Kind::Obj => {
-            let (mesh, mut warnings) = obj::load(path)?;
+            let (mesh, mut warnings) = obj::load(path, uvs)?;
             let (compiled, report) = CompiledMesh::compile_with(&mesh, options).map_err(failed)?;
             warnings.extend(describe(path, report));
             Ok((Arc::new(compiled), warnings))
@@ -90,10 +109,11 @@ fn load_scene_file(path: &Path) -> Result<LoadedScene, SceneError> {
     };
     let read = file::read(text).map_err(complain)?;
     let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| complain(w).to_string()).collect();
-    let mut models = Models::open(path, &read.models).map_err(complain)?;
-    let (scene, meshes) = assemble(path, read, &mut models)?;
+    let mut models = Models::open(path, &read.models, &read.textures).map_err(complain)?;
+    let mut loaded = assemble(path, read, &mut models, &complain)?;
     warnings.append(&mut models.warnings);
-    Ok(LoadedScene { scene, meshes, warnings })
+    loaded.warnings = warnings;
+    Ok(loaded)
 }
 
 fn text_of<'b>(path: &Path, content: &'b [u8]) -> Result<&'b str, SceneError> {
@@ -110,7 +130,8 @@ fn assemble(
     path: &Path,
     text: SceneText,
     models: &mut Models,
-) -> Result<(Scene, Vec<Arc<CompiledMesh>>), SceneError> {
+    complain: &impl Fn(file::Fault) -> SceneError,
+) -> Result<LoadedScene, SceneError> {
     let mut scene = Scene {
         ambient: text.ambient,
         render: text.render,
@@ -118,15 +139,19 @@ fn assemble(
         background: text.background,
         lights: text.lights,
         materials: text.materials,
+        textures: Vec::new(),
         models: Vec::new(),
         spheres: text.spheres,
         planes: text.planes,
         triangles: text.triangles,
     };
     for model in &text.models {
-        let instance = models.instance(model, &mut scene.materials)?;
+        let instance = models.instance(model, &mut scene.materials, &text.textures, complain)?;
         scene.models.push(instance);
     }
+    load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(complain)?;
+    let (maps, textures) = std::mem::take(&mut models.textures).into_parts();
+    scene.textures = maps;
     let meshes = models.take_meshes();
     let bounds = framing::bounds(&scene, &meshes);
     scene.camera = match text.camera {
@@ -140,7 +165,30 @@ fn assemble(
     if scene.lights.is_empty() {
         scene.lights.push(framing::default_light(&scene.camera));
     }
-    Ok((scene, meshes))
+    Ok(LoadedScene { scene, meshes, textures, warnings: Vec::new() })
+}
+
+/// Textures of the scene file's own materials, as far as something has them.
+fn load_textures(
+    folder: &Path,
+    texts: &BTreeMap<u32, TextureText>,
+    scene: &mut Scene,
+    textures: &mut Textures,
+) -> Result<(), file::Fault> {
+    let of_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
+    let used: BTreeSet<u32> =
+        of_models.chain(scene.triangles.iter().map(|triangle| triangle.material)).collect();
+    for (index, text) in texts.iter().filter(|(index, _)| used.contains(index)) {
+        let texture = textures.add(&folder.join(&text.file), text.filter);
+        let texture = texture.map_err(|reason| file::Fault {
+            at: text.at,
+            message: format!("the texture: {reason} (paths are relative to the scene file)"),
+        })?;
+        if let Some(material) = scene.materials.get_mut(*index as usize) {
+            material.texture = Some(texture);
+        }
+    }
+    Ok(())
 }
 
 /// The camera with the point that it looks at.
@@ -161,11 +209,16 @@ struct Models {
     folder: PathBuf,
     /// Real paths of the files that some instance shows smoothly.
     smooth: BTreeSet<PathBuf>,
+    /// By real path: what the instances of a file need of its texture coordinates.
+    uvs: BTreeMap<PathBuf, Uvs>,
+    textures: Textures,
     loaded: BTreeMap<PathBuf, LoadedModel>,
     warnings: Vec<String>,
 }
 
 struct LoadedModel {
+    /// As messages name it.
+    path: PathBuf,
     mesh: Arc<CompiledMesh>,
     /// Where the scene's materials hold the file's own, once an instance has asked for them.
     own_materials: Option<Vec<u32>>,
@@ -173,12 +226,18 @@ struct LoadedModel {
 
 impl Models {
     /// Finds every file, so that a missing one is told with its place in the scene file before work begins.
-    fn open(scene: &Path, models: &[ModelText]) -> Result<Self, file::Fault> {
+    fn open(
+        scene: &Path,
+        models: &[ModelText],
+        textures: &BTreeMap<u32, TextureText>,
+    ) -> Result<Self, file::Fault> {
         let folder = scene.parent().unwrap_or(Path::new(""));
         let mut all = Self {
             paths: BTreeMap::new(),
             folder: folder.to_owned(),
             smooth: BTreeSet::new(),
+            uvs: BTreeMap::new(),
+            textures: Textures::default(),
             loaded: BTreeMap::new(),
             warnings: Vec::new(),
         };
@@ -194,28 +253,45 @@ impl Models {
             if model.normals == NormalMode::Smooth {
                 all.smooth.insert(real.clone());
             }
+            let wanted = match model.material {
+                None => Uvs::Textured,
+                Some(material) if textures.contains_key(&material) => Uvs::Always,
+                Some(_) => Uvs::Never,
+            };
+            let most = all.uvs.entry(real.clone()).or_insert(wanted);
+            *most = wanted.max(*most);
             all.paths.insert(model.file.clone(), real);
         }
         Ok(all)
     }
 
-    fn instance(&mut self, text: &ModelText, materials: &mut Vec<Material>) -> Result<Model, SceneError> {
+    fn instance(
+        &mut self,
+        text: &ModelText,
+        materials: &mut Vec<Material>,
+        textures: &BTreeMap<u32, TextureText>,
+        complain: &impl Fn(file::Fault) -> SceneError,
+    ) -> Result<Model, SceneError> {
         let real = self.paths.get(&text.file).unwrap_or(&text.file).clone();
         let loaded = match self.loaded.entry(real) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {
                 let normals = self.smooth.contains(entry.key());
+                let uvs = self.uvs.get(entry.key()).copied().unwrap_or(Uvs::Never);
                 // Messages name the file as the user does.
                 let path = self.folder.join(&text.file);
-                let (mesh, warnings) =
-                    load_model_with(&path, CompileOptions { normals, ..CompileOptions::default() })?;
+                let options = CompileOptions { normals, ..CompileOptions::default() };
+                let (mesh, warnings) = load_model(&path, options, uvs)?;
                 self.warnings.extend(warnings);
-                entry.insert(LoadedModel { mesh, own_materials: None })
+                entry.insert(LoadedModel { path, mesh, own_materials: None })
             }
         };
         let slots = match text.material {
+            Some(material) if textures.contains_key(&material) && !loaded.mesh.has_uvs() => {
+                return Err(complain(without_uvs(text)));
+            }
             Some(material) => vec![material; loaded.mesh.material_count()],
-            None => loaded.own_materials(materials),
+            None => loaded.own_materials(materials, &mut self.textures, &mut self.warnings),
         };
         Ok(Model {
             mesh: loaded.mesh.id(),
@@ -237,16 +313,30 @@ impl Models {
 }
 
 impl LoadedModel {
-    fn own_materials(&mut self, materials: &mut Vec<Material>) -> Vec<u32> {
-        let mesh = &self.mesh;
+    fn own_materials(
+        &mut self,
+        materials: &mut Vec<Material>,
+        textures: &mut Textures,
+        warnings: &mut Vec<String>,
+    ) -> Vec<u32> {
         self.own_materials
             .get_or_insert_with(|| {
                 let first = materials.len() as u32;
-                materials.extend(mesh.materials().into_iter().map(|slot| slot.material));
+                materials.extend(textures.of_model(&self.path, &self.mesh, warnings));
                 (first..materials.len() as u32).collect()
             })
             .clone()
     }
+}
+
+/// A texture of the scene file on a model that has no place for it.
+fn without_uvs(text: &ModelText) -> file::Fault {
+    let message = format!(
+        "`material` in [[model]] has a texture, but {} has no texture coordinates (`vt`); \
+         write it with them, or use a material with a colour",
+        text.file.display()
+    );
+    file::Fault { at: text.material_at, message }
 }
 
 #[cfg(test)]

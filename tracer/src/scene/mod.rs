@@ -8,22 +8,25 @@ mod error;
 mod file;
 mod framing;
 mod load;
+mod moved;
 mod obj;
 mod read;
 pub mod rotation;
+mod textures;
 mod validate;
 mod warnings;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::MeshId;
+use crate::texture::TextureId;
 
 pub use error::SceneError;
-pub use load::{LoadedScene, load, load_model, load_model_with};
+pub use load::{LoadedScene, compile_model, load};
 pub use validate::{
     MAX_COORDINATE, MAX_DEPTH, MAX_EXPONENT, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES,
-    MAX_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TRIANGLES, ValidateError,
+    MAX_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, ValidateError,
 };
 
 /// A whole scene: what the scene file says, resolved and validated.
@@ -41,6 +44,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Materials; every index in the scene points in here.
     pub materials: Vec<Material>,
+    /// Textures of materials; every index of a material points in here.
+    pub textures: Vec<TextureMap>,
     /// Instances of compiled meshes.
     pub models: Vec<Model>,
     /// Analytic spheres.
@@ -161,23 +166,43 @@ pub enum Attenuation {
 /// Phong material.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Material {
-    /// c_d, linear RGB.
+    /// c_d, linear RGB; a factor of the texel where there is a texture.
     pub diffuse: Vec3,
     /// c_s, linear RGB; zero means no specular term, and none is computed.
     pub specular: Vec3,
     /// p_r, the Phong exponent.
     pub exponent: f32,
+    /// Index into [`Scene::textures`]. Only what has texture coordinates may have such a material.
+    pub texture: Option<u32>,
 }
 
 impl Material {
     /// What a model without a material gets.
     pub const NEUTRAL: Material =
-        Material { diffuse: Vec3::splat(0.7), specular: Vec3::splat(0.2), exponent: 32.0 };
+        Material { diffuse: Vec3::splat(0.7), specular: Vec3::splat(0.2), exponent: 32.0, texture: None };
 
     /// Whether it has a specular colour.
     pub fn is_specular(&self) -> bool {
         self.specular != Vec3::ZERO
     }
+}
+
+/// A texture and how it is looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TextureMap {
+    /// The picture.
+    pub texture: TextureId,
+    /// What lies between its texels.
+    pub filter: Filter,
+}
+
+/// What lies between the centres of texels, at ((i + 0.5) / width, (j + 0.5) / height).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Filter {
+    /// The nearest texel.
+    Nearest,
+    /// The four texels around, weighted by nearness, in linear light.
+    Bilinear,
 }
 
 /// How a model's normals are made.
@@ -233,6 +258,8 @@ pub struct Plane {
 pub struct Triangle {
     /// World positions of the corners.
     pub vertices: [DVec3; 3],
+    /// Texture coordinates of the corners, whole repeats taken off as by [`crate::texture::without_repeats`].
+    pub uvs: Option<[Vec2; 3]>,
     /// Index into [`Scene::materials`].
     pub material: u32,
 }

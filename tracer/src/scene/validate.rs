@@ -7,14 +7,18 @@ use glam::{DVec3, Vec3};
 
 use super::{
     Attenuation, Background, Camera, FrameView, Light, LightKind, Material, Model, RenderSettings, Scene,
+    Triangle,
 };
 use crate::image::MAX_SIDE;
 use crate::mesh::MeshId;
+use crate::texture::{self, TextureId};
 
 /// Lights of a scene.
 pub const MAX_LIGHTS: usize = 4096;
 /// Materials of a scene, those of its models' files included.
 pub const MAX_MATERIALS: usize = 1 << 18;
+/// Textures of a scene.
+pub const MAX_TEXTURES: usize = 4096;
 /// Instances of meshes in a scene.
 pub const MAX_MODELS: usize = 1 << 16;
 /// Spheres of a scene.
@@ -77,6 +81,11 @@ impl Scene {
         self.models.iter().map(|model| model.mesh).collect()
     }
 
+    /// The textures that materials of the scene name.
+    pub fn texture_ids(&self) -> BTreeSet<TextureId> {
+        self.textures.iter().map(|map| map.texture).collect()
+    }
+
     /// Checks a scene that was not made by this program's loader, such as one from the wire.
     ///
     /// # Errors
@@ -88,29 +97,26 @@ impl Scene {
         check_camera(&self.camera)?;
         check_background(&self.background)?;
         each("lights", &self.lights, check_light)?;
-        each("materials", &self.materials, check_material)?;
+        each("materials", &self.materials, |material, name| self.check_material(material, name))?;
         each("models", &self.models, |model, name| self.check_model(model, name))?;
         each("spheres", &self.spheres, |sphere, name| {
             require(is_point(sphere.center), || format!("{name}.center"), FINITE)?;
             require(is_positive(sphere.radius), || format!("{name}.radius"), "above zero and finite")?;
-            self.check_material_index(sphere.material, name)
+            self.check_plain_material(sphere.material, name)
         })?;
         each("planes", &self.planes, |plane, name| {
             require(is_point(plane.point), || format!("{name}.point"), FINITE)?;
             require(is_unit(plane.normal), || format!("{name}.normal"), UNIT)?;
-            self.check_material_index(plane.material, name)
+            self.check_plain_material(plane.material, name)
         })?;
-        each("triangles", &self.triangles, |triangle, name| {
-            let finite = triangle.vertices.iter().all(|v| is_point(*v));
-            require(finite, || format!("{name}.vertices"), FINITE)?;
-            self.check_material_index(triangle.material, name)
-        })
+        each("triangles", &self.triangles, |triangle, name| self.check_triangle(triangle, name))
     }
 
     fn check_counts(&self) -> Check {
         for (what, count, limit) in [
             ("lights", self.lights.len(), MAX_LIGHTS),
             ("materials", self.materials.len(), MAX_MATERIALS),
+            ("textures", self.textures.len(), MAX_TEXTURES),
             ("models", self.models.len(), MAX_MODELS),
             ("spheres", self.spheres.len(), MAX_SPHERES),
             ("planes", self.planes.len(), MAX_PLANES),
@@ -133,6 +139,31 @@ impl Scene {
         require(is_point(model.rotate), || format!("{name}.rotate"), FINITE)?;
         let scale = is_point(model.scale) && model.scale.to_array().iter().all(|s| *s != 0.0);
         require(scale, || format!("{name}.scale"), "finite and not zero along any axis")
+    }
+
+    fn check_triangle(&self, triangle: &Triangle, name: &str) -> Check {
+        let finite = triangle.vertices.iter().all(|v| is_point(*v));
+        require(finite, || format!("{name}.vertices"), FINITE)?;
+        let Some(uvs) = triangle.uvs else { return self.check_plain_material(triangle.material, name) };
+        require(
+            uvs.into_iter().all(texture::is_usable),
+            || format!("{name}.uvs"),
+            "finite, not negative and small",
+        )?;
+        self.check_material_index(triangle.material, name)
+    }
+
+    fn check_material(&self, material: &Material, name: &str) -> Check {
+        check_material(material, name)?;
+        let listed = material.texture.is_none_or(|index| (index as usize) < self.textures.len());
+        require(listed, || format!("{name}.texture"), "one of the scene's textures")
+    }
+
+    /// The material of something without texture coordinates.
+    fn check_plain_material(&self, index: u32, name: &str) -> Check {
+        self.check_material_index(index, name)?;
+        let plain = self.materials[index as usize].texture.is_none();
+        require(plain, || format!("{name}.material"), "without a texture: there are no texture coordinates")
     }
 
     fn check_material_index(&self, index: u32, name: &str) -> Check {

@@ -33,6 +33,7 @@ impl<S: Simd> Materials<S> {
             rest &= !same;
             materials.put(simd, mask_of(simd, same), &scene.materials[index as usize]);
         }
+        materials.diffuse = surfaces.textured(simd, block, materials.diffuse);
         materials
     }
 

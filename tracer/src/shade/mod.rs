@@ -4,7 +4,7 @@
 //! I = c_d I_a + sum_j S_j A_j B_j I_j ( c_d max(0, N.L_j) + c_s max(0, N.H_j)^p_r )
 //! ```
 //!
-//! [`surface`] finds the point, N and the material of each ray's hit, [`background`] stands where nothing is hit,
+//! [`surface`] finds the point, N and the material of each ray's hit, [`texel`] the share that a texture leaves of c_d, [`background`] stands where nothing is hit,
 //! [`specular`] is the second term in the brackets; A_j B_j I_j come from [`crate::light`], S_j from
 //! [`crate::tile::shadow`].
 
@@ -12,6 +12,7 @@ mod background;
 mod material;
 mod specular;
 mod surface;
+mod texel;
 
 use crate::frame::PreparedFrame;
 use crate::light::{Emitter, EyeLight, JUST_BEFORE};
@@ -43,9 +44,9 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(frame: &PreparedFrame) -> Self {
         let nothing = [[Lanes::ZERO; 3]; BLOCKS];
-        Self { surfaces: Surfaces::empty(), colors: nothing, contributions: nothing, lifted: nothing }
+        Self { surfaces: Surfaces::empty(frame), colors: nothing, contributions: nothing, lifted: nothing }
     }
 }
 

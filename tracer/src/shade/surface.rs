@@ -2,9 +2,10 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::texel::{CornerUvs, Texels};
 use crate::bvh::WIDTH;
 use crate::compile::Item;
-use crate::frame::Instance;
+use crate::frame::{Instance, PreparedFrame};
 use crate::mesh::CompiledMesh;
 use crate::simd::math::to_unit;
 use crate::simd::vector::Vec3x16;
@@ -36,11 +37,13 @@ pub(super) struct Surfaces {
     pub lift: [Lanes; BLOCKS],
     /// Index into the scene's materials; in blocks with a hit, lanes without one repeat one of the others.
     pub material: [Indices; BLOCKS],
+    /// What textures make of the diffuse colours; only in scenes that have textures.
+    pub texels: Option<Box<Texels>>,
 }
 
 impl Surfaces {
     /// For [`Surfaces::find`] to fill.
-    pub(super) fn empty() -> Self {
+    pub(super) fn empty(frame: &PreparedFrame) -> Self {
         let nowhere = [[Lanes::ZERO; 3]; BLOCKS];
         Self {
             hit: [0; BLOCKS],
@@ -50,6 +53,7 @@ impl Surfaces {
             to_viewer: nowhere,
             lift: [Lanes::ZERO; BLOCKS],
             material: [Indices::ZERO; BLOCKS],
+            texels: Texels::for_scene(frame),
         }
     }
 
@@ -63,6 +67,9 @@ impl Surfaces {
             self.hit[block] = rest;
             if rest == 0 {
                 continue;
+            }
+            if let Some(texels) = &mut self.texels {
+                texels.clear(block);
             }
             let direction = tile.directions(simd, block);
             let first = rest.trailing_zeros() as usize;
@@ -108,7 +115,7 @@ impl Surfaces {
                 |_| normal,
             );
         }
-        let (corners, normals, space) = match frame.items.get(item) {
+        let (corners, normals, uvs, space) = match frame.items.get(item) {
             Item::Sphere(index) => {
                 let sphere = frame.spheres[index];
                 let material = frame.scene().spheres[index].material;
@@ -118,17 +125,20 @@ impl Surfaces {
                 let corners = frame.triangles[index].corners;
                 let corners = three!(k => Vec3x16::splat(simd, corners[k].as_vec3().to_array()));
                 self.material[block].put(simd, mask_of(simd, lanes), frame.scene().triangles[index].material);
-                (corners, None, space_of(space, item, || Space::of_eye(tile)))
+                let uvs = frame.scene().triangles[index].uvs.map(CornerUvs::splat);
+                (corners, None, uvs, space_of(space, item, || Space::of_eye(tile)))
             }
             Item::Model(index) => {
                 let instance = &frame.instances[index];
                 let slots = &frame.scene().models[index].materials;
                 let (corners, normals) =
                     self.gather(simd, instance, slots, &visible.triangle[block], block, lanes);
-                (corners, normals, space_of(space, item, || Space::of_instance(tile, instance)))
+                let triangles = &visible.triangle[block];
+                let uvs = instance.textured.then(|| CornerUvs::gather(&instance.mesh, &triangles.0, lanes));
+                (corners, normals, uvs, space_of(space, item, || Space::of_instance(tile, instance)))
             }
         };
-        self.fill_triangles(simd, group, space, corners, normals);
+        self.fill_triangles(simd, group, space, corners, normals, uvs.as_ref());
     }
 
     /// Corners, and for smooth models normals, of the triangles that lanes see: triangle by triangle, because neighbours
@@ -176,6 +186,7 @@ impl Surfaces {
         space: &Space,
         [a, b, c]: ThreeVectors<S>,
         normals: Option<ThreeVectors<S>>,
+        uvs: Option<&CornerUvs>,
     ) {
         let &Group { tile, block, lanes, direction, .. } = group;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
@@ -210,6 +221,11 @@ impl Surfaces {
             group.keep(simd, ns, &mut self.ns[block]);
         } else if tile.frame.features.smooth {
             group.keep(simd, ng, &mut self.ns[block]);
+        }
+        if let (Some(uvs), Some(texels)) = (uvs, &mut self.texels) {
+            let at = space.direction(simd, tile, block).scale(t).sub(to_a);
+            let uv = uvs.at(simd, barycentric(simd, at, ab, ac));
+            texels.fill(tile.frame, block, lanes, &self.material[block], &uv);
         }
         let sound = lift.simd_le(splat(simd, f32::MAX)) & turned.abs().simd_le(splat(simd, f32::MAX));
         for lane in each_bit(lanes & !bits(sound)) {

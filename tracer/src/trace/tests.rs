@@ -32,6 +32,7 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
         background: Background::Color(Vec3::ZERO),
         lights: vec![],
         materials: vec![Material::NEUTRAL],
+        textures: vec![],
         models: vec![model],
         spheres: vec![],
         planes: vec![],
@@ -39,12 +40,12 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
     };
     change(&mut scene);
     let view = FrameView::of(&scene);
-    PreparedFrame::new(Arc::new(CompiledScene::new(scene, [Arc::new(compiled)]).unwrap()), &view).unwrap()
+    PreparedFrame::new(Arc::new(CompiledScene::new(scene, [Arc::new(compiled)], []).unwrap()), &view).unwrap()
 }
 
 fn mesh_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let slots = vec![0; triangles.len()];
-    let material = NamedMaterial { name: "m".into(), material: Material::NEUTRAL };
+    let material = NamedMaterial { name: "m".into(), material: Material::NEUTRAL, texture: None };
     Mesh { positions, triangles, triangle_materials: slots, materials: vec![material], ..Mesh::default() }
 }
 
@@ -136,7 +137,7 @@ fn of_equal_distances_the_lowest_source_index_is_seen() {
 fn of_equal_distances_the_first_item_is_seen() {
     let corners = [DVec3::new(-1.0, -1.0, -2.0), DVec3::new(1.0, -1.0, -2.0), DVec3::new(0.0, 1.0, -2.0)];
     let frame = frame_of(&ball(6, 6, |p| p + DVec3::Z * 50.0), DVec3::ZERO, |scene| {
-        scene.triangles = vec![Triangle { vertices: corners, material: 0 }; 5];
+        scene.triangles = vec![Triangle { vertices: corners, uvs: None, material: 0 }; 5];
     });
     let ray = Ray { origin: DVec3::ZERO, direction: DVec3::NEG_Z };
     let (_, primitive) = frame.closest(&ray, f64::INFINITY).unwrap();
@@ -251,7 +252,7 @@ fn hits_are_named_by_their_place_in_the_scene() {
         scene.models.push(Model { translate: place(10.0), ..scene.models[0].clone() });
         scene.spheres = vec![Sphere { center: place(20.0), radius: 2.0, material: 0 }];
         let corners = [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::new(0.0, 1.0, 0.0)];
-        let triangle = |x: f64| Triangle { vertices: corners.map(|p| p + place(x)), material: 0 };
+        let triangle = |x: f64| Triangle { vertices: corners.map(|p| p + place(x)), uvs: None, material: 0 };
         scene.triangles = vec![triangle(30.0), triangle(40.0)];
         scene.planes = vec![Plane { point: DVec3::NEG_Z * 7.0, normal: DVec3::Z, material: 0 }];
     });

@@ -10,11 +10,12 @@ use rayfarm_tracer::scene::{
     Attenuation, Background, Camera, FrameView, Light, LightKind, Material, Model, NormalMode, Plane,
     RenderSettings, Scene, Sphere, Triangle,
 };
+use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts, render_rows};
 
 /// Nothing but a background, a camera at z = 4 that looks at the origin, and three materials.
 pub(crate) fn empty(width: u32, height: u32) -> Scene {
-    let material = |diffuse, specular, exponent| Material { diffuse, specular, exponent };
+    let material = |diffuse, specular, exponent| Material { diffuse, specular, exponent, texture: None };
     Scene {
         ambient: Vec3::splat(0.06),
         render: RenderSettings { width, height, ..RenderSettings::default() },
@@ -32,6 +33,7 @@ pub(crate) fn empty(width: u32, height: u32) -> Scene {
             material(Vec3::new(0.2, 0.5, 0.3), Vec3::ZERO, 1.0),
             material(Vec3::splat(0.6), Vec3::splat(0.2), 8.5),
         ],
+        textures: vec![],
         models: vec![],
         spheres: vec![],
         planes: vec![],
@@ -56,8 +58,8 @@ pub(crate) fn analytic(width: u32, height: u32) -> Scene {
     }
     let quad = [(-2.0, -1.0), (2.0, -1.0), (2.0, 1.6), (-2.0, 1.6)].map(|(x, y)| DVec3::new(x, y, -2.5));
     scene.triangles = vec![
-        Triangle { vertices: [quad[0], quad[1], quad[2]], material: 1 },
-        Triangle { vertices: [quad[0], quad[2], quad[3]], material: 1 },
+        Triangle { vertices: [quad[0], quad[1], quad[2]], uvs: None, material: 1 },
+        Triangle { vertices: [quad[0], quad[2], quad[3]], uvs: None, material: 1 },
     ];
     let spot = LightKind::Spot {
         position: DVec3::new(-2.0, 3.0, 2.0),
@@ -120,8 +122,9 @@ pub(crate) fn ball(rings: u32, sectors: u32) -> Mesh {
 
 fn mesh_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = (0..triangles.len()).map(|i| (i / 40 % 2) as u16).collect();
-    let slot = |name: &str| NamedMaterial { name: name.into(), material: Material::NEUTRAL };
-    Mesh { positions, triangles, triangle_materials, materials: vec![slot("a"), slot("b")], normals: vec![] }
+    let slot = |name: &str| NamedMaterial { name: name.into(), material: Material::NEUTRAL, texture: None };
+    let materials = vec![slot("a"), slot("b")];
+    Mesh { positions, triangles, triangle_materials, materials, ..Mesh::default() }
 }
 
 /// Three placements of one torus over a plane, one of them stretched and smooth.
@@ -148,7 +151,18 @@ pub(crate) fn instanced(width: u32, height: u32) -> (Scene, Arc<CompiledMesh>) {
 
 /// Renders all rows at once.
 pub(crate) fn render(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameView) -> (RgbImage, RayCounts) {
-    let compiled = Arc::new(CompiledScene::new(scene.clone(), meshes.iter().cloned()).unwrap());
+    render_textured(scene, meshes, &[], view)
+}
+
+/// Likewise, with textures.
+pub(crate) fn render_textured(
+    scene: &Scene,
+    meshes: &[Arc<CompiledMesh>],
+    textures: &[Arc<Texture>],
+    view: &FrameView,
+) -> (RgbImage, RayCounts) {
+    let (meshes, textures) = (meshes.iter().cloned(), textures.iter().cloned());
+    let compiled = Arc::new(CompiledScene::new(scene.clone(), meshes, textures).unwrap());
     let frame = PreparedFrame::new(compiled, view).unwrap();
     let mut image = RgbImage::new(view.width, view.height);
     let counts = render_rows(&frame, 0..view.height, &mut image.pixels, &|| false).unwrap();

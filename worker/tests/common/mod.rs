@@ -6,23 +6,26 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayfarm_protocol::session::{self, Receiver, Sender};
 use rayfarm_protocol::{
     AssetId, FrameAnnounce, FrameId, Hello, Lease, ToMaster, ToWorker, Welcome, codec, handshake,
 };
+use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use rayfarm_tracer::scene::{
-    Attenuation, Background, Camera, FrameView, Light, LightKind, Material, Model, NormalMode, Plane,
-    RenderSettings, Scene, Sphere,
+    Attenuation, Background, Camera, Filter, FrameView, Light, LightKind, Material, Model, NormalMode, Plane,
+    RenderSettings, Scene, Sphere, TextureMap,
 };
+use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 use tokio::net::{TcpListener, TcpStream};
 
-/// A scene with everything that travels: a mesh, a sphere, a plane, a light with shadows.
+/// A scene with everything that travels: a mesh under a texture, a sphere, a plane, a light with shadows.
 pub(crate) struct Stage {
     pub(crate) body: Bytes,
     pub(crate) mesh: Bytes,
+    pub(crate) texture: Bytes,
     compiled: Arc<CompiledScene>,
     view: FrameView,
 }
@@ -30,6 +33,7 @@ pub(crate) struct Stage {
 impl Stage {
     pub(crate) fn new() -> Self {
         let mesh = pyramid();
+        let texture = stripes();
         let scene = Scene {
             ambient: Vec3::splat(0.1),
             render: RenderSettings { width: 61, height: 45, samples: 4, ..RenderSettings::default() },
@@ -47,10 +51,10 @@ impl Stage {
                 attenuation: Attenuation::None,
                 shadows: true,
             }],
-            materials: vec![Material::NEUTRAL],
+            materials: vec![Material::NEUTRAL, Material { texture: Some(0), ..Material::NEUTRAL }],
             models: vec![Model {
                 mesh: mesh.id(),
-                materials: vec![0],
+                materials: vec![1],
                 normals: NormalMode::Flat,
                 translate: DVec3::new(-0.8, 0.0, 0.0),
                 rotate: DVec3::new(0.0, 30.0, 0.0),
@@ -58,13 +62,15 @@ impl Stage {
             }],
             spheres: vec![Sphere { center: DVec3::new(1.0, 0.0, 0.0), radius: 0.7, material: 0 }],
             planes: vec![Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 0 }],
+            textures: vec![TextureMap { texture: texture.id(), filter: Filter::Bilinear }],
             triangles: vec![],
         };
         let view = FrameView::of(&scene);
         let body = codec::encode(&scene).unwrap().into();
         let mesh_bytes = Bytes::copy_from_slice(mesh.bytes());
-        let compiled = Arc::new(CompiledScene::new(scene, [Arc::new(mesh)]).unwrap());
-        Self { body, mesh: mesh_bytes, compiled, view }
+        let texture_bytes = Bytes::copy_from_slice(texture.bytes());
+        let compiled = Arc::new(CompiledScene::new(scene, [Arc::new(mesh)], [Arc::new(texture)]).unwrap());
+        Self { body, mesh: mesh_bytes, texture: texture_bytes, compiled, view }
     }
 
     pub(crate) fn height(&self) -> u32 {
@@ -99,10 +105,16 @@ fn pyramid() -> CompiledMesh {
         positions: vec![DVec3::Y, DVec3::X, DVec3::NEG_X, DVec3::Z],
         triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
         triangle_materials: vec![0; 4],
-        materials: vec![NamedMaterial { name: "plain".into(), material: Material::NEUTRAL }],
+        uvs: vec![[Vec2::ZERO, Vec2::new(3.0, 0.5), Vec2::new(0.5, 2.0)]; 4],
+        materials: vec![NamedMaterial { name: "plain".into(), material: Material::NEUTRAL, texture: None }],
         ..Mesh::default()
     };
     CompiledMesh::compile(&mesh).unwrap().0
+}
+
+fn stripes() -> Texture {
+    let pixels = (0..4 * 3 * 3).map(|i: u32| (i * 37 % 256) as u8).collect();
+    Texture::new(&RgbImage { width: 4, height: 3, pixels }).unwrap()
 }
 
 pub(crate) fn lease(frame: u64, rows: Range<u32>) -> Lease {
@@ -141,7 +153,7 @@ impl Link {
                 message => return Some(message),
             };
             self.asked += 1;
-            let assets = [&stage.body, &stage.mesh];
+            let assets = [&stage.body, &stage.mesh, &stage.texture];
             let bytes = assets.into_iter().find(|bytes| AssetId::of(bytes) == id).unwrap().clone();
             self.out.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await.unwrap();
             self.out.send(ToWorker::AssetChunk { id, offset: 0, bytes }).await.unwrap();

@@ -14,6 +14,8 @@ mod view;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -25,6 +27,7 @@ use table::{Table, tables_of};
 use value::Value;
 
 pub(super) use fault::{Fault, place};
+pub(super) use material::TextureText;
 pub(super) use objects::ModelText;
 pub(super) use view::{Aim, CameraText};
 
@@ -52,6 +55,8 @@ pub(super) struct SceneText {
     pub(super) background: Background,
     pub(super) lights: Vec<Light>,
     pub(super) materials: Vec<Material>,
+    /// By the index of their material.
+    pub(super) textures: BTreeMap<u32, TextureText>,
     pub(super) models: Vec<ModelText>,
     pub(super) spheres: Vec<Sphere>,
     pub(super) planes: Vec<Plane>,
@@ -112,13 +117,15 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let triangle = |table: Table<'_>| objects::triangle(table, &mut materials, reading);
     let triangles = list(top, "triangle", "[[triangle]]", objects::TRIANGLE_KEYS, triangle, first);
     reading.warnings.sort_by_key(|warning| warning.at);
+    let (materials, textures) = materials.into_parts();
     Some(SceneText {
         ambient: ambient?.unwrap_or(Vec3::ZERO),
         render: render?.unwrap_or_default(),
         camera: camera?,
         background: background?.unwrap_or(Background::Color(Vec3::ZERO)),
         lights,
-        materials: materials.into_values(),
+        materials,
+        textures,
         models,
         spheres,
         planes,

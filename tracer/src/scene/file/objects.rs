@@ -25,6 +25,8 @@ pub(crate) struct ModelText {
     pub(crate) at: usize,
     /// Overrides the model's own materials.
     pub(crate) material: Option<u32>,
+    /// Offset of that material's name in the text.
+    pub(crate) material_at: usize,
     pub(crate) normals: NormalMode,
     pub(crate) translate: DVec3,
     pub(crate) rotate: DVec3,
@@ -42,6 +44,7 @@ pub(super) fn model(table: Table<'_>, materials: &Materials) -> Read<ModelText> 
         file: PathBuf::from(name),
         at: file.start(),
         material: materials.referred(table)?,
+        material_at: table.get("material").map_or(0, |value| value.start()),
         normals: table.read("normals", |value| value.word(&modes))?.unwrap_or(NormalMode::Smooth),
         translate: table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
         rotate: table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
@@ -65,7 +68,7 @@ pub(super) fn sphere(table: Table<'_>, materials: &mut Materials) -> Read<Sphere
     Ok(Sphere {
         center: table.required("center")?.vector()?,
         radius: table.required("radius")?.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)?,
-        material: materials.referred_or_neutral(table)?,
+        material: materials.referred_plain(table, "use a material with a colour")?,
     })
 }
 
@@ -73,7 +76,8 @@ pub(super) fn plane(table: Table<'_>, materials: &mut Materials) -> Read<Plane> 
     Ok(Plane {
         point: table.required("point")?.vector()?,
         normal: table.required("normal")?.direction()?,
-        material: materials.referred_or_neutral(table)?,
+        material: materials
+            .referred_plain(table, "use a material with a colour, or two triangles with `uvs`")?,
     })
 }
 
@@ -83,16 +87,18 @@ pub(super) fn triangle(
     materials: &mut Materials,
     reading: &mut Reading,
 ) -> Read<Option<Triangle>> {
-    if let Some(uvs) = table.get("uvs") {
-        return Err(uvs.not_yet("a triangle with texture coordinates", "leave them out"));
-    }
     let value = table.required("vertices")?;
     let vertices = value.three_points()?;
-    let material = materials.referred_or_neutral(table)?;
+    let uvs = table.read("uvs", |value| value.three_uvs())?;
+    let material = match uvs {
+        Some(_) => materials.referred_or_neutral(table)?,
+        None => materials.referred_plain(table, "add `uvs`, or use a material with a colour")?,
+    };
+    let uvs = uvs.filter(|_| materials.has_texture(material));
     let [a, b, c] = vertices;
     if a == b || b == c || c == a {
         reading.warn(value.start(), format!("{value} has no area: the triangle is left out"));
         return Ok(None);
     }
-    Ok(Some(Triangle { vertices, material }))
+    Ok(Some(Triangle { vertices, uvs, material }))
 }

@@ -1,10 +1,10 @@
 //! Every class of fault, with its place and the words that help.
 
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::{Attenuation, LightKind, NormalMode};
+use crate::scene::{Attenuation, Filter, LightKind, NormalMode};
 
 /// A scene with one of everything, as the format's page shows it.
 const WHOLE: &str = r#"
@@ -265,15 +265,84 @@ fn features_that_are_not_built_yet_are_refused_by_name() {
         ("[background]\ncubemap = [\"a.png\"]", "2:11", &["`cubemap`", yet]),
         ("[background]\npanorama = \"sky.hdr\"", "2:12", &["`panorama`", yet]),
         ("[[light]]\nposition=[0,0,0]\nradius = 0.5", "3:10", &["`radius`", yet]),
-        ("[material.a]\ndiffuse = { texture = \"a.png\" }", "2:11", &["texture", yet]),
         ("[material.a]\nreflect = 0.1", "2:11", &["`reflect`", yet]),
         ("[material.a]\ntransmit = 1", "2:12", &["`transmit`", yet]),
-        (
-            "[[triangle]]\nvertices = [[0,0,0],[1,0,0],[0,1,0]]\nuvs = [[0,0],[1,0],[0,1]]",
-            "3:7",
-            &["`uvs`", yet],
-        ),
     ]);
+}
+
+const WOODEN: &str = "[material.wood]\ndiffuse = { texture = \"maps/wood.png\" }\n";
+const CORNERS: &str = "vertices = [[0,0,0],[1,0,0],[0,1,0]]\n";
+
+#[test]
+fn textures_and_texture_coordinates_are_read() {
+    let text = format!(
+        "{WOODEN}[material.pixels]\ndiffuse = {{ texture = \"a.png\", filter = \"nearest\" }}\n\
+         [material.red]\ndiffuse = [1, 0, 0]\n\
+         [[triangle]]\n{CORNERS}uvs = [[-7.25, 3], [1, 4.5], [-7, 5]]\nmaterial = \"wood\"\n\
+         [[triangle]]\n{CORNERS}uvs = [[0, 0], [1, 0], [0, 1]]\nmaterial = \"red\"\n\
+         [[model]]\nfile = \"a.obj\"\nmaterial = \"wood\"\n"
+    );
+    let scene = read(&text).unwrap();
+    let wood = scene.triangles[0].material;
+    let texture = &scene.textures[&wood];
+    assert_eq!((texture.file.to_str(), texture.filter), (Some("maps/wood.png"), Filter::Bilinear));
+    assert_eq!(place(&text, texture.at), (2, 23));
+    assert_eq!(scene.textures.values().filter(|texture| texture.filter == Filter::Nearest).count(), 1);
+    assert_eq!(scene.textures.len(), 2);
+    assert_eq!(scene.materials[wood as usize].diffuse, Vec3::ONE);
+    let uvs = [Vec2::new(0.75, 0.0), Vec2::new(9.0, 1.5), Vec2::new(1.0, 2.0)];
+    assert_eq!(scene.triangles[0].uvs, Some(uvs));
+    // Nothing asks for them there.
+    assert_eq!(scene.triangles[1].uvs, None);
+    assert_eq!(place(&text, scene.models[0].material_at), (17, 12));
+}
+
+#[test]
+fn faults_of_textures_name_their_place() {
+    let plain = "there are no texture coordinates";
+    let with = |rest: &str| format!("{WOODEN}{rest}");
+    let uvs = |uvs: &str| format!("[[triangle]]\n{CORNERS}uvs = {uvs}\n");
+    for (text, place, words) in [
+        (
+            "[material.a]\ndiffuse = { filter = \"nearest\" }".to_owned(),
+            "2:11",
+            &["`texture` is missing"][..],
+        ),
+        ("[material.a]\ndiffuse = { texture = 3 }".to_owned(), "2:23", &["`texture`", "a text in quotes"]),
+        ("[material.a]\ndiffuse = { texture = \"\" }".to_owned(), "2:23", &["the name of a picture"]),
+        (
+            "[material.a]\ndiffuse = { texture = \"a.png\", filter = \"linear\" }".to_owned(),
+            "2:41",
+            &["unknown word `linear`", "`filter` in `diffuse` in [material.a]", "bilinear"],
+        ),
+        (
+            "[material.a]\ndiffuse = { texture = \"a.png\", scale = 2 }".to_owned(),
+            "2:32",
+            &["unknown key `scale`", "`filter`"],
+        ),
+        (
+            with("[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial=\"wood\""),
+            "6:10",
+            &["`material` in [[sphere]] has a texture", plain, "with a colour"],
+        ),
+        (
+            with("[[plane]]\npoint=[0,0,0]\nnormal=[0,1,0]\nmaterial=\"wood\""),
+            "6:10",
+            &["[[plane]]", plain, "triangles"],
+        ),
+        (
+            with(&format!("[[triangle]]\n{CORNERS}material=\"wood\"")),
+            "5:10",
+            &["[[triangle]]", plain, "`uvs`"],
+        ),
+        (uvs("[[0,0],[1,0]]"), "3:7", &["three pairs"]),
+        (uvs("[[0,0],[1,0],[0,1,2]]"), "3:7", &["three pairs"]),
+        (uvs("[[0,0],[1,0],[0,nan]]"), "3:7", &["finite numbers up to 1e6"]),
+        (uvs("[[0,0],[1,0],[0,2e6]]"), "3:7", &["finite numbers up to 1e6"]),
+        (uvs("7"), "3:7", &["three pairs", "but is 7"]),
+    ] {
+        assert_faults(&[(&text, place, words)]);
+    }
 }
 
 #[test]

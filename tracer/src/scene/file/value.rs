@@ -2,12 +2,13 @@
 
 use std::ops::RangeInclusive;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use toml::Spanned;
 use toml::de::DeValue;
 
 use super::super::MAX_COORDINATE;
 use super::fault::{Fault, Read, shortened, suggestion};
+use crate::texture::without_repeats;
 
 /// A value and the key it belongs to.
 #[derive(Clone, Copy)]
@@ -108,6 +109,24 @@ impl<'t> Value<'t> {
             _ => Err(self.must_be_at(item, expected)),
         };
         Ok([point(a)?, point(b)?, point(c)?])
+    }
+
+    /// Three pairs of texture coordinates, whole repeats taken off.
+    pub(super) fn three_uvs(&self) -> Read<[Vec2; 3]> {
+        let expected = "an array of three pairs of finite numbers up to 1e6";
+        let pairs = self.value.get_ref().as_array().and_then(|pairs| {
+            let pair = |item: &Spanned<DeValue<'_>>| {
+                let numbers: Vec<f64> = item
+                    .get_ref()
+                    .as_array()?
+                    .iter()
+                    .map(|item| finite(item.get_ref()))
+                    .collect::<Option<_>>()?;
+                <[f64; 2]>::try_from(numbers).ok().map(DVec2::from_array)
+            };
+            <[DVec2; 3]>::try_from(pairs.iter().map(pair).collect::<Option<Vec<_>>>()?).ok()
+        });
+        pairs.and_then(without_repeats).ok_or_else(|| self.must_be(expected))
     }
 
     fn vector_of<'a>(

@@ -9,7 +9,8 @@ fn box_mesh(lower: DVec3, upper: DVec3) -> CompiledMesh {
         normals: Vec::new(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         triangle_materials: vec![0, 0],
-        materials: vec![NamedMaterial { name: "a".into(), material: Material::NEUTRAL }],
+        uvs: Vec::new(),
+        materials: vec![NamedMaterial { name: "a".into(), material: Material::NEUTRAL, texture: None }],
     };
     CompiledMesh::compile(&mesh).unwrap().0
 }

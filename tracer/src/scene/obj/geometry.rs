@@ -1,7 +1,7 @@
 //! The first reading of an OBJ text: every line is checked where its number is still known, and what remains is plain
 //! geometry that the parser behind it reads without surprises: `v`, `vn` and `f` lines with positive indices that
-//! exist. Materials are noted beside it. Texture coordinates are dropped: nothing draws them yet, and seams in them
-//! would split the vertices that normals are averaged over.
+//! exist. Materials are noted beside it. Texture coordinates are left to [`super::uvs`]: seams in them would split the
+//! vertices that normals are averaged over.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

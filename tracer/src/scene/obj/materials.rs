@@ -11,9 +11,11 @@ use super::super::read::{MAX_LIBRARY_BYTES, bytes};
 use super::super::warnings::Warnings;
 use super::super::{MAX_EXPONENT, Material};
 use super::lines::{Line, lines};
+use super::picture::{Place, picture};
+use crate::mesh::NamedMaterial;
 
 /// Materials by the name that `usemtl` gives.
-pub(super) type Library = BTreeMap<String, Material>;
+pub(super) type Library = BTreeMap<String, NamedMaterial>;
 
 /// Adds the materials of the libraries that an `mtllib` line names. Whether all of them could be read, and warnings
 /// about what stands in them.
@@ -31,7 +33,8 @@ pub(super) fn load(
         match read(folder, name) {
             Ok((path, text)) => {
                 let mut about = Warnings::about(&path);
-                library.extend(parse(&text, &mut about));
+                let inner = path.strip_prefix(folder).ok().and_then(Path::parent).unwrap_or(Path::new(""));
+                library.extend(parse(&text, &Place { folder, inner }, &mut about));
                 messages.extend(about.into_messages());
             }
             Err(reason) => {
@@ -70,10 +73,10 @@ fn inside(name: &str) -> Option<PathBuf> {
 }
 
 /// The materials of a library's text.
-fn parse(text: &str, warnings: &mut Warnings) -> Library {
+fn parse(text: &str, place: &Place<'_>, warnings: &mut Warnings) -> Library {
     let mut clean = String::new();
     for line in lines(text) {
-        match statement(&line, warnings) {
+        match statement(&line, place, warnings) {
             Ok(statement) => clean.push_str(&statement),
             Err(message) => warnings.at_line(line.number, format!("{message}; the line is left out")),
         }
@@ -84,11 +87,11 @@ fn parse(text: &str, warnings: &mut Warnings) -> Library {
         warnings.at_file("the material library cannot be read, and is left out");
         return Library::new();
     };
-    materials.into_iter().map(|material| (material.name.clone(), convert(&material))).collect()
+    materials.into_iter().map(|material| (material.name.clone(), convert(material))).collect()
 }
 
 /// The line as the parser is to see it; empty for what nobody draws.
-fn statement(line: &Line<'_>, warnings: &mut Warnings) -> Result<String, String> {
+fn statement(line: &Line<'_>, place: &Place<'_>, warnings: &mut Warnings) -> Result<String, String> {
     let keyword = line.keyword();
     match keyword {
         "newmtl" if line.rest().is_empty() => Err("`newmtl` without a name".into()),
@@ -109,10 +112,7 @@ fn statement(line: &Line<'_>, warnings: &mut Warnings) -> Result<String, String>
             }
             Ok(String::new())
         }
-        "map_Kd" => {
-            warnings.at_line(line.number, "textures are not supported yet: drawn with `Kd` alone");
-            Ok(String::new())
-        }
+        "map_Kd" => Ok(format!("map_Kd {}\n", picture(line, place, warnings)?)),
         _ => Ok(String::new()),
     }
 }
@@ -148,15 +148,22 @@ fn shortened(line: &Line<'_>) -> String {
     line.text.chars().take(60).collect()
 }
 
-fn convert(material: &tobj::Material) -> Material {
+fn convert(material: tobj::Material) -> NamedMaterial {
     let color = |[r, g, b]: [f64; 3]| Vec3::new(r as f32, g as f32, b as f32);
     // Illumination models 0 and 1 have no highlights.
     let matt = material.illumination_model.is_some_and(|model| model < 2);
-    Material {
-        diffuse: material.diffuse.map_or(Material::NEUTRAL.diffuse, color),
+    let diffuse = match (material.diffuse.map(color), &material.diffuse_texture) {
+        // `Kd` is a factor of the texel. Some programs write 0 for "the map alone", which would be black.
+        (None | Some(Vec3::ZERO), Some(_)) => Vec3::ONE,
+        (diffuse, _) => diffuse.unwrap_or(Material::NEUTRAL.diffuse),
+    };
+    let converted = Material {
+        diffuse,
         specular: material.specular.filter(|_| !matt).map_or(Vec3::ZERO, color),
         exponent: material.shininess.map_or(Material::NEUTRAL.exponent, |ns| ns as f32),
-    }
+        texture: None,
+    };
+    NamedMaterial { name: material.name, material: converted, texture: material.diffuse_texture }
 }
 
 #[cfg(test)]
@@ -165,7 +172,8 @@ mod tests {
 
     fn parsed(text: &str) -> (Library, Vec<String>) {
         let mut warnings = Warnings::about(Path::new("a.mtl"));
-        let library = parse(text, &mut warnings);
+        let place = Place { folder: Path::new("no such folder"), inner: Path::new("") };
+        let library = parse(text, &place, &mut warnings);
         (library, warnings.into_messages())
     }
 
@@ -175,23 +183,24 @@ mod tests {
                     illum 2\nnewmtl grey\nKd 0.5\nnewmtl matt\nKs 1 1 1\nillum 1\nd 1.0\nTr 0\n";
         let (library, warnings) = parsed(text);
         assert_eq!(warnings, [""; 0]);
-        let red = library["dark red # 2"];
+        let red = library["dark red # 2"].material;
         assert_eq!((red.diffuse, red.specular), (Vec3::new(0.5, 0.0, 0.0), Vec3::splat(0.25)));
         assert_eq!(red.exponent, 12.0);
-        assert_eq!(library["grey"].diffuse, Vec3::splat(0.5));
-        assert_eq!(library["matt"].specular, Vec3::ZERO);
+        assert_eq!(library["grey"].material.diffuse, Vec3::splat(0.5));
+        assert_eq!(library["matt"].material.specular, Vec3::ZERO);
     }
 
     #[test]
     fn what_cannot_be_drawn_is_told_with_its_line() {
         let text =
-            "newmtl a\nKd red\nmap_Kd wood.png\nd 0.5\nKs 2 0 0\nNs 1e9\nKd 0.1 nan 0.3\nnewmtl\nKd 1 1";
+            "newmtl a\nKd red\nmap_Kd ../wood.png\nd 0.5\nKs 2 0 0\nNs 1e9\nKd 0.1 nan 0.3\nnewmtl\nKd 1 1";
         let (library, warnings) = parsed(text);
-        assert_eq!(library["a"].diffuse, Material::NEUTRAL.diffuse);
-        assert_eq!((library["a"].specular, library["a"].exponent), (Vec3::X, 1e6));
+        let a = library["a"].material;
+        assert_eq!(a.diffuse, Material::NEUTRAL.diffuse);
+        assert_eq!((a.specular, a.exponent), (Vec3::X, 1e6));
         let expected = [
             "a.mtl:2: `Kd red`: three numbers",
-            "a.mtl:3: textures are not supported yet",
+            "a.mtl:3: the picture `../wood.png` lies outside",
             "a.mtl:4: transparency is not supported yet",
             "a.mtl:5: `Ks 2 0 0`: taken to the nearest value from 0 to 1",
             "a.mtl:6: `Ns 1e9`: taken",
@@ -203,6 +212,21 @@ mod tests {
         for (warning, start) in warnings.iter().zip(expected) {
             assert!(warning.starts_with(start), "{warning} / {start}");
         }
+    }
+
+    #[test]
+    fn kd_is_a_factor_of_the_texture_unless_it_hides_it() {
+        let text = "newmtl a\nKd 0.5 1 1\nmap_Kd -clamp on maps\\wood one.png\nnewmtl b\nmap_Kd b.png\n\
+                    newmtl c\nKd 0 0 0\nmap_Kd c.png\nnewmtl d\nKd 0 0 0\nnewmtl e\nmap_Kd -s 2\n";
+        let (library, warnings) = parsed(text);
+        let found = |name: &str| (library[name].material.diffuse, library[name].texture.as_deref());
+        assert_eq!(found("a"), (Vec3::new(0.5, 1.0, 1.0), Some("maps/wood one.png")));
+        assert_eq!(found("b"), (Vec3::ONE, Some("b.png")));
+        assert_eq!(found("c"), (Vec3::ONE, Some("c.png")));
+        assert_eq!(found("d"), (Vec3::ZERO, None));
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
+        assert!(warnings[0].starts_with("a.mtl:3: -clamp: options of textures are left out"), "{warnings:?}");
+        assert!(warnings[1].starts_with("a.mtl:12: `map_Kd` names no picture"), "{warnings:?}");
     }
 
     #[test]

@@ -6,6 +6,9 @@
 mod geometry;
 mod lines;
 mod materials;
+mod picture;
+mod slots;
+mod uvs;
 
 #[cfg(test)]
 mod tests;
@@ -15,32 +18,46 @@ use std::collections::{BTreeMap, HashMap};
 use std::panic::catch_unwind;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
+use super::SceneError;
 use super::read::{MAX_MODEL_BYTES, bytes};
 use super::warnings::Warnings;
-use super::{Material, SceneError};
-use crate::mesh::{Mesh, NamedMaterial};
+use crate::mesh::Mesh;
 use geometry::{Geometry, MaterialRun};
 use materials::Library;
+use slots::{assign_materials, find};
+
+/// When a mesh is to carry the texture coordinates that its file gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Uvs {
+    /// No texture is laid on it.
+    Never,
+    /// Where a material of its own has a texture.
+    Textured,
+    /// Whenever there are any: somebody else's texture may be laid on it.
+    Always,
+}
 
 /// Reads a model. With it come warnings about what was left out.
 ///
 /// # Errors
 /// A file that cannot be read, a line that is no OBJ, an index that points nowhere, a used vertex that is not finite,
 /// a file without faces.
-pub(super) fn load(path: &Path) -> Result<(Mesh, Vec<String>), SceneError> {
+pub(super) fn load(path: &Path, wanted: Uvs) -> Result<(Mesh, Vec<String>), SceneError> {
     let content = bytes(path, MAX_MODEL_BYTES)?;
     let mut warnings = Warnings::about(path);
     let geometry = read_geometry(path, &content, &mut warnings)?;
-    drop(content);
     let triangles: usize = geometry.runs.iter().map(|run| run.triangles).sum();
     if triangles == 0 {
         return Err(SceneError::in_file(path, "no faces in the file; a model needs at least one `f` line"));
     }
     let (library, messages) = read_libraries(path, &geometry, &mut warnings);
+    let uvs = read_uvs(&content, wanted, &geometry, &library, &mut warnings);
+    drop(content);
     let mut mesh = parse(path, &geometry.text, triangles, &mut warnings)?;
-    assign_materials(path, &mut mesh, &geometry.runs, &library)?;
+    assign_materials(path, &mut mesh, &geometry.runs, &library, uvs.as_deref())?;
+    mesh.uvs = uvs.into_iter().flatten().map(Option::unwrap_or_default).collect();
     let mut all = warnings.into_messages();
     all.extend(messages);
     Ok((mesh, all))
@@ -94,10 +111,37 @@ fn warn_of_unknown(runs: &[MaterialRun], library: &Library, warnings: &mut Warni
     }
 }
 
-/// The material of a name; some writers put a comment behind it.
-fn find(library: &Library, name: &str) -> Option<Material> {
-    let bare = || name.split_once(" #").and_then(|(bare, _)| library.get(bare.trim_end()));
-    library.get(name).or_else(bare).copied()
+/// Texture coordinates of each triangle, where they are wanted and there are any.
+fn read_uvs(
+    content: &[u8],
+    wanted: Uvs,
+    geometry: &Geometry,
+    library: &Library,
+    warnings: &mut Warnings,
+) -> Option<Vec<Option<[Vec2; 3]>>> {
+    let has_texture = |run: &MaterialRun| {
+        let material = run.material.as_deref().and_then(|name| find(library, name));
+        run.triangles > 0 && material.is_some_and(|material| material.texture.is_some())
+    };
+    let textured = wanted != Uvs::Never && geometry.runs.iter().any(has_texture);
+    if !textured && wanted != Uvs::Always {
+        return None;
+    }
+    let uvs = uvs::read(&String::from_utf8_lossy(content));
+    let missing = uvs.iter().filter(|uvs| uvs.is_none()).count();
+    if missing == uvs.len() {
+        if textured {
+            warnings.at_file("its materials have textures, but no face has texture coordinates (`vt`): drawn with `Kd` alone");
+        }
+        return None;
+    }
+    if missing > 0 {
+        warnings.at_file(format!(
+            "triangles without texture coordinates that are finite and at most 1e6: {missing}; \
+             they are drawn with `Kd` alone, or with the texel at (0, 0) where the scene gives the texture"
+        ));
+    }
+    Some(uvs)
 }
 
 fn parse(path: &Path, text: &str, triangles: usize, warnings: &mut Warnings) -> Result<Mesh, SceneError> {
@@ -149,31 +193,4 @@ fn welded(mesh: Mesh) -> Mesh {
 
 fn points(numbers: &[f64]) -> impl Iterator<Item = DVec3> {
     numbers.chunks_exact(3).map(DVec3::from_slice)
-}
-
-/// Gives every triangle its slot; a slot for each material that triangles use, in the order of their first use.
-fn assign_materials(
-    path: &Path,
-    mesh: &mut Mesh,
-    runs: &[MaterialRun],
-    library: &Library,
-) -> Result<(), SceneError> {
-    let mut slots: BTreeMap<Option<&str>, u16> = BTreeMap::new();
-    for run in runs.iter().filter(|run| run.triangles > 0) {
-        let name = run.material.as_deref();
-        let slot = match slots.get(&name) {
-            Some(slot) => *slot,
-            None => {
-                let slot = u16::try_from(mesh.materials.len()).map_err(|_| {
-                    SceneError::in_file(path, "more than 65536 materials are used; merge some of them")
-                })?;
-                let material = name.and_then(|name| find(library, name)).unwrap_or(Material::NEUTRAL);
-                mesh.materials.push(NamedMaterial { name: name.unwrap_or("neutral").to_owned(), material });
-                slots.insert(name, slot);
-                slot
-            }
-        };
-        mesh.triangle_materials.extend(std::iter::repeat_n(slot, run.triangles));
-    }
-    Ok(())
 }

@@ -1,4 +1,6 @@
-use super::super::{NormalMode, Plane, Sphere, Triangle};
+use glam::Vec2;
+
+use super::super::{Filter, NormalMode, Plane, Sphere, TextureMap};
 use super::*;
 
 fn scene() -> Scene {
@@ -21,6 +23,7 @@ fn scene() -> Scene {
             light(LightKind::Directional { direction }),
         ],
         materials: vec![Material::NEUTRAL; 2],
+        textures: vec![],
         models: vec![Model {
             mesh: MeshId([7; 32]),
             materials: vec![0, 1],
@@ -31,7 +34,7 @@ fn scene() -> Scene {
         }],
         spheres: vec![Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 }],
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1 }],
-        triangles: vec![Triangle { vertices: [DVec3::X, DVec3::Y, DVec3::Z], material: 1 }],
+        triangles: vec![Triangle { vertices: [DVec3::X, DVec3::Y, DVec3::Z], uvs: None, material: 1 }],
     }
 }
 
@@ -86,6 +89,37 @@ fn numbers_out_of_bounds_are_found_by_name() {
     for (spoil, name) in cases {
         let message = spoiled(spoil);
         assert!(message.contains(name), "{message} / {name}");
+    }
+}
+
+#[test]
+fn textures_are_listed_and_laid_on_what_has_coordinates() {
+    let textured = |s: &mut Scene| {
+        s.textures = vec![TextureMap { texture: TextureId([3; 32]), filter: Filter::Nearest }];
+        s.materials.push(Material { texture: Some(0), ..Material::NEUTRAL });
+    };
+    let mut sound = scene();
+    textured(&mut sound);
+    (sound.triangles[0].material, sound.triangles[0].uvs) = (2, Some([Vec2::ZERO; 3]));
+    sound.models[0].materials[0] = 2;
+    assert_eq!(sound.validate(), Ok(()));
+    assert_eq!(sound.texture_ids(), BTreeSet::from([TextureId([3; 32])]));
+
+    let message = spoiled(|s| s.materials[1].texture = Some(0));
+    assert_eq!(message, "materials[1].texture must be one of the scene's textures");
+    type Spoil = fn(&mut Scene);
+    let cases: [(Spoil, &str); 4] = [
+        (|s| s.spheres[0].material = 2, "spheres[0].material must be without a texture"),
+        (|s| s.planes[0].material = 2, "planes[0].material must be without a texture"),
+        (|s| s.triangles[0].material = 2, "triangles[0].material must be without a texture"),
+        (|s| s.triangles[0].uvs = Some([Vec2::NAN; 3]), "triangles[0].uvs must be finite"),
+    ];
+    for (spoil, expected) in cases {
+        let message = spoiled(|s| {
+            textured(s);
+            spoil(s);
+        });
+        assert!(message.starts_with(expected), "{message}");
     }
 }
 

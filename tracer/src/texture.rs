@@ -1,0 +1,297 @@
+//! Pictures on surfaces.
+//!
+//! A texture is one immutable blob of bytes, named by its BLAKE3 hash, as compiled meshes are: made on the master from a
+//! picture, sent to every worker as it is. Sixteen bytes of header (magic, version, width, height, little endian), then
+//! three sRGB bytes a texel, rows from bottom to top: that is how v counts.
+
+use std::fmt;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec2, Vec2};
+use serde::{Deserialize, Serialize};
+
+use crate::image::{MAX_SIDE, RgbImage};
+
+/// First bytes of a texture.
+pub const MAGIC: [u8; 6] = *b"RFTEXM";
+
+/// Version of the layout of textures.
+pub const FORMAT_VERSION: u16 = 1;
+
+/// Most texels of one texture: 8192 x 8192, 192 MiB.
+pub const MAX_TEXELS: u64 = 1 << 26;
+
+/// Largest texture coordinate, in magnitude. A triangle over which a picture repeats more often than once a pixel shows
+/// noise in any case.
+pub const MAX_UV: f64 = 1e6;
+
+/// Largest texture coordinate once whole repeats are taken off: see [`without_repeats`].
+const MAX_STORED_UV: f32 = 2e6 + 1.0;
+
+/// The name of a texture: BLAKE3 of its bytes.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct TextureId(pub [u8; 32]);
+
+impl fmt::Display for TextureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl fmt::Debug for TextureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "TextureId({:02x}{:02x}{:02x}{:02x})", self.0[0], self.0[1], self.0[2], self.0[3])
+    }
+}
+
+/// Why a picture cannot be a texture, or bytes are none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TextureError {
+    /// More texels than a texture may have.
+    #[error(
+        "a texture of {width} x {height} texels; at most {MAX_TEXELS} (8192 x 8192) are allowed: make the picture smaller"
+    )]
+    TooLarge {
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// No texel at all.
+    #[error("a texture of {width} x {height} texels; it needs at least one")]
+    Empty {
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The bytes are no texture of this version.
+    #[error("not a texture that this version reads: {0}")]
+    Format(String),
+}
+
+/// Fixed part of a texture.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Header {
+    magic: [u8; 6],
+    version: u16,
+    width: u32,
+    height: u32,
+}
+
+const HEADER_BYTES: usize = size_of::<Header>();
+
+const _: () = assert!(HEADER_BYTES == 16);
+
+impl Header {
+    fn read(bytes: &[u8]) -> Result<Self, TextureError> {
+        let format = |what: String| Err(TextureError::Format(what));
+        if !bytes.starts_with(&MAGIC) {
+            return format("it does not start with RFTEXM".into());
+        }
+        let Some(fixed) = bytes.get(..HEADER_BYTES) else {
+            return format(format!("{} bytes are too few for a header", bytes.len()));
+        };
+        let header: Header = bytemuck::pod_read_unaligned(fixed);
+        if header.version != FORMAT_VERSION {
+            let version = header.version;
+            return format(format!("it has format version {version}, this program reads {FORMAT_VERSION}"));
+        }
+        check_size(header.width, header.height)?;
+        let needed = HEADER_BYTES as u64 + 3 * u64::from(header.width) * u64::from(header.height);
+        if bytes.len() as u64 != needed {
+            return format(format!("its header announces {needed} bytes, there are {}", bytes.len()));
+        }
+        Ok(header)
+    }
+}
+
+/// Refuses a size that no texture may have.
+pub(crate) fn check_size(width: u32, height: u32) -> Result<(), TextureError> {
+    if width == 0 || height == 0 {
+        return Err(TextureError::Empty { width, height });
+    }
+    let too_large =
+        width > MAX_SIDE || height > MAX_SIDE || u64::from(width) * u64::from(height) > MAX_TEXELS;
+    if too_large { Err(TextureError::TooLarge { width, height }) } else { Ok(()) }
+}
+
+/// A picture for surfaces. It repeats without end in both directions.
+pub struct Texture {
+    bytes: Vec<u8>,
+    width: u32,
+    height: u32,
+    id: TextureId,
+}
+
+impl fmt::Debug for Texture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Texture({:?}, {} x {})", self.id, self.width, self.height)
+    }
+}
+
+impl Texture {
+    /// Makes a texture of a picture.
+    ///
+    /// # Errors
+    /// A picture that is empty or too large.
+    pub fn new(picture: &RgbImage) -> Result<Self, TextureError> {
+        let RgbImage { width, height, ref pixels } = *picture;
+        check_size(width, height)?;
+        let header = Header { magic: MAGIC, version: FORMAT_VERSION, width, height };
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + pixels.len());
+        bytes.extend_from_slice(bytemuck::bytes_of(&header));
+        for row in pixels.chunks_exact(width as usize * 3).rev() {
+            bytes.extend_from_slice(row);
+        }
+        Self::from_vec(bytes)
+    }
+
+    /// Takes the bytes of a texture from a peer, and checks them.
+    ///
+    /// # Errors
+    /// Bytes that are no texture of this version, or one that is too large.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, TextureError> {
+        // Before anything is copied: the header must fit the length.
+        Header::read(bytes)?;
+        Self::from_vec(bytes.to_vec())
+    }
+
+    fn from_vec(bytes: Vec<u8>) -> Result<Self, TextureError> {
+        let Header { width, height, .. } = Header::read(&bytes)?;
+        let id = TextureId(*blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes());
+        Ok(Self { bytes, width, height, id })
+    }
+
+    /// The bytes, as they are sent.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// BLAKE3 of the bytes.
+    pub fn id(&self) -> TextureId {
+        self.id
+    }
+
+    /// Texels in a row.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The sRGB bytes of the texel in column `x`, from the left, of row `y`, from the bottom; black outside.
+    #[inline(always)]
+    pub(crate) fn texel(&self, x: u32, y: u32) -> [u8; 3] {
+        let first = HEADER_BYTES + 3 * (y as usize * self.width as usize + x as usize);
+        // Four bytes at once, with the one before: there is always one, if only the header's last.
+        match self.bytes.get(first - 1..first + 3) {
+            Some(&[_, r, g, b]) => [r, g, b],
+            _ => [0; 3],
+        }
+    }
+}
+
+/// Texture coordinates of a triangle with whole repeats of the picture taken off, so that the least of each is in [0, 1) and
+/// `f32` keeps its digits; `None` when one is not finite or beyond [`MAX_UV`].
+pub fn without_repeats(uvs: [DVec2; 3]) -> Option<[Vec2; 3]> {
+    let fits = uvs.iter().all(|uv| uv.abs().cmple(DVec2::splat(MAX_UV)).all());
+    let whole = uvs[0].min(uvs[1]).min(uvs[2]).floor();
+    fits.then(|| uvs.map(|uv| (uv - whole).as_vec2()))
+}
+
+/// Whether a texture coordinate from elsewhere is one that [`without_repeats`] may have made.
+pub(crate) fn is_usable(uv: Vec2) -> bool {
+    // False for NaN.
+    uv.to_array().iter().all(|c| (0.0..=MAX_STORED_UV).contains(c))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn picture(width: u32, height: u32) -> RgbImage {
+        let pixels = (0..width * height * 3).map(|i| (i * 7 % 256) as u8).collect();
+        RgbImage { width, height, pixels }
+    }
+
+    #[test]
+    fn texels_stand_where_the_picture_has_them_bottom_row_first() {
+        let picture = picture(5, 3);
+        let texture = Texture::new(&picture).unwrap();
+        for (x, y) in (0..3).flat_map(|y| (0..5).map(move |x| (x, y))) {
+            assert_eq!(Some(texture.texel(x, 2 - y)), picture.pixel(x, y));
+        }
+        assert_eq!(texture.texel(0, 3), [0; 3]);
+        let again = Texture::from_bytes(texture.bytes()).unwrap();
+        assert_eq!((again.id(), again.width(), again.height()), (texture.id(), 5, 3));
+    }
+
+    #[test]
+    fn sizes_are_bounded_before_memory_is_taken() {
+        let announced = |width: u32, height: u32| {
+            let header = Header { magic: MAGIC, version: FORMAT_VERSION, width, height };
+            Texture::from_bytes(bytemuck::bytes_of(&header)).unwrap_err()
+        };
+        for (width, height) in [(u32::MAX, u32::MAX), (16384, 8192), (16385, 1)] {
+            assert_eq!(announced(width, height), TextureError::TooLarge { width, height });
+        }
+        assert_eq!(announced(0, 7), TextureError::Empty { width: 0, height: 7 });
+        assert!(announced(8192, 8192).to_string().contains("announces 201326608 bytes, there are 16"));
+        assert!(Texture::new(&picture(0, 0)).unwrap_err().to_string().contains("needs at least one"));
+    }
+
+    #[test]
+    fn other_bytes_are_told_apart() {
+        for (bytes, words) in [
+            (&b"RFMESH"[..], "does not start with RFTEXM"),
+            (b"RFTEXM", "6 bytes are too few"),
+            (b"RFTEXM\x09\x00\x01\x00\x00\x00\x01\x00\x00\x00abc", "format version 9"),
+        ] {
+            let message = Texture::from_bytes(bytes).unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn whole_repeats_are_taken_off_and_nothing_else() {
+        let uvs = |x: f64| [DVec2::new(x, 0.25), DVec2::new(x + 1.5, -0.5), DVec2::new(x + 0.25, 0.0)];
+        let near = without_repeats(uvs(0.125)).unwrap();
+        assert_eq!(near, [Vec2::new(0.125, 1.25), Vec2::new(1.625, 0.5), Vec2::new(0.375, 1.0)]);
+        for whole in [-999_999.0, -7.0, 3.0, 999_998.0] {
+            assert_eq!(without_repeats(uvs(whole + 0.125)), Some(near));
+        }
+        assert!(near.into_iter().all(is_usable));
+        for odd in [f64::NAN, f64::INFINITY, 1.1e6, -1e300] {
+            assert_eq!(without_repeats(uvs(odd)), None);
+        }
+        let wide = without_repeats([DVec2::splat(-1e6), DVec2::splat(1e6), DVec2::ZERO]).unwrap();
+        assert!(wide.into_iter().all(is_usable));
+        assert!(![f32::NAN, -0.1, 1e7].into_iter().any(|c| is_usable(Vec2::new(0.5, c))));
+    }
+
+    proptest! {
+        #[test]
+        fn changed_bytes_are_refused_or_still_a_sound_texture(
+            changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..5),
+            cut in 0_usize..4,
+        ) {
+            let mut bytes = Texture::new(&picture(4, 3)).unwrap().bytes().to_vec();
+            bytes.truncate(bytes.len() - cut);
+            for (index, value) in changes {
+                let at = index.index(bytes.len());
+                bytes[at] = value;
+            }
+            if let Ok(texture) = Texture::from_bytes(&bytes) {
+                prop_assert_eq!(u64::from(texture.width()) * u64::from(texture.height()), 12);
+                texture.texel(texture.width() - 1, texture.height() - 1);
+            }
+        }
+    }
+}
