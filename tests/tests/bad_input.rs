@@ -42,6 +42,11 @@ fn mistakes_in_a_scene_are_named_with_line_and_remedy() {
         ("look_at = [0.0, 0.3, 0.0]", "look_at = [0.0, nan, 0.0]", &["changed.toml:", "look_at"]),
         ("fov = 45.0", "kind = \"fisheye\"", &["changed.toml:", "fisheye", "not supported yet"]),
         ("exponent = 30.0", "reflect = 0.5", &["changed.toml:", "reflect", "not supported yet"]),
+        (
+            "diffuse = [0.7, 0.4, 0.3]",
+            "diffuse = { texture = \"clay.png\" }",
+            &["changed.toml:", "[[sphere]]", "texture"],
+        ),
         ("bumps.obj", "hills.obj", &["hills.obj"]),
         ("[render]", "[render", &["changed.toml:"]),
     ] {

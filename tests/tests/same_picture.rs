@@ -1,7 +1,7 @@
 //! The same picture, whoever renders it: workers, threads and policies change no byte.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
@@ -30,7 +30,7 @@ fn render(scene: &Path, output: &Path, more: &[&str]) -> serde_json::Value {
 fn traced(scene: &Path) -> RgbImage {
     let loaded = load(scene).unwrap();
     let view = FrameView::of(&loaded.scene);
-    let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes).unwrap());
+    let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap());
     let mut image = RgbImage::new(view.width, view.height);
     render_rows(&PreparedFrame::new(compiled, &view).unwrap(), 0..view.height, &mut image.pixels, &|| false)
         .unwrap();
@@ -78,6 +78,60 @@ fn a_compiled_model_renders_as_its_source_does() {
     let [a, b] = [(&source, "a.png"), (&compiled, "b.png")]
         .map(|(model, name)| render(model, &scenes.path(name), &size)["blake3"].clone());
     assert_eq!(a, b);
+}
+
+/// A model with its own texture, and single triangles under a repeated one.
+fn write_textured(scenes: &Scenes) -> PathBuf {
+    for (name, side) in [("wood.png", 16), ("tile.png", 5)] {
+        let pixels = (0..side * side * 3).map(|i: u32| (i.wrapping_mul(0x9e37_79b1) >> 24) as u8).collect();
+        rayfarm_tracer::image::save(&scenes.path(name), &RgbImage { width: side, height: side, pixels })
+            .unwrap();
+    }
+    scenes.write("wood.mtl", "newmtl wood\nKd 0.9 1 0.8\nmap_Kd wood.png\n");
+    let head = "mtllib wood.mtl\nusemtl wood\nv -1 0 0\nv 1 0 0\nv 1 1.5 -0.3\nv -1 1.5 -0.3\n";
+    scenes.write("sheet.obj", format!("{head}vt -0.5 0\nvt 2 0\nvt 2 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"));
+    let triangle = |vertices: &str, uvs: &str| {
+        format!("[[triangle]]\nvertices = [{vertices}]\nuvs = [{uvs}]\nmaterial = \"tile\"\n")
+    };
+    let floor = triangle("[-3, 0, 2], [3, 0, 2], [3, 0, -3]", "[0, 0], [6, 0], [6, 5]")
+        + &triangle("[-3, 0, 2], [3, 0, -3], [-3, 0, -3]", "[0, 0], [6, 5], [0, 5]");
+    let text = format!(
+        "render = {{ width = 160, height = 120 }}\n[camera]\nposition = [0.5, 1.5, 4]\nlook_at = [0, 0.6, 0]\n\
+         [[light]]\nkind = \"point\"\nposition = [2, 4, 3]\n\
+         [material.tile]\ndiffuse = {{ texture = \"tile.png\", filter = \"nearest\" }}\n\
+         [[model]]\nfile = \"sheet.obj\"\n{floor}"
+    );
+    scenes.write("textured.toml", text)
+}
+
+#[test]
+fn textures_travel_with_the_scene() {
+    let scenes = Scenes::new();
+    let scene = write_textured(&scenes);
+    let loaded = load(&scene).unwrap();
+    assert_eq!((loaded.textures.len(), loaded.warnings), (2, vec![]));
+    let expected = traced(&scene);
+    for workers in ["1", "2"] {
+        let output = scenes.path("textured.png");
+        let report = render(&scene, &output, &["--local-workers", workers, "--threads", "1"]);
+        assert!(rayfarm_tracer::image::load(&output).unwrap() == expected, "{workers} workers");
+        assert_eq!(report["workers"], workers.parse::<u32>().unwrap());
+    }
+    // The sheet shows its picture: without it another one is rendered.
+    scenes.write("wood.mtl", "newmtl wood\nKd 0.9 1 0.8\n");
+    assert!(traced(&scene) != expected);
+}
+
+#[test]
+fn a_compiled_model_in_another_folder_finds_its_textures() {
+    let scenes = Scenes::new();
+    write_textured(&scenes);
+    std::fs::create_dir(scenes.path("compiled")).unwrap();
+    let (source, compiled) = (scenes.path("sheet.obj"), scenes.path("compiled/sheet.rfm"));
+    let mut compile = master();
+    compile.arg("compile").arg(&source).arg("-o").arg(&compiled);
+    Running::start(&mut compile).finish().expect_success();
+    assert!(traced(&source) == traced(&compiled));
 }
 
 #[test]

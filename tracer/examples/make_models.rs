@@ -1,4 +1,4 @@
-//! Writes the meshes of `models/`: everything that comes with the project to look at is made here.
+//! Writes the meshes and textures of `models/`: everything that comes with the project to look at is made here.
 //!
 //! `cargo run --release -p rayfarm-tracer --example make_models -- models`
 //!
@@ -10,6 +10,9 @@ use std::process::ExitCode;
 
 #[path = "make_models/mod.rs"]
 mod generator;
+
+use generator::Content;
+use rayfarm_tracer::image;
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args_os().skip(1);
@@ -33,8 +36,11 @@ fn write_all(folder: &Path) -> Result<(), String> {
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(told)?;
         }
-        std::fs::write(&path, &file.text).map_err(told)?;
-        println!("{:28} {:8} triangles {:9} bytes", file.path, file.triangles, file.text.len());
+        match &file.content {
+            Content::Text(text) => std::fs::write(&path, text).map_err(told)?,
+            Content::Picture(picture) => image::save(&path, picture).map_err(|error| error.to_string())?,
+        }
+        println!("{:28} {:8} triangles", file.path, file.triangles);
     }
     Ok(())
 }

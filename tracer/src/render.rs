@@ -263,10 +263,10 @@ mod tests {
     use crate::scene::FrameView;
     use crate::{CompiledScene, simd};
 
-    /// Every kind of light, primitive, normal, and exponent, on every level that this machine has.
+    /// Every kind of light, primitive, normal, exponent and texture, on every level that this machine has.
     #[test]
     fn all_levels_of_simd_render_the_same_bytes() {
-        for scene in ["lights.toml", "room.toml"] {
+        for scene in ["lights.toml", "room.toml", "textured.toml"] {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(scene);
             let loaded = crate::scene::load(&path).unwrap();
             let view = FrameView { width: 150, height: 110, samples: 4, ..FrameView::of(&loaded.scene) };

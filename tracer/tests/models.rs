@@ -6,12 +6,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayfarm_tracer::CompiledScene;
+use rayfarm_tracer::image;
 use rayfarm_tracer::scene::{LightKind, LoadedScene, load};
 
 #[path = "../examples/make_models/mod.rs"]
 mod generator;
 
-const SCENES: [&str; 4] = ["room.toml", "product.toml", "instances.toml", "lights.toml"];
+use generator::Content;
+
+const SCENES: [&str; 5] = ["room.toml", "product.toml", "instances.toml", "lights.toml", "textured.toml"];
 const MAX_FOLDER_BYTES: u64 = 10_000_000;
 
 fn folder() -> PathBuf {
@@ -36,7 +39,8 @@ fn every_scene_loads_without_warnings_and_compiles() {
     for name in SCENES {
         let scene = loaded(name);
         assert!(scene.warnings.is_empty(), "{name}: {:?}", scene.warnings);
-        CompiledScene::new(scene.scene, scene.meshes).unwrap_or_else(|error| panic!("{name}: {error}"));
+        CompiledScene::new(scene.scene, scene.meshes, scene.textures)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
     }
 }
 
@@ -61,7 +65,7 @@ fn the_default_scene_is_rich_enough() {
     assert!(lights.iter().any(|light| {
         matches!(light.kind, LightKind::Spot { penumbra, .. } if penumbra > 0.0) && light.shadows
     }));
-    let compiled = CompiledScene::new(room.scene, room.meshes).unwrap();
+    let compiled = CompiledScene::new(room.scene, room.meshes, room.textures).unwrap();
     assert!(compiled.triangle_count() >= 50_000, "{} triangles", compiled.triangle_count());
 }
 
@@ -70,15 +74,21 @@ fn the_generator_writes_exactly_the_files_in_the_repository() {
     let generated = generator::files();
     for file in &generated {
         let path = folder().join(&file.path);
-        let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         // Not assert_eq: a difference would print megabytes.
-        assert!(text == file.text, "{} is not what the generator writes: run it again", path.display());
+        let is_the_same = match &file.content {
+            Content::Text(text) => fs::read_to_string(&path).is_ok_and(|found| found == *text),
+            Content::Picture(picture) => image::load(&path).is_ok_and(|found| found == *picture),
+        };
+        assert!(is_the_same, "{} is not what the generator writes: run it again", path.display());
         assert_eq!(file.triangles > 0, file.path.ends_with(".obj"), "{}", file.path);
     }
-    let meshes = files_below(&folder())
-        .into_iter()
-        .filter(|path| path.extension().is_some_and(|extension| extension == "obj" || extension == "mtl"));
-    assert_eq!(meshes.count(), generated.len(), "a mesh in models/ that the generator does not know");
+    // The picture beside the scenes shows one of them.
+    let is_generated = |path: &PathBuf| {
+        path.extension().is_some_and(|e| e == "obj" || e == "mtl" || e == "png")
+            && !path.ends_with("room.png")
+    };
+    let files = files_below(&folder()).into_iter().filter(is_generated);
+    assert_eq!(files.count(), generated.len(), "a file in models/ that the generator does not know");
 }
 
 #[test]
@@ -90,7 +100,8 @@ fn the_readme_names_every_mesh_and_its_triangles() {
     }
     for name in SCENES {
         let scene = loaded(name);
-        let triangles = CompiledScene::new(scene.scene, scene.meshes).unwrap().triangle_count();
+        let triangles =
+            CompiledScene::new(scene.scene, scene.meshes, scene.textures).unwrap().triangle_count();
         let row = readme.lines().find(|line| line.starts_with(&format!("| `{name}`"))).unwrap_or_default();
         assert!(
             row.contains(&format!("| {triangles} |")),

@@ -3,6 +3,7 @@
 mod angle;
 mod camera;
 mod chess;
+mod globe;
 mod obj;
 mod random;
 mod room;
@@ -10,6 +11,7 @@ mod shape;
 mod shapes;
 
 use obj::{Digits, Shading, mtl_text, obj_text};
+use rayfarm_tracer::image::RgbImage;
 use shape::Model;
 
 /// A generated file.
@@ -17,9 +19,17 @@ pub(crate) struct GeneratedFile {
     /// Path inside `models/`.
     pub(crate) path: String,
     /// What stands in it.
-    pub(crate) text: String,
-    /// Triangles in it; none in a material library.
+    pub(crate) content: Content,
+    /// Triangles in it; none in a material library or a picture.
     pub(crate) triangles: usize,
+}
+
+/// A text, or a picture that becomes a PNG.
+pub(crate) enum Content {
+    /// OBJ or MTL.
+    Text(String),
+    /// A texture.
+    Picture(RgbImage),
 }
 
 /// The OBJ files of one scene with their common material library.
@@ -47,7 +57,8 @@ impl Part {
 
 /// Every generated file of `models/`.
 pub(crate) fn files() -> Vec<GeneratedFile> {
-    [room::folder(), camera::folder(), chess::folder()].iter().flat_map(files_of).collect()
+    let folders = [room::folder(), camera::folder(), chess::folder(), globe::folder()];
+    folders.iter().flat_map(files_of).chain(globe::textured_files()).collect()
 }
 
 fn files_of(folder: &Folder) -> Vec<GeneratedFile> {
@@ -56,12 +67,13 @@ fn files_of(folder: &Folder) -> Vec<GeneratedFile> {
         folder.parts.iter().flat_map(|part| part.model.groups.iter().map(|(material, _)| *material));
     let mut files = vec![GeneratedFile {
         path: format!("{}/{library}", folder.name),
-        text: mtl_text(materials),
+        content: Content::Text(mtl_text(materials)),
         triangles: 0,
     }];
     files.extend(folder.parts.iter().map(|part| {
         let (text, triangles) = obj_text(&part.model, &library, part.shading, part.digits);
-        GeneratedFile { path: format!("{}/{}.obj", folder.name, part.name), text, triangles }
+        let path = format!("{}/{}.obj", folder.name, part.name);
+        GeneratedFile { path, content: Content::Text(text), triangles }
     }));
     files
 }

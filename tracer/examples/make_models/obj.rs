@@ -175,7 +175,7 @@ fn area_normal(shape: &Shape, face: &[u32; 4]) -> DVec3 {
 }
 
 /// A decimal without superfluous characters: no trailing zeros, no leading zero, no minus zero.
-fn number(value: f64, digits: usize) -> String {
+pub(crate) fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     match text {
