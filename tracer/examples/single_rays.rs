@@ -55,7 +55,7 @@ fn models_only(path: &Path) -> Result<PreparedFrame, Box<dyn Error>> {
     loaded.scene.spheres.clear();
     loaded.scene.planes.clear();
     let view = FrameView::of(&loaded.scene);
-    let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes)?);
+    let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures)?);
     Ok(PreparedFrame::new(compiled, &view)?)
 }
 

@@ -300,7 +300,8 @@ impl CompiledMesh {
         self.section(self.sections.normals, self.header.normal_count as usize)
     }
 
-    fn uvs(&self) -> &[[Vec2; 3]] {
+    /// Texture coordinates of all lanes; empty where the mesh carries none.
+    pub(crate) fn uvs(&self) -> &[[Vec2; 3]] {
         self.section(self.sections.uvs, self.header.uv_count as usize)
     }
 

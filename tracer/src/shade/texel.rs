@@ -31,10 +31,11 @@ impl CornerUvs {
     /// Those of the triangles that lanes see.
     #[inline(always)]
     pub(super) fn gather(mesh: &CompiledMesh, triangles: &[u32; LANES], lanes: u32) -> Self {
+        let all = mesh.uvs();
         let mut uvs = [[Lanes::ZERO; 2]; 3];
         for lane in each_bit(lanes) {
             // `CompiledScene::new` made sure that a mesh under a texture has them.
-            let corners = mesh.corner_uvs(triangles[lane]).unwrap_or_default();
+            let corners = all.get(triangles[lane] as usize).copied().unwrap_or_default();
             for (uvs, corner) in uvs.iter_mut().zip(corners) {
                 uvs[0].0[lane] = corner.x;
                 uvs[1].0[lane] = corner.y;

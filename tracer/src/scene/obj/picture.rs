@@ -80,7 +80,7 @@ fn split_options(rest: &str) -> (&str, Vec<&'static str>) {
         for index in 0..*most {
             // The second and third number of a vector may be left out.
             let number = first_word(rest).parse::<f64>().is_ok();
-            if *most == 3 && !number || index > 0 && !number {
+            if !number && (*most == 3 || index > 0) {
                 break;
             }
             rest = after_word(rest);
