@@ -85,6 +85,12 @@ need() {
 
 need
 
+# Before this script's own builds make it busy.
+load=$(cut -d ' ' -f 1 /proc/loadavg 2>/dev/null || echo unknown)
+if [ "$load" != unknown ] && awk -v load="$load" 'BEGIN { exit !(load > 0.5) }'; then
+    say "the machine is busy (load $load): these figures, of several threads above all, will be of what is left of it"
+fi
+
 if [ -n "$keep" ]; then
     mkdir -p "$keep"
     work=$(cd "$keep" && pwd)
@@ -215,6 +221,6 @@ cpu="${cpu:-$(uname -m)}, $(nproc) cores"
 commit=$(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)
 version=$("$embree" --version)
 today=$(date +%F)
-echo "$cpu; rayfarm $commit; Embree $version; $today; medians of $rounds rounds"
+echo "$cpu; rayfarm $commit; Embree $version; $today; load before $load; medians of $rounds rounds"
 python3 "$peers/report.py" "$runs" ${csv:+--csv "$csv"} \
-    --note "cpu=$cpu" --note "commit=$commit" --note "embree_version=$version" --note "date=$today"
+    --note "cpu=$cpu" --note "commit=$commit" --note "embree_version=$version" --note "date=$today" --note "load=$load"

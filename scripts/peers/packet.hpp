@@ -89,28 +89,61 @@ class PacketTracer {
         return lowest == highest ? Seen::one_surface : Seen::several;
     }
 
+    // Of each lane's surface.
+    struct LaneSurfaces {
+        Lanes diffuse[3], specular[3], exponent, normals[3][3];
+    };
+
+    // Copied lane by lane, so that the loop that shades reads all lanes in order and stays one of vectors.
+    template <bool TURNED>
+    LaneSurfaces copy_surfaces(const RTCRayHit16& rays, unsigned first) const {
+        LaneSurfaces lanes;
+        for (int i = 0; i < LANES; ++i) {
+            const unsigned id = rays.hit.instID[0][i];
+            const Surface& surface = scene_.surfaces[id == RTC_INVALID_GEOMETRY_ID ? first : id];
+            const Material& material = surface.material;
+            lanes.diffuse[0][i] = material.diffuse.x, lanes.specular[0][i] = material.specular.x;
+            lanes.diffuse[1][i] = material.diffuse.y, lanes.specular[1][i] = material.specular.y;
+            lanes.diffuse[2][i] = material.diffuse.z, lanes.specular[2][i] = material.specular.z;
+            lanes.exponent[i] = material.exponent;
+            for (int column = 0; TURNED && column < 3; ++column) {
+                lanes.normals[column][0][i] = surface.normals[column].x;
+                lanes.normals[column][1][i] = surface.normals[column].y;
+                lanes.normals[column][2][i] = surface.normals[column].z;
+            }
+        }
+        return lanes;
+    }
+
+    static Vec3f at(const Lanes* lanes, int i) { return {lanes[0][i], lanes[1][i], lanes[2][i]}; }
+
     template <bool ONE_SURFACE, bool TURNED>
     int shade(const RTCRayHit16& rays, unsigned first, Colors& out) {
-        const Surface* const surfaces = scene_.surfaces.data();
+        const Surface one = scene_.surfaces[first];
+        LaneSurfaces several;
+        if (!ONE_SURFACE) several = copy_surfaces<TURNED>(rays, first);
         alignas(64) int lit[LANES];
         RTCRay16 shadow;
         Colors from_light, always;
         int count = 0;
         for (int i = 0; i < LANES; ++i) {
             const bool hit = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-            const unsigned id = rays.hit.instID[0][i];
-            const Surface& surface = surfaces[ONE_SURFACE ? first : hit ? id : first];
-            const Material& material = surface.material;
+            const Material& material = one.material;
+            const Vec3f diffuse = ONE_SURFACE ? material.diffuse : at(several.diffuse, i);
+            const Vec3f specular = ONE_SURFACE ? material.specular : at(several.specular, i);
+            const float exponent = ONE_SURFACE ? material.exponent : several.exponent[i];
             const float t = hit ? rays.ray.tfar[i] : 0.0f;
             const float dx = rays.ray.dir_x[i], dy = rays.ray.dir_y[i], dz = rays.ray.dir_z[i];
             const float px = eye_.x + t * dx, py = eye_.y + t * dy, pz = eye_.z + t * dz;
 
             float nx = rays.hit.Ng_x[i], ny = rays.hit.Ng_y[i], nz = rays.hit.Ng_z[i];
             if (TURNED) {
-                const Vec3f* m = surface.normals;
-                const float x = m[0].x * nx + m[1].x * ny + m[2].x * nz;
-                const float y = m[0].y * nx + m[1].y * ny + m[2].y * nz;
-                const float z = m[0].z * nx + m[1].z * ny + m[2].z * nz;
+                const Vec3f a = ONE_SURFACE ? one.normals[0] : at(several.normals[0], i);
+                const Vec3f b = ONE_SURFACE ? one.normals[1] : at(several.normals[1], i);
+                const Vec3f c = ONE_SURFACE ? one.normals[2] : at(several.normals[2], i);
+                const float x = a.x * nx + b.x * ny + c.x * nz;
+                const float y = a.y * nx + b.y * ny + c.y * nz;
+                const float z = a.z * nx + b.z * ny + c.z * nz;
                 nx = x, ny = y, nz = z;
             }
             const float n_dot_d = nx * dx + ny * dy + nz * dz;
@@ -127,17 +160,17 @@ class PacketTracer {
             const float n_dot_l = nx * lx + ny * ly + nz * lz;
             const float n_dot_h = (nx * hx + ny * hy + nz * hz) / std::sqrt(hx * hx + hy * hy + hz * hz);
             const float inside = n_dot_h > 0.0f ? n_dot_h : 0.0f;
-            const float highlight = power(inside < 1.0f ? inside : 1.0f, material.exponent);
+            const float highlight = power(inside < 1.0f ? inside : 1.0f, exponent);
 
             const bool facing = hit & (n_dot_l > 0.0f);
             lit[i] = facing ? -1 : 0;
             count += facing;
-            from_light.r[i] = radiance_.x * (material.diffuse.x * n_dot_l + material.specular.x * highlight);
-            from_light.g[i] = radiance_.y * (material.diffuse.y * n_dot_l + material.specular.y * highlight);
-            from_light.b[i] = radiance_.z * (material.diffuse.z * n_dot_l + material.specular.z * highlight);
-            always.r[i] = hit ? ambient_.x * material.diffuse.x : background_.x;
-            always.g[i] = hit ? ambient_.y * material.diffuse.y : background_.y;
-            always.b[i] = hit ? ambient_.z * material.diffuse.z : background_.z;
+            from_light.r[i] = radiance_.x * (diffuse.x * n_dot_l + specular.x * highlight);
+            from_light.g[i] = radiance_.y * (diffuse.y * n_dot_l + specular.y * highlight);
+            from_light.b[i] = radiance_.z * (diffuse.z * n_dot_l + specular.z * highlight);
+            always.r[i] = hit ? ambient_.x * diffuse.x : background_.x;
+            always.g[i] = hit ? ambient_.y * diffuse.y : background_.y;
+            always.b[i] = hit ? ambient_.z * diffuse.z : background_.z;
 
             const float reach = std::fabs(px) + std::fabs(py) + std::fabs(pz) + t * d_squared * to_viewer;
             const float lift = LIFT * reach;
