@@ -102,6 +102,8 @@ trap 'say "interrupted"; exit 130' INT TERM
 
 # --- building both ----------------------------------------------------------------------------------------------------
 
+# Of what is built now, whatever is committed meanwhile.
+commit=$(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)
 say "building rayfarm"
 (cd "$root" && cargo build --release --package rayfarm-master >&2)
 target=$(cd "$root" && cargo metadata --format-version 1 --no-deps |
@@ -218,7 +220,6 @@ done
 
 cpu=$(lscpu 2>/dev/null | sed -n 's/^Model name: *//p' | head -n 1)
 cpu="${cpu:-$(uname -m)}, $(nproc) cores"
-commit=$(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)
 version=$("$embree" --version)
 today=$(date +%F)
 echo "$cpu; rayfarm $commit; Embree $version; $today; load before $load; medians of $rounds rounds"
