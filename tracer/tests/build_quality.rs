@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rayfarm_tracer::mesh::{BuildQuality, CompileOptions, CompiledMesh};
-use rayfarm_tracer::scene::{self, FrameView, load_model_with};
+use rayfarm_tracer::scene::{self, FrameView, compile_model};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 fn models() -> PathBuf {
@@ -15,7 +15,7 @@ fn models() -> PathBuf {
 
 fn queen(quality: BuildQuality) -> Arc<CompiledMesh> {
     let options = CompileOptions { quality, ..CompileOptions::default() };
-    load_model_with(&models().join("chess/queen.obj"), options).unwrap().0
+    compile_model(&models().join("chess/queen.obj"), &models(), options).unwrap().0
 }
 
 /// The scene with all its models replaced by one.
@@ -26,7 +26,7 @@ fn picture_with(mesh: Arc<CompiledMesh>) -> Vec<u8> {
         model.materials = vec![0; mesh.material_count()];
     }
     let view = FrameView { width: 160, height: 120, samples: 4, ..FrameView::of(&loaded.scene) };
-    let compiled = CompiledScene::new(loaded.scene, [mesh]).unwrap();
+    let compiled = CompiledScene::new(loaded.scene, [mesh], loaded.textures).unwrap();
     let frame = PreparedFrame::new(Arc::new(compiled), &view).unwrap();
     let mut bytes = vec![0; 160 * 120 * 3];
     render_rows(&frame, 0..120, &mut bytes, &|| false).unwrap();
