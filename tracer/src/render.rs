@@ -132,7 +132,9 @@ fn render_tile<S: Simd>(
     let grid = frame.rays.grid();
     let corner = (pixels.left * grid, pixels.top * grid);
     let tile = EyeTile::new(frame, rays, live_lanes(grid, pixels), corner);
-    counts.primary += tile.live.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
+    for lanes in tile.live {
+        counts.primary += u64::from(lanes.count_ones());
+    }
     let Scratch { visible, tile: room, shade: shading } = scratch;
     tile.find_visible(simd, visible, room);
     shade::shade(simd, &tile, visible, shading, room, counts);

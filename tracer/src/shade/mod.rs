@@ -9,7 +9,9 @@
 //! [`crate::tile::shadow`].
 
 mod background;
+mod facet;
 mod material;
+mod space;
 mod specular;
 mod surface;
 mod texel;
@@ -22,6 +24,7 @@ use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat, three};
 use crate::tile::shadow::{ShadowTile, Source};
 use crate::tile::visible::{EyeTile, Visible};
 use crate::tile::{self, BLOCKS};
+use facet::Facets;
 use material::Materials;
 use surface::Surfaces;
 
@@ -34,6 +37,7 @@ pub(crate) type Colors = [[Lanes; 3]; BLOCKS];
 
 /// Room for the shading of a tile, kept from tile to tile.
 pub(crate) struct Scratch {
+    facets: Facets,
     surfaces: Surfaces,
     /// The picture so far.
     pub colors: Colors,
@@ -46,7 +50,13 @@ pub(crate) struct Scratch {
 impl Scratch {
     pub(crate) fn new(frame: &PreparedFrame) -> Self {
         let nothing = [[Lanes::ZERO; 3]; BLOCKS];
-        Self { surfaces: Surfaces::empty(frame), colors: nothing, contributions: nothing, lifted: nothing }
+        Self {
+            facets: Facets::new(),
+            surfaces: Surfaces::empty(frame),
+            colors: nothing,
+            contributions: nothing,
+            lifted: nothing,
+        }
     }
 }
 
@@ -61,7 +71,7 @@ pub(crate) fn shade<S: Simd>(
     counts: &mut RayCounts,
 ) {
     let frame = tile.frame;
-    scratch.surfaces.find(simd, tile, visible);
+    scratch.surfaces.find(simd, tile, visible, &mut scratch.facets);
     for block in 0..BLOCKS {
         let hit = scratch.surfaces.hit[block];
         if tile.live[block] & !hit != 0 {
@@ -104,7 +114,7 @@ fn add_light<S: Simd>(
     tiles: &mut tile::Scratch,
     counts: &mut RayCounts,
 ) {
-    let Scratch { surfaces, colors, contributions, lifted } = scratch;
+    let Scratch { surfaces, colors, contributions, lifted, .. } = scratch;
     let mut lit = [0_u32; BLOCKS];
     for block in 0..BLOCKS {
         if surfaces.hit[block] != 0 {

@@ -1,7 +1,9 @@
 //! What is at the hits of a tile: points, normals, materials.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
+use super::facet::Facets;
+use super::space::{Space, space_of};
 use super::texel::{CornerUvs, Texels};
 use crate::bvh::WIDTH;
 use crate::compile::Item;
@@ -59,29 +61,43 @@ impl Surfaces {
 
     /// Finds what is at the hits of a tile.
     #[inline(always)]
-    pub(super) fn find<S: Simd>(&mut self, simd: S, tile: &EyeTile<'_>, visible: &Visible) {
+    pub(super) fn find<S: Simd>(
+        &mut self,
+        simd: S,
+        tile: &EyeTile<'_>,
+        visible: &Visible,
+        facets: &mut Facets,
+    ) {
+        facets.clear();
         let mut space = None;
         for block in 0..BLOCKS {
             let items = &visible.item[block];
             let mut rest = tile.live[block] & !items.equal(simd, NOTHING);
             self.hit[block] = rest;
-            if rest == 0 {
-                continue;
-            }
+            facets.begin_block(block);
             if let Some(texels) = &mut self.texels {
                 texels.clear(block);
             }
-            let direction = tile.directions(simd, block);
-            let first = rest.trailing_zeros() as usize;
             while rest != 0 {
                 let item = items.0[rest.trailing_zeros() as usize];
                 let lanes = rest & items.equal(simd, item);
                 rest &= !lanes;
-                let group = Group { tile, block, lanes, alone: lanes == self.hit[block], direction };
-                self.fill(simd, &group, visible, item, &mut space);
+                if !add_facets(simd, facets, tile, visible, block, item, lanes) {
+                    let direction = tile.directions(simd, block);
+                    let group = Group { tile, block, lanes, alone: lanes == self.hit[block], direction };
+                    self.fill(simd, &group, visible, item, &mut space);
+                }
             }
+        }
+        facets.find_planes(simd, tile);
+        for block in 0..BLOCKS {
+            if self.hit[block] == 0 {
+                continue;
+            }
+            let direction = tile.directions(simd, block);
+            facets.fill(simd, tile, block, direction, self);
             if self.hit[block] != 0xffff {
-                let material = self.material[block].0[first];
+                let material = self.material[block].0[self.hit[block].trailing_zeros() as usize];
                 self.material[block].put(simd, mask_of(simd, 0xffff & !self.hit[block]), material);
             }
             if tile.frame.features.specular {
@@ -91,7 +107,7 @@ impl Surfaces {
         }
     }
 
-    /// The lanes of a block that see one item. `space` is kept for the next block that sees it.
+    /// The lanes of a block that see one item without facets. `space` is kept for the next block that sees it.
     #[inline(always)]
     fn fill<S: Simd>(
         &mut self,
@@ -115,6 +131,7 @@ impl Surfaces {
                 |_| normal,
             );
         }
+        let triangles = &visible.triangle[block];
         let (corners, normals, uvs, space) = match frame.items.get(item) {
             Item::Sphere(index) => {
                 let sphere = frame.spheres[index];
@@ -131,14 +148,15 @@ impl Surfaces {
             Item::Model(index) => {
                 let instance = &frame.instances[index];
                 let slots = &frame.scene().models[index].materials;
-                let (corners, normals) =
-                    self.gather(simd, instance, slots, &visible.triangle[block], block, lanes);
-                let triangles = &visible.triangle[block];
+                let (corners, normals) = self.gather(simd, instance, slots, triangles, block, lanes);
                 let uvs = instance.textured.then(|| CornerUvs::gather(&instance.mesh, &triangles.0, lanes));
                 (corners, normals, uvs, space_of(space, item, || Space::of_instance(tile, instance)))
             }
         };
-        self.fill_triangles(simd, group, space, corners, normals, uvs.as_ref());
+        let sound = self.fill_triangles(simd, group, space, corners, normals, uvs.as_ref());
+        for lane in each_bit(lanes & !sound) {
+            self.repair(tile, block, lane, item, triangles.0[lane]);
+        }
     }
 
     /// Corners, and for smooth models normals, of the triangles that lanes see: triangle by triangle, because neighbours
@@ -177,7 +195,8 @@ impl Surfaces {
         (corners, instance.smooth.then_some(normals))
     }
 
-    /// Points on the planes of triangles, by the planes' own equations; the rays are known to hit them.
+    /// Points on the planes of triangles, by the planes' own equations; the rays are known to hit them. Returns the bits of
+    /// those that came out sound.
     #[inline(always)]
     fn fill_triangles<S: Simd>(
         &mut self,
@@ -187,7 +206,7 @@ impl Surfaces {
         [a, b, c]: ThreeVectors<S>,
         normals: Option<ThreeVectors<S>>,
         uvs: Option<&CornerUvs>,
-    ) {
+    ) -> u32 {
         let &Group { tile, block, lanes, direction, .. } = group;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let to_a = a.sub(Vec3x16::splat(simd, space.origin));
@@ -202,10 +221,7 @@ impl Surfaces {
         let length = eye_normal.dot(eye_normal).sqrt();
         let turned = one.copysign(-along) / length;
         let ng = eye_normal.scale(turned);
-        let lift = (point.size() + splat(simd, space.reach)) * splat(simd, LIFT);
-        group.keep(simd, point, &mut self.point[block]);
-        group.keep(simd, ng, &mut self.ng[block]);
-        group.keep_one(simd, lift, &mut self.lift[block]);
+        let lift = self.put_plane(simd, group, point, ng, splat(simd, space.reach));
         if let Some(normals) = normals {
             let at = space.direction(simd, tile, block).scale(t).sub(to_a);
             let [u, v] = barycentric(simd, at, ab, ac);
@@ -227,34 +243,44 @@ impl Surfaces {
             let uv = uvs.at(simd, barycentric(simd, at, ab, ac));
             texels.fill(tile.frame, block, lanes, &self.material[block], &uv);
         }
-        let sound = lift.simd_le(splat(simd, f32::MAX)) & turned.abs().simd_le(splat(simd, f32::MAX));
-        for lane in each_bit(lanes & !bits(sound)) {
-            self.repair(tile, block, lane, space, a, ab, ac);
-        }
+        bits(lift.simd_le(splat(simd, f32::MAX)) & turned.abs().simd_le(splat(simd, f32::MAX)))
+    }
+
+    /// Keeps points on planes with their normals. Returns how far shadow rays are lifted off them.
+    #[inline(always)]
+    pub(super) fn put_plane<S: Simd>(
+        &mut self,
+        simd: S,
+        group: &Group<'_, S>,
+        point: Vec3x16<S>,
+        ng: Vec3x16<S>,
+        reach: f32x16<S>,
+    ) -> f32x16<S> {
+        let lift = (point.size() + reach) * splat(simd, LIFT);
+        group.keep(simd, point, &mut self.point[group.block]);
+        group.keep(simd, ng, &mut self.ng[group.block]);
+        group.keep_one(simd, lift, &mut self.lift[group.block]);
+        lift
     }
 
     /// A triangle too thin for single precision: once more in `f64`.
     #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "what the caller has at hand")]
-    fn repair<S: Simd>(
-        &mut self,
-        tile: &EyeTile<'_>,
-        block: usize,
-        lane: usize,
-        space: &Space,
-        a: Vec3x16<S>,
-        ab: Vec3x16<S>,
-        ac: Vec3x16<S>,
-    ) {
-        let vector = |v: Vec3x16<S>| Vec3::from_array(v.0.map(|component| component[lane])).as_dvec3();
-        let columns = space.normals.map(|column| Vec3::from_array(column).as_dvec3());
-        let normal = DMat3::from_cols(columns[0], columns[1], columns[2]) * vector(ab).cross(vector(ac));
+    pub(super) fn repair(&mut self, tile: &EyeTile<'_>, block: usize, lane: usize, item: u32, triangle: u32) {
+        let [a, b, c] = match tile.frame.items.get(item) {
+            Item::Model(index) => {
+                let instance = &tile.frame.instances[index];
+                let corners = instance.mesh.corners(triangle);
+                corners.map(|corner| instance.linear * corner.as_dvec3() + instance.translation)
+            }
+            Item::Triangle(index) => tile.frame.triangles[index].corners,
+            // Never too thin.
+            Item::Sphere(_) => return,
+        };
         let ray = tile.ray(block, lane);
-        let ng = normal.normalize_or(-ray.direction.normalize());
+        let ng = (b - a).cross(c - a).normalize_or(-ray.direction.normalize());
         let ng = if ng.dot(ray.direction) > 0.0 { -ng } else { ng };
         // Without a plane to rely on, the first corner tells the distance.
-        let depth = (vector(a) - Vec3::from_array(space.origin).as_dvec3()).length()
-            / Vec3::from_array(space.directions[0]).as_dvec3().length();
+        let depth = a.length() / ray.direction.length();
         self.set(block, lane, ray.direction * depth, ng);
     }
 
@@ -305,21 +331,56 @@ fn barycentric<S: Simd>(simd: S, at: Vec3x16<S>, ab: Vec3x16<S>, ac: Vec3x16<S>)
     [u, v]
 }
 
-/// The lanes of a block that see one item.
-struct Group<'a, S: Simd> {
-    tile: &'a EyeTile<'a>,
+/// Notes the triangles that some lanes of a block see, if their item is flat and bare: else they want more than a plane.
+#[inline(always)]
+fn add_facets<S: Simd>(
+    simd: S,
+    facets: &mut Facets,
+    tile: &EyeTile<'_>,
+    visible: &Visible,
     block: usize,
+    item: u32,
     lanes: u32,
+) -> bool {
+    let frame = tile.frame;
+    if item >= frame.items.first_plane() {
+        return false;
+    }
+    let triangles = &visible.triangle[block];
+    match frame.items.get(item) {
+        Item::Model(index) if !frame.instances[index].smooth && !frame.instances[index].textured => {
+            let slots = &frame.scene().models[index].materials;
+            let mesh = &frame.instances[index].mesh;
+            facets.add(simd, block, item, lanes, triangles, |triangle| match slots.as_slice() {
+                &[slot] => slot,
+                _ => slot_of(mesh, slots, triangle),
+            });
+            true
+        }
+        Item::Triangle(index) if frame.scene().triangles[index].uvs.is_none() => {
+            let material = frame.scene().triangles[index].material;
+            facets.add(simd, block, item, lanes, triangles, |_| material);
+            true
+        }
+        Item::Model(_) | Item::Triangle(_) | Item::Sphere(_) => false,
+    }
+}
+
+/// The lanes of a block that see one item.
+pub(super) struct Group<'a, S: Simd> {
+    pub tile: &'a EyeTile<'a>,
+    pub block: usize,
+    pub lanes: u32,
     /// No other lane of the block hits anything.
-    alone: bool,
+    pub alone: bool,
     /// Of the rays in eye space.
-    direction: Vec3x16<S>,
+    pub direction: Vec3x16<S>,
 }
 
 impl<S: Simd> Group<'_, S> {
     /// Replaces these lanes.
     #[inline(always)]
-    fn keep(&self, simd: S, new: Vec3x16<S>, old: &mut [Lanes; 3]) {
+    pub(super) fn keep(&self, simd: S, new: Vec3x16<S>, old: &mut [Lanes; 3]) {
         for axis in 0..3 {
             self.keep_one(simd, new.0[axis], &mut old[axis]);
         }
@@ -345,55 +406,4 @@ fn put<S: Simd>(simd: S, mask: mask32x16<S>, vectors: [Vec3; 3], lanes: &mut Thr
 /// `CompiledScene::new` made sure that there is one per slot.
 fn slot_of(mesh: &CompiledMesh, slots: &[u32], triangle: u32) -> u32 {
     slots[mesh.slot(triangle) as usize]
-}
-
-/// The rays of a tile in the space of a mesh.
-struct Space {
-    /// Where they start.
-    origin: [f32; 3],
-    /// Through the tile's centre, and what a step right and a step down add.
-    directions: [[f32; 3]; 3],
-    /// Columns of the matrix that takes normals to eye space, divided by `normals_scale`.
-    normals: [[f32; 3]; 3],
-    normals_scale: f32,
-    /// Largest coordinate that placed the mesh.
-    reach: f32,
-}
-
-/// The space of an item: the one that is kept, if it is this item's.
-fn space_of(kept: &mut Option<(u32, Space)>, item: u32, make: impl FnOnce() -> Space) -> &Space {
-    if kept.as_ref().is_none_or(|(of, _)| *of != item) {
-        *kept = None;
-    }
-    &kept.get_or_insert_with(|| (item, make())).1
-}
-
-impl Space {
-    fn of_eye(tile: &EyeTile<'_>) -> Self {
-        let directions = three!(i => tile.steps[i].as_vec3().to_array());
-        let normals = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        Self { origin: [0.0; 3], directions, normals, normals_scale: 1.0, reach: 0.0 }
-    }
-
-    /// Of the rays of a block.
-    #[inline(always)]
-    fn direction<S: Simd>(&self, simd: S, tile: &EyeTile<'_>, block: usize) -> Vec3x16<S> {
-        let (x, y) = (tile.rays.x[block].load(simd), tile.rays.y[block].load(simd));
-        let [center, right, down] = three!(i => Vec3x16::splat(simd, self.directions[i]));
-        center.add(right.scale(x)).add(down.scale(y))
-    }
-
-    fn of_instance(tile: &EyeTile<'_>, instance: &Instance) -> Self {
-        let single = |v: DVec3| v.as_vec3().to_array();
-        // Normals are normalised afterwards: their scale is free, and kept near one.
-        let [x, y, z] = three!(i => instance.normals.col(i).abs());
-        let size = x.max(y).max(z).max_element();
-        Self {
-            origin: single(instance.inverse * -instance.translation),
-            directions: three!(i => single(instance.inverse * tile.steps[i])),
-            normals: three!(i => single(instance.normals.col(i) / size)),
-            normals_scale: (1.0 / size) as f32,
-            reach: instance.translation.abs().max_element() as f32,
-        }
-    }
 }
