@@ -121,13 +121,18 @@ impl<'a> Sight<'a> {
             // A box that reaches behind the lens has no rectangle around it.
             wanted &= !crossing | in_sight(simd, node, &Frustum::new(self.lens, self.rays.union));
         }
-        let mut by_block = around.blocks(simd, self.rays, blocks, interest);
-        let overlapping = bits(by_block.load(simd).simd_ne(u32x16::splat(simd, 0)));
-        wanted &= crossing | overlapping;
+        wanted &= crossing | around.overlapping::<S, I>(simd, self.rays.union);
+        let least = interest.least();
+        let few = wanted.count_ones() <= blocks.count_ones();
+        let mut by_block =
+            if few { Indices::ZERO } else { around.blocks_of_all(simd, self.rays, least, blocks) };
         for lane in each_bit(wanted) {
             if crossing >> lane & 1 == 1 {
                 by_block.0[lane] = ALL_BLOCKS;
                 continue;
+            }
+            if few {
+                by_block.0[lane] = around.blocks_of(simd, lane, self.rays, least, blocks);
             }
             let (rectangle, z_most) = around.get(lane);
             by_block.0[lane] = interest.refine(simd, rectangle, z_most, by_block.0[lane]);
@@ -361,12 +366,44 @@ impl Around {
         around
     }
 
-    /// Which of some blocks of rays each box may matter to: their rectangles overlap, and it is near enough.
+    /// Bits of the boxes that may hold a ray of the tile, given the rectangle around all rays.
     #[inline(always)]
-    fn blocks<S: Simd, I: Interest<S>>(&self, simd: S, rays: &Rays, blocks: u32, interest: &I) -> Indices {
-        let [x_from, x_to, y_from, y_to] = &self.sides;
-        let [x_from, x_to] = [x_from.load(simd), x_to.load(simd)];
-        let [y_from, y_to] = [y_from.load(simd), y_to.load(simd)];
+    fn overlapping<S: Simd, I: Interest<S>>(&self, simd: S, union: [f32; 4]) -> u32 {
+        let [x_from, x_to] = [self.sides[0].load(simd), self.sides[1].load(simd)];
+        let [y_from, y_to] = [self.sides[2].load(simd), self.sides[3].load(simd)];
+        let mut overlap = x_from.simd_le(splat(simd, union[1]))
+            & x_to.simd_ge(splat(simd, union[0]))
+            & y_from.simd_le(splat(simd, union[3]))
+            & y_to.simd_ge(splat(simd, union[2]));
+        if I::ON_GRID {
+            // Rays stand at whole numbers and a half.
+            let half = splat(simd, 0.5);
+            overlap &=
+                (x_to - half).floor().simd_ge(x_from - half) & (y_to - half).floor().simd_ge(y_from - half);
+        }
+        bits(overlap)
+    }
+
+    /// Which of some blocks of rays one box may matter to: their rectangles overlap, and it is near enough.
+    #[inline(always)]
+    fn blocks_of<S: Simd>(&self, simd: S, lane: usize, rays: &Rays, least: &Lanes, blocks: u32) -> u32 {
+        let [x_lo, x_hi, y_lo, y_hi] = &rays.bounds;
+        let ([x_from, x_to, y_from, y_to], z_most) = self.get(lane);
+        blocks
+            & bits(
+                x_hi.load(simd).simd_ge(splat(simd, x_from))
+                    & x_lo.load(simd).simd_le(splat(simd, x_to))
+                    & y_hi.load(simd).simd_ge(splat(simd, y_from))
+                    & y_lo.load(simd).simd_le(splat(simd, y_to))
+                    & least.load(simd).simd_le(splat(simd, z_most)),
+            )
+    }
+
+    /// The same for some boxes at once: a step a block of rays, not a box.
+    #[inline(always)]
+    fn blocks_of_all<S: Simd>(&self, simd: S, rays: &Rays, least: &Lanes, blocks: u32) -> Indices {
+        let [x_from, x_to] = [self.sides[0].load(simd), self.sides[1].load(simd)];
+        let [y_from, y_to] = [self.sides[2].load(simd), self.sides[3].load(simd)];
         let z_most = self.z_most.load(simd);
         let none = u32x16::splat(simd, 0);
         let mut found = none;
@@ -376,15 +413,8 @@ impl Around {
                 & x_to.simd_ge(splat(simd, x_lo))
                 & y_from.simd_le(splat(simd, y_hi))
                 & y_to.simd_ge(splat(simd, y_lo))
-                & z_most.simd_ge(splat(simd, interest.least().0[block]));
+                & z_most.simd_ge(splat(simd, least.0[block]));
             found = found | select_indices(overlap, u32x16::splat(simd, 1 << block), none);
-        }
-        if I::ON_GRID {
-            // Rays stand at whole numbers and a half.
-            let half = splat(simd, 0.5);
-            let between =
-                (x_to - half).floor().simd_ge(x_from - half) & (y_to - half).floor().simd_ge(y_from - half);
-            found = select_indices(between, found, none);
         }
         let mut by_box = Indices::ZERO;
         by_box.store(found);
