@@ -27,7 +27,7 @@ const WIDEST: f64 = 8.0;
 const BEFORE_LIGHT: f32 = (1 << 17) as f32;
 
 /// Boxes that touch no more blocks than this are held against single rays.
-const FEW_BLOCKS: u32 = 4;
+const FEW_BLOCKS: u32 = 8;
 
 /// No more triangles than this are held against a block of rays without counting its rays first.
 const FEW_TRIANGLES: u32 = 3;
