@@ -4,7 +4,8 @@
 //! I = c_d I_a + sum_j S_j A_j B_j I_j ( c_d max(0, N.L_j) + c_s max(0, N.H_j)^p_r )
 //! ```
 //!
-//! [`surface`] finds the point, N and the material of each ray's hit, [`texel`] the share that a texture leaves of c_d, [`background`] stands where nothing is hit,
+//! [`surface`] finds the point, N and the material of each ray's hit ([`facet`] those of flat triangles, in [`space`]), [`texel`]
+//! the share that a texture leaves of c_d, [`background`] stands where nothing is hit,
 //! [`specular`] is the second term in the brackets; A_j B_j I_j come from [`crate::light`], S_j from
 //! [`crate::tile::shadow`].
 
