@@ -6,9 +6,9 @@
 //!
 //! ```text
 //!   Lens     the picture as seen from the point: (x, y) where a ray pierces the plane at depth 1     lens.rs
-//!   Walk     the tree, nearest first; boxes beside the tile or behind all that it sees drop out      walk.rs
+//!   Walk     the tree; boxes beside the tile or behind all that it sees drop out                     walk.rs, around.rs
 //!   Setup    sixteen triangles at once become lines and a depth plane in the picture                 setup.rs
-//!   Cover    each triangle that is left against blocks of sixteen rays: inside? nearer?              cover.rs
+//!   Cover    the triangles that are left against blocks of sixteen rays: inside? nearer?             cover.rs
 //! ```
 //!
 //! [`visible`] asks for the nearest triangle of each ray from the eye, [`shadow`] whether anything lies between a light
@@ -21,8 +21,12 @@
 //! A tile is sixteen *blocks* of sixteen *lanes*: 4 x 4 blocks of 4 x 4 rays, because small triangles are as high as
 //! they are wide.
 
+mod around;
+mod blocked;
 mod cover;
 pub(crate) mod lens;
+mod light_lens;
+mod points;
 mod setup;
 pub(crate) mod shadow;
 pub(crate) mod visible;
@@ -31,8 +35,8 @@ mod walk;
 use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat};
 
 pub(crate) use lens::Affine;
+use points::Points;
 use setup::Flats;
-use shadow::Points;
 use walk::{Frontier, WalkStack};
 
 /// Rays along a side of a tile.
