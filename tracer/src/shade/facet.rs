@@ -3,8 +3,9 @@
 //! All rays that see a flat triangle share its plane, normal and material. So these are found once a tile, for sixteen
 //! triangles at a time, and a ray has only to meet a plane: n.(t d) = p.
 
+use super::group::Group;
 use super::space::{Space, space_of};
-use super::surface::{Group, Surfaces};
+use super::surface::Surfaces;
 use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::simd::math::to_unit;

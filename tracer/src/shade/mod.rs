@@ -11,6 +11,7 @@
 
 mod background;
 mod facet;
+mod group;
 mod material;
 mod space;
 mod specular;

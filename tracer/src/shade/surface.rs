@@ -1,8 +1,9 @@
 //! What is at the hits of a tile: points, normals, materials.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::facet::Facets;
+use super::group::{Group, ThreeVectors, barycentric, put};
 use super::space::{Space, space_of};
 use super::texel::{CornerUvs, Texels};
 use crate::bvh::WIDTH;
@@ -12,8 +13,7 @@ use crate::mesh::CompiledMesh;
 use crate::simd::math::to_unit;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{
-    Indices, Lanes, Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, mask32x16, select, splat,
-    three,
+    Indices, Lanes, Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat, three,
 };
 use crate::tile::BLOCKS;
 use crate::tile::visible::{EyeTile, NOTHING, Visible};
@@ -316,21 +316,6 @@ impl Surfaces {
     }
 }
 
-/// Three vectors a lane.
-type ThreeVectors<S> = [Vec3x16<S>; 3];
-
-/// Barycentric weights of the second and the third corner, by areas; clamped, because rounding must not leave the triangle.
-/// `at` is relative to the first corner, as `ab` and `ac` are.
-#[inline(always)]
-fn barycentric<S: Simd>(simd: S, at: Vec3x16<S>, ab: Vec3x16<S>, ac: Vec3x16<S>) -> [f32x16<S>; 2] {
-    let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-    let full = ab.cross(ac);
-    let whole = one / full.dot(full);
-    let u = (at.cross(ac).dot(full) * whole).max_precise(zero).min_precise(one);
-    let v = (ab.cross(at).dot(full) * whole).max_precise(zero).min_precise(one - u);
-    [u, v]
-}
-
 /// Notes the triangles that some lanes of a block see, if their item is flat and bare: else they want more than a plane.
 #[inline(always)]
 fn add_facets<S: Simd>(
@@ -363,43 +348,6 @@ fn add_facets<S: Simd>(
             true
         }
         Item::Model(_) | Item::Triangle(_) | Item::Sphere(_) => false,
-    }
-}
-
-/// The lanes of a block that see one item.
-pub(super) struct Group<'a, S: Simd> {
-    pub tile: &'a EyeTile<'a>,
-    pub block: usize,
-    pub lanes: u32,
-    /// No other lane of the block hits anything.
-    pub alone: bool,
-    /// Of the rays in eye space.
-    pub direction: Vec3x16<S>,
-}
-
-impl<S: Simd> Group<'_, S> {
-    /// Replaces these lanes.
-    #[inline(always)]
-    pub(super) fn keep(&self, simd: S, new: Vec3x16<S>, old: &mut [Lanes; 3]) {
-        for axis in 0..3 {
-            self.keep_one(simd, new.0[axis], &mut old[axis]);
-        }
-    }
-
-    #[inline(always)]
-    fn keep_one(&self, simd: S, new: f32x16<S>, old: &mut Lanes) {
-        let kept = if self.alone { new } else { select(mask_of(simd, self.lanes), new, old.load(simd)) };
-        old.store(kept);
-    }
-}
-
-/// Puts three vectors into the lanes of a mask.
-#[inline(always)]
-fn put<S: Simd>(simd: S, mask: mask32x16<S>, vectors: [Vec3; 3], lanes: &mut ThreeVectors<S>) {
-    for k in 0..3 {
-        for axis in 0..3 {
-            lanes[k].0[axis] = select(mask, splat(simd, vectors[k][axis]), lanes[k].0[axis]);
-        }
     }
 }
 
