@@ -7,6 +7,7 @@ use crate::shade::{self, Colors};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, dispatch, each_bit, splat, three};
 use crate::srgb;
+use crate::stage::{Stage, Watch};
 use crate::tile::visible::{EyeTile, Visible};
 use crate::tile::{self, BLOCKS, Rays, SIDE, place};
 
@@ -53,6 +54,23 @@ pub fn render_rows(
     out: &mut [u8],
     cancelled: &dyn Fn() -> bool,
 ) -> Result<RayCounts, Cancelled> {
+    render_rows_watched(frame, rows, out, cancelled, &mut ())
+}
+
+/// [`render_rows`], told to `watch` stage by stage: for benchmarks. It is compiled once more for each kind of watch.
+///
+/// # Errors
+/// As [`render_rows`].
+///
+/// # Panics
+/// As [`render_rows`].
+pub fn render_rows_watched<W: Watch>(
+    frame: &PreparedFrame,
+    rows: Range<u32>,
+    out: &mut [u8],
+    cancelled: &dyn Fn() -> bool,
+    watch: &mut W,
+) -> Result<RayCounts, Cancelled> {
     let row_bytes = frame.width() as usize * 3;
     assert!(rows.end <= frame.height(), "rows {rows:?} of a frame of {} rows", frame.height());
     assert_eq!(out.len(), rows.len() * row_bytes, "bytes for rows {rows:?}");
@@ -65,7 +83,7 @@ pub fn render_rows(
         let bottom = (top + 1).next_multiple_of(tile_pixels(frame)).min(rows.end);
         let start = (top - rows.start) as usize * row_bytes;
         let band = &mut out[start..start + (bottom - top) as usize * row_bytes];
-        let done = dispatch!(frame.level, simd => render_band(simd, frame, top..bottom, band));
+        let done = dispatch!(frame.level, simd => render_band(simd, frame, top..bottom, band, &mut *watch));
         counts += done;
         top = bottom;
     }
@@ -79,7 +97,14 @@ fn tile_pixels(frame: &PreparedFrame) -> u32 {
 
 /// Tiles that share a band of rows.
 #[inline(always)]
-fn render_band<S: Simd>(simd: S, frame: &PreparedFrame, rows: Range<u32>, out: &mut [u8]) -> RayCounts {
+fn render_band<S: Simd, W: Watch>(
+    simd: S,
+    frame: &PreparedFrame,
+    rows: Range<u32>,
+    out: &mut [u8],
+    watch: &mut W,
+) -> RayCounts {
+    watch.enter(Stage::Visible);
     let rays = Rays::grid(simd);
     let mut scratch = Scratch::new(frame);
     let side = tile_pixels(frame);
@@ -92,7 +117,7 @@ fn render_band<S: Simd>(simd: S, frame: &PreparedFrame, rows: Range<u32>, out: &
             top: rows.start / side * side,
             rows: rows.clone(),
         };
-        render_tile(simd, frame, &rays, &pixels, &mut scratch, out, &mut counts);
+        render_tile(simd, frame, &rays, &pixels, &mut scratch, out, &mut counts, watch);
     }
     counts
 }
@@ -120,7 +145,8 @@ struct Pixels {
 }
 
 #[inline(always)]
-fn render_tile<S: Simd>(
+#[expect(clippy::too_many_arguments, reason = "what a band lends each of its tiles")]
+fn render_tile<S: Simd, W: Watch>(
     simd: S,
     frame: &PreparedFrame,
     rays: &Rays,
@@ -128,7 +154,9 @@ fn render_tile<S: Simd>(
     scratch: &mut Scratch,
     out: &mut [u8],
     counts: &mut RayCounts,
+    watch: &mut W,
 ) {
+    watch.enter(Stage::Visible);
     let grid = frame.rays.grid();
     let corner = (pixels.left * grid, pixels.top * grid);
     let tile = EyeTile::new(frame, rays, live_lanes(grid, pixels), corner);
@@ -137,7 +165,8 @@ fn render_tile<S: Simd>(
     }
     let Scratch { visible, tile: room, shade: shading } = scratch;
     tile.find_visible(simd, visible, room);
-    shade::shade(simd, &tile, visible, shading, room, counts);
+    shade::shade(simd, &tile, visible, shading, room, counts, watch);
+    watch.enter(Stage::Encoding);
     let colors = &shading.colors;
     if grid == 1 {
         write_samples(simd, frame, pixels, colors, &tile.live, out);

@@ -23,6 +23,7 @@ use crate::light::{Emitter, EyeLight, JUST_BEFORE};
 use crate::render::RayCounts;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat, three};
+use crate::stage::{Stage, Watch};
 use crate::tile::shadow::{ShadowTile, Source};
 use crate::tile::visible::{EyeTile, Visible};
 use crate::tile::{self, BLOCKS};
@@ -64,16 +65,19 @@ impl Scratch {
 
 /// What the rays of a tile see, into `scratch.colors`.
 #[inline(always)]
-pub(crate) fn shade<S: Simd>(
+pub(crate) fn shade<S: Simd, W: Watch>(
     simd: S,
     tile: &EyeTile<'_>,
     visible: &Visible,
     scratch: &mut Scratch,
     tiles: &mut tile::Scratch,
     counts: &mut RayCounts,
+    watch: &mut W,
 ) {
     let frame = tile.frame;
+    watch.enter(Stage::Surfaces);
     scratch.surfaces.find(simd, tile, visible, &mut scratch.facets);
+    watch.enter(Stage::Shading);
     for block in 0..BLOCKS {
         let hit = scratch.surfaces.hit[block];
         if tile.live[block] & !hit != 0 {
@@ -87,7 +91,7 @@ pub(crate) fn shade<S: Simd>(
         }
     }
     for light in &frame.lights {
-        add_light(simd, tile, visible, light, scratch, tiles, counts);
+        add_light(simd, tile, visible, light, scratch, tiles, counts, watch);
     }
 }
 
@@ -107,7 +111,8 @@ fn blend<S: Simd>(simd: S, lanes: u32, a: Vec3x16<S>, b: Vec3x16<S>) -> Vec3x16<
 
 /// One light on all points of a tile: what it would add, then who is in its shadow.
 #[inline(always)]
-fn add_light<S: Simd>(
+#[expect(clippy::too_many_arguments, reason = "what a tile lends each of its lights")]
+fn add_light<S: Simd, W: Watch>(
     simd: S,
     tile: &EyeTile<'_>,
     visible: &Visible,
@@ -115,6 +120,7 @@ fn add_light<S: Simd>(
     scratch: &mut Scratch,
     tiles: &mut tile::Scratch,
     counts: &mut RayCounts,
+    watch: &mut W,
 ) {
     let Scratch { surfaces, colors, contributions, lifted, .. } = scratch;
     let mut lit = [0_u32; BLOCKS];
@@ -137,7 +143,9 @@ fn add_light<S: Simd>(
     }
     if light.shadows {
         counts.shadow += lit.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
+        watch.enter(Stage::Shadows);
         let dark = dark(simd, tile, visible, light, lifted, lit, tiles);
+        watch.enter(Stage::Shading);
         for block in 0..BLOCKS {
             lit[block] &= !dark[block];
         }
