@@ -159,7 +159,7 @@ impl Setting {
     fn picture(&mut self, filter: Filter) {
         let mut picture = RgbImage::new(512, 512);
         for (index, byte) in picture.pixels.iter_mut().enumerate() {
-            *byte = (index * 37 ^ index >> 9) as u8;
+            *byte = ((index * 37) ^ (index >> 9)) as u8;
         }
         match Texture::new(&picture) {
             Ok(texture) => {
