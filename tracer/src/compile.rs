@@ -67,19 +67,34 @@ pub(crate) enum Item {
 /// What the scene asks for: the rest is not computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Features {
-    /// A material with a specular colour: directions to the viewer are needed.
+    /// Something wears a material with a specular colour: directions to the viewer are needed.
     pub specular: bool,
+    /// Something wears a material with a texture.
+    pub textured: bool,
     /// A model with interpolated normals: they differ from the geometric ones.
     pub smooth: bool,
 }
 
 impl Features {
     pub(crate) fn of(scene: &Scene) -> Self {
+        let any = |asks: fn(&Material) -> bool| {
+            worn(scene).any(|index| scene.materials.get(index as usize).is_some_and(asks))
+        };
         Self {
-            specular: scene.materials.iter().any(Material::is_specular),
+            specular: any(Material::is_specular),
+            textured: any(|material| material.texture.is_some()),
             smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
         }
     }
+}
+
+/// Indices of the materials that something in the scene wears.
+fn worn(scene: &Scene) -> impl Iterator<Item = u32> {
+    let on_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
+    on_models
+        .chain(scene.spheres.iter().map(|sphere| sphere.material))
+        .chain(scene.planes.iter().map(|plane| plane.material))
+        .chain(scene.triangles.iter().map(|triangle| triangle.material))
 }
 
 /// Which item indices are which.

@@ -67,7 +67,7 @@ fn raised_to<S: Simd>(simd: S, base: f32x16<S>, exponent: f32) -> f32x16<S> {
     let (mut power, mut square) = (splat(simd, 1.0), base);
     while whole != 0 {
         if whole & 1 == 1 {
-            power = power * square;
+            power *= square;
         }
         square = square * square;
         whole >>= 1;

@@ -65,8 +65,7 @@ pub(super) struct Texels(Colors);
 impl Texels {
     /// `None` for a scene without textures.
     pub(super) fn for_scene(frame: &PreparedFrame) -> Option<Box<Self>> {
-        let has_textures = !frame.textures().is_empty();
-        has_textures.then(|| Box::new(Self([[Lanes([1.0; LANES]); 3]; BLOCKS])))
+        frame.features.textured.then(|| Box::new(Self([[Lanes([1.0; LANES]); 3]; BLOCKS])))
     }
 
     /// No textures in a block yet.

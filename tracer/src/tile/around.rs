@@ -158,7 +158,7 @@ impl Around {
                 & y_from.simd_le(splat(simd, y_hi))
                 & y_to.simd_ge(splat(simd, y_lo))
                 & z_most.simd_ge(splat(simd, least.0[block]));
-            found = found | select_indices(overlap, u32x16::splat(simd, 1 << block), none);
+            found |= select_indices(overlap, u32x16::splat(simd, 1 << block), none);
         }
         let mut by_box = Indices::ZERO;
         by_box.store(found);

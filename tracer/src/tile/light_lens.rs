@@ -55,7 +55,7 @@ impl Extent {
                 }
             }
             for i in 0..3 {
-                weights[i] = weights[i] + weight[i];
+                weights[i] += weight[i];
             }
         }
         let sum = three!(i => DVec3::from_array(three!(axis => f64::from(sums[i].0[axis].reduce_sum()))));
