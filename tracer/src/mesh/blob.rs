@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::{FORMAT_VERSION, MAGIC, MeshError};
 use crate::bvh::{WIDTH, WideNode};
-use crate::simd::Lanes;
+use crate::simd::{Lanes, three};
 
 /// Source of a lane without a triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
@@ -25,7 +25,10 @@ impl TriangleBlock {
     /// Corners of one triangle.
     #[inline(always)]
     pub(crate) fn corners(&self, lane: usize) -> [Vec3; 3] {
-        self.0.map(|[x, y, z]| Vec3::new(x.0[lane], y.0[lane], z.0[lane]))
+        three!(k => {
+            let [x, y, z] = &self.0[k];
+            Vec3::new(x.0[lane], y.0[lane], z.0[lane])
+        })
     }
 }
 

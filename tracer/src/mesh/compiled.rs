@@ -255,6 +255,7 @@ impl CompiledMesh {
     }
 
     /// Corners of triangle `i` in mesh space.
+    #[inline]
     pub fn corners(&self, i: u32) -> [Vec3; 3] {
         self.blocks()[i as usize / WIDTH].corners(i as usize % WIDTH)
     }

@@ -7,6 +7,7 @@ use super::near_ray::NearRay;
 use crate::bvh::WIDTH;
 use crate::mesh::TriangleBlock;
 use crate::simd::{Simd, SimdBase, bits, f32x16, fma, select, splat, three};
+use crate::triangle::axes_ending_with;
 
 /// A ray as triangles want it: permuted and sheared so that it runs along the last axis.
 pub(super) struct FilterRay {
@@ -22,10 +23,10 @@ pub(super) struct FilterRay {
 impl FilterRay {
     #[inline(always)]
     pub(super) fn new(ray: &NearRay) -> Self {
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][ray.axis];
-        let per_depth = ray.inverse[ray.axis];
+        let axes = axes_ending_with(ray.axis);
+        let per_depth = ray.inverse[ray.axis % 4];
         let shear = [-ray.direction[axes[0]] * per_depth, -ray.direction[axes[1]] * per_depth];
-        let origin = axes.map(|axis| ray.origin[axis]);
+        let origin = three!(k => ray.origin[axes[k]]);
         Self { axes, origin, shear, per_depth, error: ray.error }
     }
 

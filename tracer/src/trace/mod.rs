@@ -11,6 +11,7 @@ mod search;
 mod tests;
 mod walk;
 
+use std::hint::black_box;
 use std::ops::ControlFlow::{self, Continue};
 
 use glam::{DVec3, Vec3};
@@ -19,12 +20,12 @@ use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
 use crate::mesh::TriangleBlock;
-use crate::simd::{Simd, dispatch, each_bit};
+use crate::simd::{Simd, dispatch, each_bit, three};
 use crate::triangle::ShearedRay;
 use filter::FilterRay;
 use near_ray::NearRay;
 use search::{Any, Closest, Offer, Search};
-use walk::{Leaves, Stack, walk};
+use walk::{Leaves, Stack, walk, with_stack};
 
 /// o + t d in eye space; d need not be a unit vector.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +103,8 @@ impl PreparedFrame {
     /// The closest hit with 0 < t < `t_max`: its t, and what is there.
     pub(crate) fn closest(&self, ray: &Ray, t_max: f64) -> Option<(f64, PrimitiveId)> {
         let mut closest = Closest::new(self, ray, t_max);
-        let _ = dispatch!(self.level, simd => self.search(simd, ray, &mut closest));
+        let _ =
+            with_stack(|stack| dispatch!(self.level, simd => self.search(simd, ray, stack, &mut closest)));
         closest.found()
     }
 
@@ -113,7 +115,7 @@ impl PreparedFrame {
 
     fn is_occluded(&self, ray: &Ray, t_max: f64, leaving: Option<PrimitiveId>) -> bool {
         let mut any = Any { frame: self, ray, t_max, leaving };
-        dispatch!(self.level, simd => self.search(simd, ray, &mut any)).is_break()
+        with_stack(|stack| dispatch!(self.level, simd => self.search(simd, ray, stack, &mut any))).is_break()
     }
 
     /// The hit of one primitive, to the last digit.
@@ -150,7 +152,8 @@ impl PreparedFrame {
             Item::Model(index) => {
                 let instance = &self.instances[index];
                 let local = instance.to_mesh(ray);
-                let corners = instance.mesh.corners(triangle).map(Vec3::as_dvec3);
+                let corners = instance.mesh.corners(triangle);
+                let corners = three!(k => corners[k].as_dvec3());
                 ShearedRay::new(local.origin, local.direction).intersect(&corners)
             }
         }
@@ -158,17 +161,17 @@ impl PreparedFrame {
 
     /// Offers every primitive to `search` that the ray may hit, those in nearer boxes earlier.
     #[inline(always)]
-    fn search<S: Simd>(&self, simd: S, ray: &Ray, search: &mut impl Search) -> ControlFlow<()> {
+    fn search<S: Simd>(&self, simd: S, ray: &Ray, stack: Stack, search: &mut impl Search) -> ControlFlow<()> {
         for plane in 0..self.planes.len() as u32 {
             self.offer_item(ray, self.items.first_plane() + plane, search)?;
         }
-        let mut items = ItemLeaves { frame: self, ray, stack: Stack::new(), search };
-        if self.nodes[0].count == 1 && self.nodes.len() == 1 {
-            return items.visit_items(simd, 0);
+        // A model alone: the scene's tree has nothing to add to its own.
+        if let ([instance], 1) = (&self.instances[..], self.items.first_plane()) {
+            return instance.search(simd, ray, 0, stack, search);
         }
         let bounds = || self.nodes[0].bounds();
         let Some(near) = NearRay::new(*ray, bounds) else { return Continue(()) };
-        walk(simd, &self.nodes, &near, &mut Stack::new(), &mut items)
+        walk(simd, &self.nodes, &near, stack, &mut ItemLeaves { frame: self, ray, search })
     }
 
     /// A sphere, a plane or a triangle of the scene file.
@@ -210,24 +213,7 @@ impl PreparedFrame {
 struct ItemLeaves<'a, T> {
     frame: &'a PreparedFrame,
     ray: &'a Ray,
-    /// For the trees of meshes.
-    stack: Stack,
     search: &'a mut T,
-}
-
-impl<T: Search> ItemLeaves<'_, T> {
-    #[inline(always)]
-    fn visit_items<S: Simd>(&mut self, simd: S, leaf: u32) -> ControlFlow<()> {
-        for &item in self.frame.items_of(leaf) {
-            if let Item::Model(index) = self.frame.items.get(item) {
-                let instance = &self.frame.instances[index];
-                instance.search(simd, self.ray, item, &mut self.stack, self.search)?;
-            } else {
-                self.frame.offer_item(self.ray, item, self.search)?;
-            }
-        }
-        Continue(())
-    }
 }
 
 impl<S: Simd, T: Search> Leaves<S> for ItemLeaves<'_, T> {
@@ -237,8 +223,16 @@ impl<S: Simd, T: Search> Leaves<S> for ItemLeaves<'_, T> {
     }
 
     #[inline(always)]
-    fn visit(&mut self, simd: S, leaf: u32, _: f32) -> ControlFlow<()> {
-        self.visit_items(simd, leaf)
+    fn visit(&mut self, simd: S, leaf: u32, _: f32, mut stack: Stack) -> ControlFlow<(), bool> {
+        for &item in self.frame.items_of(leaf) {
+            if let Item::Model(index) = self.frame.items.get(item) {
+                let instance = &self.frame.instances[index];
+                instance.search(simd, self.ray, item, stack.above(), self.search)?;
+            } else {
+                self.frame.offer_item(self.ray, item, self.search)?;
+            }
+        }
+        Continue(true)
     }
 }
 
@@ -247,7 +241,6 @@ struct TriangleLeaves<'a, T> {
     item: u32,
     blocks: &'a [TriangleBlock],
     near: &'a NearRay,
-    filter: FilterRay,
     search: &'a mut T,
 }
 
@@ -258,8 +251,10 @@ impl<S: Simd, T: Search> Leaves<S> for TriangleLeaves<'_, T> {
     }
 
     #[inline(always)]
-    fn visit(&mut self, simd: S, leaf: u32, reach: f32) -> ControlFlow<()> {
-        let hits = self.filter.hits(simd, &self.blocks[leaf as usize], reach);
+    fn visit(&mut self, simd: S, leaf: u32, reach: f32, _: Stack) -> ControlFlow<(), bool> {
+        // Made for each block: many rays see none, few see many. Not before the walk either: see `walk`.
+        let filter = FilterRay::new(black_box(self.near));
+        let hits = filter.hits(simd, &self.blocks[leaf as usize], reach);
         for lane in each_bit(hits.maybe) {
             let triangle = leaf * WIDTH as u32 + lane as u32;
             let primitive = PrimitiveId { item: self.item, triangle };
@@ -269,7 +264,7 @@ impl<S: Simd, T: Search> Leaves<S> for TriangleLeaves<'_, T> {
                 self.search.offer(Offer { primitive, certain, low, high })?;
             }
         }
-        Continue(())
+        Continue(hits.maybe != 0)
     }
 }
 
@@ -281,14 +276,13 @@ impl Instance {
         simd: S,
         ray: &Ray,
         item: u32,
-        stack: &mut Stack,
+        stack: Stack,
         search: &mut impl Search,
     ) -> ControlFlow<()> {
         let whole_mesh = || (Vec3::NEG_ONE, Vec3::ONE);
         let Some(near) = NearRay::new(self.to_mesh(ray), whole_mesh) else { return Continue(()) };
-        let filter = FilterRay::new(&near);
         let blocks = self.mesh.blocks();
-        let mut triangles = TriangleLeaves { item, blocks, near: &near, filter, search };
+        let mut triangles = TriangleLeaves { item, blocks, near: &near, search };
         walk(simd, self.mesh.nodes(), &near, stack, &mut triangles)
     }
 

@@ -1,19 +1,19 @@
 //! A ray in `f32`, near what it may hit, and what the rounding may cost.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::Ray;
 
 /// Rays that start farther out than this, in units of their space (what is traced lies within [-1, 1] or so), are started
 /// where they come near: then the digits of an `f32` are spent there, however far the ray comes from.
-pub(super) const FAR: f64 = 4.0;
+pub(super) const FAR: f32 = 4.0;
 
 /// Error of a coordinate relative to a corner, sheared, in shares of the largest number that went into it: the sum of
 /// ten roundings of at most 2^-24, and room.
-const ROUNDING: f64 = 0.75 / (1 << 20) as f64;
+const ROUNDING: f32 = 0.75 / (1 << 20) as f32;
 
 /// Directions whose largest component is not within these are scaled, so that no product overflows in `f32`.
-const USUAL: std::ops::Range<f64> = 1.0 / (1 << 30) as f64..(1 << 30) as f64;
+const USUAL: std::ops::Range<f32> = 1.0 / (1 << 30) as f32..(1 << 30) as f32;
 
 /// Components of directions are at least this large: the ray is tilted by less than the error that its coordinates have
 /// anyhow, and no reciprocal overflows.
@@ -25,10 +25,11 @@ const RUN_UP: f64 = 1.0 / (1 << 18) as f64;
 
 /// A ray with a direction of no unusual length.
 pub(super) struct NearRay {
-    pub origin: [f32; 3],
-    pub direction: [f32; 3],
+    /// By axis. The fourth numbers of all are idle: a number below four is an index that needs no check.
+    pub origin: [f32; 4],
+    pub direction: [f32; 4],
     /// Reciprocals of the direction.
-    pub inverse: [f32; 3],
+    pub inverse: [f32; 4],
     /// The axis of the largest component of the direction.
     pub axis: usize,
     /// Bound for the error of coordinates.
@@ -42,35 +43,33 @@ pub(super) struct NearRay {
 impl NearRay {
     /// `None` if the ray misses the box by far.
     #[inline(always)]
-    pub(super) fn new(mut ray: Ray, bounds: impl FnOnce() -> (Vec3, Vec3)) -> Option<Self> {
-        let reach = ray.origin.abs().max_element();
+    pub(super) fn new(ray: Ray, bounds: impl FnOnce() -> (Vec3, Vec3)) -> Option<Self> {
+        let mut origin = in_four(ray.origin);
+        let mut size = largest(&origin);
         let mut start = 0.0;
-        if !(reach <= FAR) {
+        if !(size <= FAR) {
+            // The last part is the rounding of the origin in `f64`.
+            let rounding = ray.origin.abs().max_element() / f64::from(1 << 26);
             start = approach(&ray, bounds())?;
-            ray.origin += ray.direction * start;
+            origin = in_four(ray.origin + ray.direction * start);
+            size = largest(&origin) + rounding as f32;
         }
-        // The last part is the rounding of the origin in `f64`.
-        let size = 1.0 + ray.origin.abs().max_element() + reach / f64::from(1 << 26);
-        let [x, y, z] = ray.direction.abs().to_array();
-        let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(y < z) };
-        let largest = x.max(y).max(z);
+        let mut direction = in_four(ray.direction);
         let (mut scale, mut per_t) = (1.0, 1.0);
-        if !USUAL.contains(&largest) {
-            (scale, per_t) = power_of_two_at(largest);
-            ray.direction *= scale;
+        if !USUAL.contains(&largest(&direction)) {
+            (scale, per_t) = power_of_two_at(ray.direction.abs().max_element());
+            direction = in_four(ray.direction * scale);
         }
-        let direction = ray.direction.as_vec3();
-        let least = direction.abs().max(Vec3::splat(LEAST_COMPONENT));
-        Some(Self {
-            origin: ray.origin.as_vec3().to_array(),
-            direction: direction.to_array(),
-            inverse: (Vec3::ONE / least.copysign(direction)).to_array(),
-            axis,
-            error: (size * ROUNDING) as f32,
-            start,
-            scale,
-            per_t,
-        })
+        let mut inverse = [0.0; 4];
+        for (inverse, component) in inverse.iter_mut().zip(direction) {
+            let size = component.abs();
+            *inverse =
+                1.0 / (if size > LEAST_COMPONENT { size } else { LEAST_COMPONENT }).copysign(component);
+        }
+        let [x, y, z, _] = direction;
+        let (x, y, z) = (x.abs(), y.abs(), z.abs());
+        let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(y < z) };
+        Some(Self { origin, direction, inverse, axis, error: (1.0 + size) * ROUNDING, start, scale, per_t })
     }
 
     /// The t of a distance.
@@ -85,6 +84,19 @@ impl NearRay {
         const UP: f64 = 1.0 + 1.0 / (1 << 22) as f64;
         ((t - self.start) * self.per_t * UP) as f32 + f32::MIN_POSITIVE
     }
+}
+
+#[inline(always)]
+fn in_four(vector: DVec3) -> [f32; 4] {
+    [vector.x as f32, vector.y as f32, vector.z as f32, 1.0]
+}
+
+/// The magnitude of the largest of three. `f32::max` takes care of NaN, which costs two instructions more each.
+#[inline(always)]
+fn largest(&[x, y, z, _]: &[f32; 4]) -> f32 {
+    let (x, y, z) = (x.abs(), y.abs(), z.abs());
+    let two = if x > y { x } else { y };
+    if two > z { two } else { z }
 }
 
 /// Two powers of two: one that brings `number` into [1, 2), and its reciprocal.
