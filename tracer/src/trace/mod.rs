@@ -20,7 +20,7 @@ use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
 use crate::mesh::TriangleBlock;
-use crate::simd::{Simd, dispatch, each_bit, three};
+use crate::simd::{Simd, dispatch, each_bit, prefetch, three};
 use crate::triangle::ShearedRay;
 use filter::FilterRay;
 use near_ray::NearRay;
@@ -234,6 +234,9 @@ impl<S: Simd, T: Search> Leaves<S> for ItemLeaves<'_, T> {
         }
         Continue(true)
     }
+
+    #[inline(always)]
+    fn prefetch(&self, _: u32) {}
 }
 
 /// Blocks of triangles of a mesh.
@@ -265,6 +268,13 @@ impl<S: Simd, T: Search> Leaves<S> for TriangleLeaves<'_, T> {
             }
         }
         Continue(hits.maybe != 0)
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, leaf: u32) {
+        if let Some(block) = self.blocks.get(leaf as usize) {
+            prefetch(block);
+        }
     }
 }
 

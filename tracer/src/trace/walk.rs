@@ -19,6 +19,9 @@ pub(super) trait Leaves<S: Simd> {
     /// Looks at one leaf, within [0, `reach`]; may stop the walk, else tells whether the limit may have changed.
     /// What is above on the stack is free.
     fn visit(&mut self, simd: S, leaf: u32, reach: f32, stack: Stack) -> ControlFlow<(), bool>;
+
+    /// Has a leaf that may be visited later brought into the cache.
+    fn prefetch(&self, leaf: u32);
 }
 
 /// Visits each leaf that the ray may touch, nearer ones earlier.
@@ -36,7 +39,7 @@ pub(super) fn walk<S: Simd>(
     while let Some(link) = next {
         // Lanes filled with a ray's numbers would else be made once, before the loop, and saved in memory around the
         // calls of a visit, at more than it costs to fill them from the numbers again.
-        let Some(leaf) = stack.next_leaf(simd, nodes, black_box(&slabs), link, reach) else { break };
+        let Some(leaf) = stack.next_leaf(simd, nodes, leaves, black_box(&slabs), link, reach) else { break };
         if leaves.visit(simd, leaf, reach, stack.above())? {
             reach = ray.distance(leaves.limit());
         }
@@ -147,6 +150,7 @@ impl Stack<'_> {
         &mut self,
         simd: S,
         nodes: &[WideNode],
+        leaves: &impl Leaves<S>,
         slabs: &Slabs<'_>,
         mut next: u32,
         reach: f32,
@@ -161,7 +165,7 @@ impl Stack<'_> {
                     next = if entered == 0 {
                         self.pop(reach)?
                     } else {
-                        self.push_all_but_nearest(node, entered, &near.to_array())
+                        self.push_all_but_nearest(leaves, node, entered, &near.to_array())
                     };
                 }
             }
@@ -170,7 +174,13 @@ impl Stack<'_> {
 
     /// Pushes the children in `entered`, of which there is one at least, but for the nearest, which it returns.
     #[inline(always)]
-    fn push_all_but_nearest(&mut self, node: &WideNode, entered: u32, near: &[f32; WIDTH]) -> u32 {
+    fn push_all_but_nearest<S: Simd>(
+        &mut self,
+        leaves: &impl Leaves<S>,
+        node: &WideNode,
+        entered: u32,
+        near: &[f32; WIDTH],
+    ) -> u32 {
         let first = entered.trailing_zeros() as usize;
         let mut others = entered & (entered - 1);
         if others == 0 {
@@ -181,12 +191,15 @@ impl Stack<'_> {
         // nobody can predict. More than three are sorted in part: a walk in any order finds the same.
         let lane = others.trailing_zeros() as usize;
         let (mut below, other) = (self.len, key(node, near, lane));
-        self.keys[below % ROOM] = nearest.max(other);
+        let farther = nearest.max(other);
+        self.keys[below % ROOM] = farther;
+        prefetch_leaf(leaves, farther);
         nearest = nearest.min(other);
         others &= others - 1;
         while others != 0 {
             let other = key(node, near, others.trailing_zeros() as usize);
             let farther = nearest.max(other);
+            prefetch_leaf(leaves, farther);
             nearest = nearest.min(other);
             let top = self.keys[below % ROOM];
             self.keys[below % ROOM] = top.max(farther);
@@ -216,4 +229,12 @@ impl Stack<'_> {
 #[inline(always)]
 fn key(node: &WideNode, near: &[f32; WIDTH], lane: usize) -> u64 {
     u64::from(near[lane % WIDTH].to_bits()) << 32 | u64::from(node.link(lane % WIDTH))
+}
+
+/// Nodes are few, and near in the cache anyhow.
+#[inline(always)]
+fn prefetch_leaf<S: Simd>(leaves: &impl Leaves<S>, key: u64) {
+    if let WideChild::Block(leaf) = WideChild::of(key as u32) {
+        leaves.prefetch(leaf);
+    }
 }
