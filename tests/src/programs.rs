@@ -22,8 +22,8 @@ fn folder() -> &'static Path {
         let test = std::env::current_exe().unwrap();
         let profile = test.parent().and_then(Path::parent).unwrap().to_path_buf();
         let mut build = Command::new(env!("CARGO"));
-        // All targets, as the tests themselves are built: what they share is then built once.
-        build.args(["build", "--quiet", "--workspace", "--all-targets"]);
+        // With what `cargo test` builds as well: what they share is then built once.
+        build.args(["build", "--quiet", "--workspace", "--lib", "--bins", "--examples", "--tests"]);
         build.arg("--target-dir").arg(profile.parent().unwrap());
         if profile.ends_with("release") {
             build.arg("--release");
