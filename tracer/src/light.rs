@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::scene::{Attenuation, Light, LightKind};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, SimdBase, SimdFloat, bits, f32x16, select, splat};
+use crate::simd::{Simd, SimdBase, SimdFloat, bits, f32x16, select, splat, three};
 
 /// Where a shadow ray ends, in shares of the way to the light. A surface that holds the light does not hide it: points
 /// are `f32`, so what stands within the last 2^-18 of the way cannot be told from the light's own place.
@@ -93,9 +93,12 @@ impl EyeLight {
         };
         let strength = attenuation * share;
         let reached = size.simd_gt(splat(simd, 0.0)) & strength.simd_gt(splat(simd, 0.0));
+        // Bounded: an infinite light would make NaN of a colour's zeros.
+        let brightest = splat(simd, f32::MAX);
+        let radiance = color.scale(strength);
         Incidence {
             direction,
-            radiance: color.scale(strength),
+            radiance: Vec3x16(three!(i => radiance.0[i].min(brightest))),
             reached: bits(reached & strength.is_finite()),
         }
     }

@@ -198,9 +198,11 @@ fn a_scene_scaled_by_a_power_of_two_is_the_same_picture_bit_for_bit() {
     }
     let (instanced, mesh) = instanced(96, 64);
     let (expected, _) = render(&instanced, std::slice::from_ref(&mesh), &FrameView::of(&instanced));
-    let larger = scaled(&instanced, 1024.0);
-    let (image, _) = render(&larger, &[mesh], &FrameView::of(&larger));
-    assert!(image == expected, "instances");
+    for exponent in [-40, 10, 40] {
+        let scaled = scaled(&instanced, f64::from(exponent).exp2());
+        let (image, _) = render(&scaled, std::slice::from_ref(&mesh), &FrameView::of(&scaled));
+        assert!(image == expected, "instances, 2^{exponent}");
+    }
 }
 
 fn scaled(scene: &Scene, factor: f64) -> Scene {

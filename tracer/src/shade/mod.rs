@@ -16,6 +16,8 @@ mod material;
 mod space;
 mod specular;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod texel;
 
 use crate::frame::PreparedFrame;

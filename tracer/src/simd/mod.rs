@@ -187,7 +187,8 @@ fn name_of<S: Simd>(_: S) -> &'static str {
     }
 }
 
-/// All levels that this machine has, the portable one last: tests hold them against each other.
+/// All levels that this machine has, the lowest last: tests hold them against each other. With the feature `portable` the
+/// last one does lanes one by one.
 #[cfg(test)]
 pub(crate) fn all() -> Vec<Level> {
     let mut levels = vec![best()];
@@ -199,5 +200,7 @@ pub(crate) fn all() -> Vec<Level> {
         levels.extend(best.as_sse2().map(Level::Sse2));
     }
     levels.push(Level::baseline());
+    #[cfg(feature = "portable")]
+    levels.push(Level::fallback());
     levels
 }

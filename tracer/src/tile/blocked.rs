@@ -8,7 +8,7 @@ use super::shadow::ShadowTile;
 use super::walk::{Frontier, Interest};
 use super::{ALL_BLOCKS, BLOCKS, Rays};
 use crate::compile::Item;
-use crate::simd::{Lanes, Simd, SimdBase, bits, each_bit, f32x16, splat, three, u32x16};
+use crate::simd::{Lanes, Simd, SimdBase, bits, each_bit, f32x16, splat, u32x16};
 use crate::trace::PrimitiveId;
 
 /// A triangle this many times closer to the light than a point lies before `t_light` for certain: half of what that allows.
@@ -46,8 +46,7 @@ impl Blocked<'_> {
             }
             Item::Triangle(index) => {
                 let corners = self.tile.frame.triangles[index].corners;
-                let corners = three!(k => lens.exact(corners[k]));
-                flats.set_up_exactly(0, lens.parallel, corners, self.rays);
+                flats.set_up_exactly(0, lens, corners, self.rays);
                 cover_set_up(simd, flats, 0, ALL_BLOCKS, self);
             }
             Item::Sphere(_) => self.ask_item(),

@@ -2,11 +2,11 @@
 
 use super::Rays;
 use super::lens::Lens;
-use super::setup::{Flats, through};
+use super::setup::Flats;
 use super::walk::{Frontier, Interest, Leaf, Walk, WalkStack, open_blocks};
 use crate::bvh::WIDTH;
 use crate::mesh::{CompiledMesh, TriangleBlock};
-use crate::simd::{Simd, each_bit, prefetch};
+use crate::simd::{Simd, each_bit, prefetch, three};
 
 /// What a tile asks of triangles.
 pub(super) trait Question<S: Simd>: Interest<S> {
@@ -91,7 +91,8 @@ fn cover_leaf<S: Simd, Q: Question<S>>(
         },
     );
     for lane in each_bit(crossing) {
-        flats.set_up_exactly(lane, lens.parallel, through(lens, leaf.corners(lane)), rays);
+        let corners = leaf.corners(lane);
+        flats.set_up_exactly(lane, lens, three!(k => corners[k].as_dvec3()), rays);
         cover_set_up(simd, flats, first, blocks, question);
     }
 }

@@ -12,6 +12,12 @@ use crate::simd::three;
 /// Relative error of a number that went through a handful of `f32` operations.
 pub(super) const ROUNDING: f32 = 1.0 / (1 << 22) as f32;
 
+/// The same for `f64`.
+const EXACT_ROUNDING: f64 = 1.0 / (1_u64 << 50) as f64;
+
+/// The scene lies this far from the eye at most, in eye units, also when it spins.
+const SCENE: f64 = 2.0;
+
 /// Of one space into another: a row for each coordinate there, three factors and a constant.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Affine(pub [[f64; 4]; 3]);
@@ -66,6 +72,8 @@ pub(crate) struct Lens {
     pub error: [f32; 2],
     /// Seen along parallel rays, not from a point.
     pub parallel: bool,
+    /// Error of [`Lens::exact`] for points of the scene.
+    pub exact_error: f64,
     exact: Affine,
 }
 
@@ -74,11 +82,14 @@ impl Lens {
     #[inline(always)]
     pub(crate) fn new(exact: Affine, reach: f64, parallel: bool) -> Self {
         let mut size = [0.0; 3];
+        let mut exact_size = 0.0_f64;
         for i in 0..3 {
             let row = exact.0[i];
-            size[i] = (row[0].abs() + row[1].abs() + row[2].abs()) * reach + row[3].abs();
+            let factors = row[0].abs() + row[1].abs() + row[2].abs();
+            size[i] = factors * reach + row[3].abs();
+            exact_size = exact_size.max(factors * reach.max(SCENE) + row[3].abs());
         }
-        Self::with_sizes(exact, size, parallel)
+        Self { exact_error: exact_size * EXACT_ROUNDING, ..Self::with_sizes(exact, size, parallel) }
     }
 
     /// `size` bounds the numbers that go into each row.
@@ -91,13 +102,16 @@ impl Lens {
             }
         }
         let error = [size[0].max(size[1]) as f32 * ROUNDING, size[2] as f32 * ROUNDING];
-        Self { rows, error, parallel, exact }
+        let exact_error = size[0].max(size[1]).max(size[2]) * EXACT_ROUNDING;
+        Self { rows, error, parallel, exact_error, exact }
     }
 
     /// The same picture of another space, of which `placement` is the place in this one.
     #[inline(always)]
     pub(crate) fn of(&self, placement: &Affine, reach: f64) -> Lens {
-        Lens::new(self.exact.after(placement), reach, self.parallel)
+        let lens = Lens::new(self.exact.after(placement), reach, self.parallel);
+        // What the placement was rounded by stays, also where its constant cancels ours.
+        Lens { exact_error: lens.exact_error + self.exact_error, ..lens }
     }
 
     /// The same picture, of points given relative to a place of this space, at most `reach` from it on each axis: their few
@@ -115,7 +129,7 @@ impl Lens {
         Lens::with_sizes(exact, size, self.parallel)
     }
 
-    /// (a, b, g) of a point, to the last digit.
+    /// (a, b, g) of a point, but for [`Lens::exact_error`].
     pub(crate) fn exact(&self, point: DVec3) -> DVec3 {
         self.exact.apply(point)
     }

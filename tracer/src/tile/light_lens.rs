@@ -68,9 +68,13 @@ impl Extent {
         }
     }
 
-    /// A lens at the light, towards the middle of the points; `None` if they stand too far apart, or at the light.
+    /// A lens at the light, towards the middle of the points; `None` if they stand too far apart, at the light, or out of reach.
     pub(super) fn lens(&self, light: Source) -> Option<Lens> {
         let &Self { lo, hi, across, along } = self;
+        if !(across + along).is_finite() {
+            // A point of a plane may be too far away for an `f32`: the others keep their shadows.
+            return None;
+        }
         let middle = self.middle().as_dvec3();
         let reach = f64::from(lo.abs().max(hi.abs()).max_element());
         // The picture of a lens at `from`.

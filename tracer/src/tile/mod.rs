@@ -29,6 +29,8 @@ mod light_lens;
 mod points;
 mod setup;
 pub(crate) mod shadow;
+#[cfg(test)]
+mod tests;
 pub(crate) mod visible;
 mod walk;
 

@@ -5,7 +5,7 @@
 //! Conversion using 2D Homogeneous Coordinates", 1997). Sixteen triangles at once, with a bound for the error of E
 //! and of z. A triangle that reaches behind the lens takes the long way, alone and in `f64`.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::Rays;
 use super::lens::{Lens, ROUNDING};
@@ -153,27 +153,33 @@ impl Flats {
     }
 
     /// The long way for one triangle that reaches behind the lens, or has more digits than a mesh: in `f64`, with lines from
-    /// the cross products of (a, b, g), which need no division. It is not seen if it has no area in the picture, or lies
-    /// beside it.
-    pub(super) fn set_up_exactly(&mut self, lane: usize, parallel: bool, corners: [DVec3; 3], rays: &Rays) {
+    /// the cross products of (a, b, g), which need no division. It is not seen if it lies beside the picture. `corners` are
+    /// in the space that the lens looks at.
+    pub(super) fn set_up_exactly(&mut self, lane: usize, lens: &Lens, corners: [DVec3; 3], rays: &Rays) {
         self.seen = 0;
+        let corners = three!(k => lens.exact(corners[k]));
         // z g at the corners, with g = 1 for parallel rays.
-        let closeness = three!(k => if parallel { -corners[k].z } else { 1.0 });
-        let [a, b, c] = three!(k => if parallel { corners[k].with_z(1.0) } else { corners[k] });
+        let closeness = three!(k => if lens.parallel { -corners[k].z } else { 1.0 });
+        let [a, b, c] = three!(k => if lens.parallel { corners[k].with_z(1.0) } else { corners[k] });
         let normals = [b.cross(c), c.cross(a), a.cross(b)];
         let determinant = a.dot(normals[0]);
         let scale = normals[0].abs().max(normals[1].abs()).max(normals[2].abs()).max_element();
-        if determinant == 0.0 || scale == 0.0 || !scale.is_finite() {
-            // Edge-on, to the last digit: no ray hits it.
-            return;
+        // What the corners are off by, in the normals and in the determinant.
+        let largest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        let normal_error = 8.0 * lens.exact_error * largest;
+        let determinant_error = 3.0 * (lens.exact_error * scale + largest * normal_error);
+        if !(determinant.abs() > determinant_error && scale.is_finite()) {
+            // Edge-on to nearly the last digit.
+            return self.set_unknown(lane, rays);
         }
         let reach = rays.reach();
         let size = |[e, ex, ey]: [f32; 3]| e.abs() + reach * (ex.abs() + ey.abs());
+        let line_error = (normal_error / scale) as f32 * (1.0 + 2.0 * reach);
         let mut slack = 0.0_f32;
         for (edge, normal) in normals.into_iter().enumerate() {
             let line = normal * (determinant.signum() / scale);
             let [ex, ey, e] = line.as_vec3().to_array();
-            let error = 4.0 * ROUNDING * size([e, ex, ey]) + (ex.abs() + ey.abs()) * rays.error;
+            let error = 4.0 * ROUNDING * size([e, ex, ey]) + (ex.abs() + ey.abs()) * rays.error + line_error;
             let x = rays.union[usize::from(ex > 0.0)];
             let y = rays.union[2 + usize::from(ey > 0.0)];
             if e + error + ex * x + ey * y < 0.0 {
@@ -185,13 +191,18 @@ impl Flats {
             slack = slack.max(2.0 * error);
         }
         self.slack.0[lane] = slack;
-        let z =
-            (normals[0] * closeness[0] + normals[1] * closeness[1] + normals[2] * closeness[2]) / determinant;
+        let sum = normals[0] * closeness[0] + normals[1] * closeness[1] + normals[2] * closeness[2];
+        let z = sum / determinant;
+        let most = closeness[0].abs().max(closeness[1].abs()).max(closeness[2].abs());
+        let sum_error = 3.0 * (normal_error * most + lens.exact_error * scale);
+        let gradient_error = (sum_error + z.abs().max_element() * determinant_error) / determinant.abs();
         let [zx, zy, z0] = z.as_vec3().to_array();
         for (lanes, number) in self.z.iter_mut().zip([z0, zx, zy]) {
             lanes.0[lane] = number;
         }
-        let z_error = 4.0 * ROUNDING * size([z0, zx, zy]) + (zx.abs() + zy.abs()) * rays.error;
+        let z_error = 4.0 * ROUNDING * size([z0, zx, zy])
+            + (zx.abs() + zy.abs()) * rays.error
+            + gradient_error as f32 * (1.0 + 2.0 * reach);
         self.z_error.0[lane] = z_error;
         for (lanes, side) in self.around.iter_mut().zip(rays.union) {
             lanes.0[lane] = side;
@@ -199,6 +210,24 @@ impl Flats {
         // Of the plane over the tile: the triangle itself may reach behind the lens.
         let [x_lo, x_hi, y_lo, y_hi] = rays.union;
         self.z_most.0[lane] = z0 + (zx * x_lo).max(zx * x_hi) + (zy * y_lo).max(zy * y_hi) + z_error;
+        self.seen = 1 << lane;
+    }
+
+    /// A triangle of which nothing can be told: it may be anywhere, and every ray is asked about it.
+    #[cold]
+    fn set_unknown(&mut self, lane: usize, rays: &Rays) {
+        for edge in 0..3 {
+            self.e[edge].0[lane] = 1.0;
+            self.ex[edge].0[lane] = 0.0;
+            self.ey[edge].0[lane] = 0.0;
+            self.z[edge].0[lane] = 0.0;
+        }
+        self.slack.0[lane] = f32::INFINITY;
+        self.z_error.0[lane] = f32::INFINITY;
+        self.z_most.0[lane] = f32::INFINITY;
+        for (lanes, side) in self.around.iter_mut().zip(rays.union) {
+            lanes.0[lane] = side;
+        }
         self.seen = 1 << lane;
     }
 
@@ -268,11 +297,6 @@ fn row<S: Simd>(simd: S, row: [f32; 4], corner: &[Lanes; 3]) -> f32x16<S> {
     let xy = fma(splat(simd, row[1]), corner[1].load(simd), splat(simd, row[3]));
     let z = fma(splat(simd, row[2]), corner[2].load(simd), xy);
     fma(splat(simd, row[0]), corner[0].load(simd), z)
-}
-
-/// Corners of a mesh's triangle, seen through a lens.
-pub(super) fn through(lens: &Lens, corners: [Vec3; 3]) -> [DVec3; 3] {
-    three!(k => lens.exact(corners[k].as_dvec3()))
 }
 
 /// The lines and the closeness of triangles at places: one triangle at sixteen, or sixteen at one.

@@ -184,8 +184,7 @@ impl<'a> EyeTile<'a> {
                     }
                     Item::Triangle(index) => {
                         let corners = self.frame.triangles[index].corners;
-                        let corners = three!(k => self.lens.exact(corners[k]));
-                        flats.set_up_exactly(0, false, corners, self.rays);
+                        flats.set_up_exactly(0, &self.lens, corners, self.rays);
                         cover_set_up(simd, flats, 0, ALL_BLOCKS, &mut nearest);
                     }
                     Item::Sphere(_) => nearest.ask_every_ray(simd),
