@@ -1,6 +1,6 @@
 //! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] one colour, exactly rounded; [`encode_lanes`] sixteen colours at
-//! once by a polynomial, exact but within 10^-4 of a step of a threshold. Pictures of one sample take the second, means
-//! of several the first.
+//! once by a polynomial, exact but within 10^-4 of a step of a threshold. Pictures take the
+//! second, the oracle and its tests the first.
 //!
 //! 255 thresholds, computed once in `f64`, say where one code ends and the next begins. A table over the leading bits
 //! of the number finds the first candidate; a comparison or two does the rest. No libm in the per-pixel path, so all

@@ -1,6 +1,6 @@
 //! Bounding volume hierarchies: built by `obvhs`, kept in an own layout, walked by an own traversal.
 //!
-//! Binary trees stand over the items of a scene (they never travel); over the triangles of a mesh they are widened, so that one vector
+//! Binary trees are widened, over the items of a scene (those never travel) as over the triangles of a mesh, so that one vector
 //! operation looks at sixteen boxes.
 
 mod build;

@@ -32,7 +32,7 @@ impl TriangleBlock {
     }
 }
 
-/// Alignment of sections, in bytes: one cache line, and what a [`crate::bvh::Node`] wants.
+/// Alignment of sections, in bytes: one cache line, and what a [`WideNode`] wants.
 pub(super) const ALIGN: usize = 64;
 
 /// One cache line of bytes.
