@@ -121,6 +121,9 @@ pub(crate) struct RenderArgs {
     /// Frames to render.
     #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
     pub(crate) frames: u32,
+    /// Begin when N workers are connected, and not before; without it, when the local ones are.
+    #[arg(long, value_name = "N", value_parser = worker_count)]
+    pub(crate) wait_for_workers: Option<u32>,
     /// Write a CSV line per frame.
     #[arg(long, value_name = "FILE")]
     pub(crate) fps_log: Option<PathBuf>,

@@ -44,7 +44,11 @@ fn one_two_and_three_workers_render_the_bytes_of_the_tracer() {
     let expected = traced(&scene);
     for workers in ["1", "2", "3"] {
         let name = format!("by-{workers}.png");
-        let report = render(&scene, &scenes.path(&name), &["--local-workers", workers, "--threads", "1"]);
+        let report = render(
+            &scene,
+            &scenes.path(&name),
+            &["--local-workers", workers, "--wait-for-workers", workers, "--threads", "1"],
+        );
         let image = rayfarm_tracer::image::load(&scenes.path(&name)).unwrap();
         assert!(image == expected, "{workers} workers");
         assert_eq!(report["workers"], workers.parse::<u32>().unwrap());
@@ -113,7 +117,11 @@ fn textures_travel_with_the_scene() {
     let expected = traced(&scene);
     for workers in ["1", "2"] {
         let output = scenes.path("textured.png");
-        let report = render(&scene, &output, &["--local-workers", workers, "--threads", "1"]);
+        let report = render(
+            &scene,
+            &output,
+            &["--local-workers", workers, "--wait-for-workers", workers, "--threads", "1"],
+        );
         assert!(rayfarm_tracer::image::load(&output).unwrap() == expected, "{workers} workers");
         assert_eq!(report["workers"], workers.parse::<u32>().unwrap());
     }
@@ -140,7 +148,18 @@ fn a_camera_move_costs_each_worker_less_than_a_kilobyte() {
     let scene = scenes.path("small.toml");
     let scene_bytes = |frames: &str| {
         let output = scenes.path("frame-%03d.ppm");
-        let more = ["--frames", frames, "--orbit", "90", "--size", "40x30", "--local-workers", "2"];
+        let more = [
+            "--frames",
+            frames,
+            "--orbit",
+            "90",
+            "--size",
+            "40x30",
+            "--local-workers",
+            "2",
+            "--wait-for-workers",
+            "2",
+        ];
         render(&scene, &output, &more)["scene_bytes"].as_u64().unwrap()
     };
     // Enough frames in the shorter run for both workers to have fetched the scene.
@@ -158,7 +177,7 @@ fn workload_w1_by_one_two_and_three_workers() {
     let scenes = Scenes::new();
     for workers in ["1", "2", "3"] {
         let name = format!("w1-by-{workers}.png");
-        render(&scene, &scenes.path(&name), &["--local-workers", workers]);
+        render(&scene, &scenes.path(&name), &["--local-workers", workers, "--wait-for-workers", workers]);
         assert!(scenes.read(&name) == scenes.read("w1-by-1.png"), "{workers} workers");
     }
     let picture = rayfarm_tracer::image::load(&scenes.path("w1-by-1.png")).unwrap();

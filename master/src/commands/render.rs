@@ -49,6 +49,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         animation: animation(&args.picture, args.frames),
         frames: u64::from(args.frames),
         requested: 0,
+        wait_for_workers: args.wait_for_workers,
         unwritten: VecDeque::new(),
         writer: FrameWriter::new(pattern),
         totals: Totals::new(triangles, log),
@@ -67,6 +68,8 @@ struct Run {
     animation: Animation,
     frames: u64,
     requested: u64,
+    /// So many must be there before the run begins, however long that takes.
+    wait_for_workers: Option<u32>,
     /// Pictures that the writer has no room for yet.
     unwritten: VecDeque<(u64, RgbImage)>,
     writer: FrameWriter,
@@ -84,7 +87,7 @@ impl Run {
         let local_workers = options.local_workers;
         let mut farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
         let mut progress = Progress::new(self.frames, farm.address(), local_workers);
-        muster(&farm, local_workers, &interrupted).await;
+        self.muster(&farm, local_workers, &mut progress, &interrupted).await;
         self.totals.begin();
         let rendered = self.render(&mut farm, &mut progress, &interrupted).await;
         let written = self.writer.finish().await;
@@ -97,6 +100,31 @@ impl Run {
                 self.frames
             ))),
             result => result.map(|()| self.totals.report(&self.view)),
+        }
+    }
+
+    /// Waits until the workers are there, so that figures are of the number of workers that was asked for and do not
+    /// tell how fast processes start. A local one that does not come is not waited for long.
+    async fn muster(
+        &self,
+        farm: &Farm,
+        local_workers: u32,
+        progress: &mut Progress,
+        interrupted: &CancellationToken,
+    ) {
+        let (count, patience) =
+            self.wait_for_workers.map_or((local_workers, MUSTER), |count| (count, Duration::MAX));
+        let all_there = async {
+            let mut status = farm.status();
+            while status.workers.len() < count as usize {
+                progress.look(&status);
+                tokio::time::sleep(MUSTER_LOOK).await;
+                status = farm.status();
+            }
+        };
+        tokio::select! {
+            () = interrupted.cancelled() => {}
+            _ = tokio::time::timeout(patience, all_there) => {}
         }
     }
 
@@ -151,20 +179,6 @@ impl Run {
             farm.request(self.animation.view(&self.view, self.requested));
             self.requested += 1;
         }
-    }
-}
-
-/// Waits until the local workers are there, so that figures are of the number of workers that was asked for and do not
-/// tell how fast processes start. One that does not come is not waited for long.
-async fn muster(farm: &Farm, local_workers: u32, interrupted: &CancellationToken) {
-    let all_there = async {
-        while farm.status().workers.len() < local_workers as usize {
-            tokio::time::sleep(MUSTER_LOOK).await;
-        }
-    };
-    tokio::select! {
-        () = interrupted.cancelled() => {}
-        _ = tokio::time::timeout(MUSTER, all_there) => {}
     }
 }
 
