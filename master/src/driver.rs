@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
-use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, ToWorker, codec};
+use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, PixelsHeader, ToWorker, codec};
 use rayfarm_tracer::TILE_SIZE;
 use rayfarm_tracer::scene::FrameView;
 use tokio::sync::Notify;
@@ -192,17 +192,20 @@ impl Driver {
     pub(crate) fn pixels(
         &self,
         worker: WorkerId,
-        lease: Lease,
-        cost: Cost,
+        header: PixelsHeader,
         bytes: &[u8],
     ) -> Result<(), AnswerError> {
+        let PixelsHeader { lease, encoding, cost } = header;
         let standing = match self.lock().roster.get_mut(worker) {
             Some(session) => session.leases.answer(&lease),
             None => Standing::Revoked,
         };
         match standing {
-            Standing::Granted => match self.framebuffers.write(lease, bytes)? {
-                Written::Kept => self.handle(Event::SegmentDone { worker, lease, cost }),
+            Standing::Granted => match self.framebuffers.write(lease, encoding, bytes)? {
+                Written::Kept { decode } => {
+                    tracing::trace!("{worker} has done {lease}: {cost:?}, {decode:?} to decode");
+                    self.handle(Event::SegmentDone { worker, lease, cost });
+                }
                 Written::Superseded => {}
             },
             Standing::Revoked => {}
