@@ -156,7 +156,7 @@ impl CompiledScene {
         let boxes: Vec<(DVec3, DVec3)> =
             items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let tree = bvh::build_wide(relative_boxes(&boxes, bounds), 1, BuildQuality::Default);
+        let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default);
         Ok(Self { scene, meshes, textured, textures, tree, bounds })
     }
 

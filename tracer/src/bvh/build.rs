@@ -7,6 +7,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::{Boundable, BvhBuildParams};
 
+use super::fill::fill;
 use super::wide::{WideTree, widen};
 use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
 
@@ -53,8 +54,8 @@ const MEDIAN_LEAF: usize = 4;
 ///
 /// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (many boxes in one place),
 /// the tree is built by the median instead, whose depth is logarithmic whatever the boxes are.
-pub(crate) fn build(boxes: Vec<(Vec3, Vec3)>, quality: BuildQuality) -> Tree {
-    let primitives: Vec<Primitive> = boxes.into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
+pub(super) fn build(boxes: &[(Vec3, Vec3)], quality: BuildQuality) -> Tree {
+    let primitives = primitives_of(boxes);
     if primitives.is_empty() {
         return Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 };
     }
@@ -62,12 +63,18 @@ pub(crate) fn build(boxes: Vec<(Vec3, Vec3)>, quality: BuildQuality) -> Tree {
     lay_out(&source).unwrap_or_else(|| median(&primitives))
 }
 
-/// Builds a tree of sixteen children a node, and at most `leaf` primitives a leaf (but a few more where boxes coincide). Where
-/// it ends deeper than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
-pub(crate) fn build_wide(boxes: Vec<(Vec3, Vec3)>, leaf: usize, quality: BuildQuality) -> WideTree {
-    let primitives: Vec<Primitive> = boxes.iter().map(|&(lo, hi)| Primitive { lo, hi }).collect();
-    let wide = widen(&build(boxes, quality), leaf);
-    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives), leaf) }
+/// Builds a tree of sixteen children a node, and at most `leaf` primitives a leaf, most of them full. Where it ends deeper
+/// than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
+pub(crate) fn build_wide(boxes: &[(Vec3, Vec3)], leaf: usize, quality: BuildQuality) -> WideTree {
+    let tree = build(boxes, quality);
+    // Single primitives fill their leaves anyway.
+    let tree = if leaf > 1 { fill(&tree, boxes, leaf) } else { tree };
+    let wide = widen(&tree, leaf);
+    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives_of(boxes)), leaf) }
+}
+
+fn primitives_of(boxes: &[(Vec3, Vec3)]) -> Vec<Primitive> {
+    boxes.iter().map(|&(lo, hi)| Primitive { lo, hi }).collect()
 }
 
 struct Primitive {
@@ -82,12 +89,13 @@ impl Boundable for Primitive {
 }
 
 impl Tree {
-    fn new(capacity: usize) -> Self {
+    /// Room for so many nodes.
+    pub(super) fn new(capacity: usize) -> Self {
         Self { nodes: Vec::with_capacity(capacity), order: Vec::with_capacity(capacity), depth: 1 }
     }
 
     /// Adds a leaf's primitives and names them.
-    fn leaf(&mut self, primitives: impl IntoIterator<Item = u32>) -> Child {
+    pub(super) fn leaf(&mut self, primitives: impl IntoIterator<Item = u32>) -> Child {
         let first = self.order.len() as u32;
         self.order.extend(primitives);
         Child::Leaf { first, count: self.order.len() as u32 - first }
@@ -239,13 +247,13 @@ mod tests {
     #[test]
     fn every_primitive_stands_in_one_leaf() {
         for count in [1, 2, 3, 5, 100, 5000] {
-            check(&build(grid(count), BuildQuality::Default), count);
+            check(&build(&grid(count), BuildQuality::Default), count);
         }
     }
 
     #[test]
     fn twenty_thousand_boxes_in_one_place_stay_shallow() {
-        let tree = build(vec![(Vec3::ZERO, Vec3::ONE); 20_000], BuildQuality::Default);
+        let tree = build(&[(Vec3::ZERO, Vec3::ONE); 20_000], BuildQuality::Default);
         check(&tree, 20_000);
         assert!(tree.depth as usize <= MAX_DEPTH, "depth {}", tree.depth);
     }
@@ -261,6 +269,6 @@ mod tests {
 
     #[test]
     fn no_boxes_make_an_empty_root() {
-        assert_eq!(build(Vec::new(), BuildQuality::Default).nodes, [Node::EMPTY]);
+        assert_eq!(build(&[], BuildQuality::Default).nodes, [Node::EMPTY]);
     }
 }

@@ -5,6 +5,7 @@
 
 mod build;
 mod collapse;
+mod fill;
 mod node;
 mod wide;
 

@@ -174,7 +174,7 @@ pub(super) fn half_area((lo, hi): (Vec3, Vec3)) -> f32 {
 }
 
 /// Primitives below each node; children stand behind their parents.
-fn subtree_sizes(nodes: &[Node]) -> Vec<u32> {
+pub(super) fn subtree_sizes(nodes: &[Node]) -> Vec<u32> {
     let mut sizes = vec![0; nodes.len()];
     for (index, node) in nodes.iter().enumerate().rev() {
         sizes[index] = (0..2)
@@ -188,7 +188,7 @@ fn subtree_sizes(nodes: &[Node]) -> Vec<u32> {
     sizes
 }
 
-fn primitives_below(tree: &Tree, child: Child) -> Vec<u32> {
+pub(super) fn primitives_below(tree: &Tree, child: Child) -> Vec<u32> {
     let mut found = Vec::with_capacity(WIDTH);
     let mut pending = vec![child];
     while let Some(child) = pending.pop() {
@@ -300,7 +300,7 @@ mod tests {
     fn every_primitive_stands_in_one_block_inside_the_boxes_above() {
         for count in [1, 2, 16, 17, 300, 5000] {
             let all = boxes(count);
-            let tree = build_wide(all.clone(), WIDTH, BuildQuality::Default);
+            let tree = build_wide(&all, WIDTH, BuildQuality::Default);
             assert_eq!(validate_wide(&tree.nodes, tree.blocks.len() as u32).unwrap(), tree.depth);
             let mut seen: Vec<u32> = tree.blocks.iter().flatten().copied().collect();
             seen.sort_unstable();
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn nodes_are_well_filled() {
-        let tree = build_wide(boxes(20_000), WIDTH, BuildQuality::Default);
+        let tree = build_wide(&boxes(20_000), WIDTH, BuildQuality::Default);
         let children: u32 = tree.nodes.iter().map(|node| node.count).sum();
         let mean = f64::from(children) / tree.nodes.len() as f64;
         assert!(mean > 10.0, "{mean} children a node");
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn two_thousand_boxes_in_one_place_stay_shallow() {
-        let tree = build_wide(vec![(Vec3::ZERO, Vec3::ONE); 2_000], WIDTH, BuildQuality::Default);
+        let tree = build_wide(&[(Vec3::ZERO, Vec3::ONE); 2_000], WIDTH, BuildQuality::Default);
         assert!(tree.depth as usize <= MAX_WIDE_DEPTH, "depth {}", tree.depth);
     }
 

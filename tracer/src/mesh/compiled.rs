@@ -75,8 +75,8 @@ impl CompiledMesh {
     /// As [`CompiledMesh::compile`].
     pub fn compile_with(mesh: &Mesh, options: CompileOptions) -> Result<(Self, MeshReport), MeshError> {
         let (clean, report) = clean(mesh, options.normals)?;
-        let tree =
-            bvh::build_wide(clean.corners.iter().map(bounds_of_corners).collect(), WIDTH, options.quality);
+        let boxes: Vec<_> = clean.corners.iter().map(bounds_of_corners).collect();
+        let tree = bvh::build_wide(&boxes, WIDTH, options.quality);
         let materials = encode_materials(&mesh.materials);
 
         let mut header = Header::new(clean.center, clean.exponent, clean.bounds);
