@@ -5,32 +5,23 @@
 //! triangles are therefore divided anew, from above, only where leaves come out full: sixteen triangles a leaf, sixteen
 //! leaves a node, sixteen nodes the next.
 //!
-//! Where to divide: a ray meets a box that is w by h in the picture by its area, w h. A tile with sides t meets it wherever it
-//! overlaps: (w + t) (h + t) = w h + t (w + h) + t^2. So what a box costs is its area, and its edges times the tile's.
-//! Single rays gain by the fuller leaves all the same.
+//! Single rays gain by the fuller leaves as well. How they are divided: `divide.rs`.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::build::Tree;
-use super::wide::{WIDTH, half_area, primitives_below, subtree_sizes};
+use super::divide::{Bounds, Division, Price};
+use super::wide::{WIDTH, primitives_below, subtree_sizes};
 use super::{Child, Node};
-
-/// Least and greatest corner.
-type Bounds = (Vec3, Vec3);
 
 /// Subtrees of up to this many primitives are divided anew: three full levels. More gained nothing.
 const LARGEST: usize = WIDTH * WIDTH * WIDTH;
-
-/// Side of a tile, in shares of the mesh: of a mesh that fills a picture of sixty-four tiles.
-const TILE: f32 = 1.0 / 64.0;
 
 /// The same tree with its bottom divided anew where that is better, into leaves of at most `leaf` primitives, most of them full.
 ///
 /// O(n log n), on all threads.
 pub(super) fn fill(tree: &Tree, boxes: &[Bounds], leaf: usize) -> Tree {
-    let (lo, hi) = tree.nodes[0].bounds();
-    let price = Price { tile: (hi - lo).max_element() * TILE };
+    let price = Price::within(tree.nodes[0].bounds());
     let filling = Filling { tree, sizes: subtree_sizes(&tree.nodes), boxes, leaf, price };
     let root = Child::Inner(0);
     if filling.size(root) <= LARGEST {
@@ -39,7 +30,8 @@ pub(super) fn fill(tree: &Tree, boxes: &[Bounds], leaf: usize) -> Tree {
     let kept: Vec<u32> =
         (0..tree.nodes.len() as u32).filter(|&i| filling.size(Child::Inner(i)) > LARGEST).collect();
     let children = kept.iter().flat_map(|&node| [0, 1].map(|side| tree.nodes[node as usize].child(side)));
-    let small: Vec<Child> = children.filter(|&child| filling.size(child) <= LARGEST).collect();
+    let small: Vec<Child> =
+        children.filter(|&child| child != Child::Empty && filling.size(child) <= LARGEST).collect();
     let bottoms: Vec<Tree> = small.par_iter().map(|&child| filling.bottom(child, LARGEST)).collect();
     filling.join(&kept, bottoms)
 }
@@ -52,19 +44,6 @@ struct Filling<'a> {
     boxes: &'a [Bounds],
     leaf: usize,
     price: Price,
-}
-
-/// What it costs that a box is met now and then.
-#[derive(Clone, Copy)]
-struct Price {
-    /// Side of a tile.
-    tile: f32,
-}
-
-impl Price {
-    fn of(self, (lo, hi): Bounds) -> f32 {
-        half_area((lo, hi)) + self.tile * (hi - lo).element_sum()
-    }
 }
 
 impl Filling<'_> {
@@ -103,21 +82,7 @@ impl Filling<'_> {
 
     /// What is below a child, divided anew, and the price of its leaves.
     fn divided(&self, child: Child) -> (Tree, f32) {
-        let mut primitives = primitives_below(self.tree, child);
-        let tree = Tree::new(2 * primitives.len().div_ceil(self.leaf));
-        let mut division = Division { filling: self, tree, cost: 0.0, behind: Vec::new() };
-        division.tree.nodes.push(Node::EMPTY);
-        if primitives.len() <= self.leaf {
-            division.hang(0, 0, &mut primitives, 1);
-        } else {
-            division.divide(0, &mut primitives, 1);
-        }
-        (division.tree, division.cost)
-    }
-
-    fn with(&self, (lo, hi): Bounds, primitive: u32) -> Bounds {
-        let (other_lo, other_hi) = self.boxes[primitive as usize];
-        (lo.min(other_lo), hi.max(other_hi))
+        Division::of(primitives_below(self.tree, child), self.boxes, self.leaf, self.price)
     }
 
     /// The price of the leaves that a child would become as it is.
@@ -159,6 +124,7 @@ impl Filling<'_> {
                         depths[places[inner as usize] as usize] = depth;
                         Child::Inner(places[inner as usize])
                     }
+                    Child::Empty => continue,
                     _ => bottoms.next().map_or(Child::Empty, |bottom| joined.append(bottom, depth)),
                 };
                 joined.nodes[place].set(side, node.child_bounds(side), below);
@@ -190,113 +156,10 @@ impl Tree {
     }
 }
 
-/// Some primitives being divided.
-struct Division<'a> {
-    filling: &'a Filling<'a>,
-    tree: Tree,
-    /// Of the leaves.
-    cost: f32,
-    /// Prices of the boxes around what stands behind each place.
-    behind: Vec<f32>,
-}
-
-impl Division<'_> {
-    /// Divides more primitives than a leaf takes between the sides of a node.
-    fn divide(&mut self, node: u32, primitives: &mut [u32], depth: u32) {
-        self.tree.depth = self.tree.depth.max(depth);
-        let at = self.arrange(primitives);
-        let (left, right) = primitives.split_at_mut(at);
-        self.hang(node, 0, left, depth);
-        self.hang(node, 1, right, depth);
-    }
-
-    /// Makes primitives one side of a node.
-    fn hang(&mut self, node: u32, side: usize, primitives: &mut [u32], depth: u32) {
-        let bounds = primitives.iter().fold(EMPTY, |bounds, &primitive| self.filling.with(bounds, primitive));
-        let child = if primitives.len() <= self.filling.leaf {
-            self.cost += self.filling.price.of(bounds);
-            self.tree.leaf(primitives.iter().copied())
-        } else {
-            let inner = self.tree.nodes.len() as u32;
-            self.tree.nodes.push(Node::EMPTY);
-            self.divide(inner, primitives, depth + 1);
-            Child::Inner(inner)
-        };
-        self.tree.nodes[node as usize].set(side, bounds, child);
-    }
-
-    /// Puts primitives in the order along the axis where dividing them costs least, and tells where that is.
-    fn arrange(&mut self, primitives: &mut [u32]) -> usize {
-        let unit = unit_of(primitives.len(), self.filling.leaf);
-        let mut best: Option<(f32, usize, Vec<u32>)> = None;
-        for axis in 0..3 {
-            let sorted = self.sorted(primitives, axis);
-            let (cost, at) = self.cheapest(&sorted, unit);
-            if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                best = Some((cost, at, sorted));
-            }
-        }
-        let Some((_, at, sorted)) = best else { return unit };
-        primitives.copy_from_slice(&sorted);
-        at
-    }
-
-    /// By centre along an axis, then by number.
-    fn sorted(&self, primitives: &[u32], axis: usize) -> Vec<u32> {
-        let key = |&primitive: &u32| {
-            let (lo, hi) = self.filling.boxes[primitive as usize];
-            u64::from(in_order(lo[axis] + hi[axis])) << 32 | u64::from(primitive)
-        };
-        let mut keys: Vec<u64> = primitives.iter().map(key).collect();
-        keys.sort_unstable();
-        keys.into_iter().map(|key| key as u32).collect()
-    }
-
-    /// Where to divide so that one side is made of full units, and the least sum of prices times leaves.
-    fn cheapest(&mut self, sorted: &[u32], unit: usize) -> (f32, usize) {
-        let Filling { leaf, price, .. } = *self.filling;
-        let count = sorted.len();
-        let leaves = |primitives: usize| primitives.div_ceil(leaf) as f32;
-        self.behind.resize(count, 0.0);
-        let mut bounds = EMPTY;
-        for at in (1..count).rev() {
-            bounds = self.filling.with(bounds, sorted[at]);
-            self.behind[at] = price.of(bounds);
-        }
-        let mut best = (f32::INFINITY, unit);
-        bounds = EMPTY;
-        for at in 1..count {
-            bounds = self.filling.with(bounds, sorted[at - 1]);
-            if at % unit == 0 || (count - at) % unit == 0 {
-                let cost = price.of(bounds) * leaves(at) + self.behind[at] * leaves(count - at);
-                if cost < best.0 {
-                    best = (cost, at);
-                }
-            }
-        }
-        best
-    }
-}
-
-const EMPTY: Bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-
-/// Primitives of the largest full leaf, or full subtree of sixteen times as many, that is smaller than `count`.
-fn unit_of(count: usize, leaf: usize) -> usize {
-    let mut unit = leaf;
-    while unit * WIDTH < count {
-        unit *= WIDTH;
-    }
-    unit
-}
-
-/// Bits that are ordered as the numbers are.
-fn in_order(number: f32) -> u32 {
-    let bits = number.to_bits();
-    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::super::BuildQuality;
     use super::super::build::build;
     use super::*;
@@ -360,16 +223,5 @@ mod tests {
         let boxes = vec![(Vec3::ZERO, Vec3::ONE); 5_000];
         let filled = fill(&build(&boxes, BuildQuality::Default), &boxes, 16);
         leaves_of(&filled, &boxes, 16);
-    }
-
-    #[test]
-    fn numbers_sort_as_their_bits_do() {
-        let numbers = [f32::NEG_INFINITY, -2.0, -1e-40, 0.0, 1e-40, 1.0, f32::INFINITY];
-        assert!(numbers.windows(2).all(|pair| in_order(pair[0]) < in_order(pair[1])));
-    }
-
-    #[test]
-    fn units_are_full_subtrees() {
-        assert_eq!([17, 256, 257, 4_096, 4_097].map(|count| unit_of(count, 16)), [16, 16, 256, 256, 4_096]);
     }
 }

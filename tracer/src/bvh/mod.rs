@@ -5,6 +5,7 @@
 
 mod build;
 mod collapse;
+mod divide;
 mod fill;
 mod node;
 mod wide;
