@@ -20,10 +20,12 @@ pub(super) fn highlight<S: Simd>(
     exponents: f32x16<S>,
 ) -> f32x16<S> {
     let half = to_light.add(to_viewer);
-    let n_dot_h = normals.dot(half) / half.dot(half).sqrt();
-    let positive = n_dot_h.simd_gt(splat(simd, 1e-30));
-    let base = select(positive, n_dot_h, splat(simd, 1.0)).min(splat(simd, 1.0));
-    let power = raised(simd, base, exponents);
+    let along = normals.dot(half);
+    // (N.H)^2 takes no square root, and exponents are mostly even.
+    let square = along * along / half.dot(half);
+    let positive = along.simd_gt(splat(simd, 0.0)) & square.simd_gt(splat(simd, 1e-30));
+    let square = select(positive, square, splat(simd, 1.0)).min(splat(simd, 1.0));
+    let power = raised(simd, square, exponents);
     let power = select(positive, power, splat(simd, 0.0));
     let odd = bits(exponents.simd_gt(splat(simd, SINGLE)) | exponents.simd_eq(splat(simd, 0.0)));
     if odd == 0 {
@@ -37,11 +39,11 @@ pub(super) fn highlight<S: Simd>(
     f32x16::load_array(simd, power)
 }
 
-/// base^exponent, lane by lane, exponent by exponent: most often there is one. `base` is in (0, 1].
+/// sqrt(square)^exponent, lane by lane, exponent by exponent: most often there is one. `square` is in (0, 1].
 #[inline(always)]
-fn raised<S: Simd>(simd: S, base: f32x16<S>, exponents: f32x16<S>) -> f32x16<S> {
+fn raised<S: Simd>(simd: S, square: f32x16<S>, exponents: f32x16<S>) -> f32x16<S> {
     let first = exponents.to_array()[0];
-    let power = raised_to(simd, base, first);
+    let power = raised_to(simd, square, first);
     if bits(exponents.simd_eq(splat(simd, first))) == 0xffff {
         return power;
     }
@@ -51,26 +53,28 @@ fn raised<S: Simd>(simd: S, base: f32x16<S>, exponents: f32x16<S>) -> f32x16<S> 
         let exponent = exponents.to_array()[rest.trailing_zeros() as usize];
         // NaN equals nothing, and has no place here.
         let same = rest & bits(exponents.simd_eq(splat(simd, exponent))) | rest & rest.wrapping_neg();
-        power = select(mask_of(simd, same), raised_to(simd, base, exponent), power);
+        power = select(mask_of(simd, same), raised_to(simd, square, exponent), power);
         rest &= !same;
     }
     power
 }
 
-/// base^exponent: whole exponents by squaring, which is shorter; others by logarithm.
+/// sqrt(square)^exponent: whole exponents by squaring, which is shorter; others by logarithm.
 #[inline(always)]
-fn raised_to<S: Simd>(simd: S, base: f32x16<S>, exponent: f32) -> f32x16<S> {
-    let mut whole = exponent as u32;
+fn raised_to<S: Simd>(simd: S, mut square: f32x16<S>, exponent: f32) -> f32x16<S> {
+    let whole = exponent as u32;
     if whole as f32 != exponent || whole > MOST_SQUARED {
-        return exp2(simd, (log2(simd, base) * splat(simd, exponent)).max(splat(simd, -126.0)));
+        let exponent = splat(simd, 0.5 * exponent);
+        return exp2(simd, (log2(simd, square) * exponent).max(splat(simd, -126.0)));
     }
-    let (mut power, mut square) = (splat(simd, 1.0), base);
-    while whole != 0 {
-        if whole & 1 == 1 {
+    let mut power = if whole & 1 == 1 { square.sqrt() } else { splat(simd, 1.0) };
+    let mut rest = whole >> 1;
+    while rest != 0 {
+        if rest & 1 == 1 {
             power *= square;
         }
         square = square * square;
-        whole >>= 1;
+        rest >>= 1;
     }
     power
 }
