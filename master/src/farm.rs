@@ -29,10 +29,12 @@ use tokio_util::task::TaskTracker;
 use crate::assets::Assets;
 use crate::driver::Driver;
 use crate::local_workers::LocalWorkers;
+use crate::scheduler::{Event, WorkerId};
 use crate::server;
 
 pub use crate::assets::AssetError;
 pub use crate::framebuffer::FramePixels;
+pub use crate::scheduler::WorkerState;
 pub use crate::scheduler::policy::SegmentPolicy;
 pub use rayfarm_protocol::{Cost as FrameCounts, FrameId};
 
@@ -88,6 +90,8 @@ pub struct FinishedFrame {
     pub counts: FrameCounts,
     /// From the moment the frame began to its last row.
     pub elapsed: Duration,
+    /// From the request to the last row: how old the camera is that the picture shows.
+    pub latency: Duration,
     /// Workers connected when it completed.
     pub workers: u32,
     /// Render threads of these workers together.
@@ -105,6 +109,8 @@ pub struct FinishedFrame {
 pub struct FarmStatus {
     /// The workers connected now, in the order in which they came.
     pub workers: Vec<WorkerStatus>,
+    /// The names of workers that were kicked and are kept out.
+    pub kicked: Vec<String>,
     /// The oldest frame being rendered.
     pub frame: Option<FrameId>,
     /// Its finished rows.
@@ -128,9 +134,16 @@ pub struct WorkerStatus {
     pub segments_done: u64,
     /// Rows of average cost per second, smoothed; 0 before that is known.
     pub speed: f64,
+    /// Whether it is given work, and why not.
+    pub state: WorkerState,
     /// Why it could not render a frame, the last time it could not.
     pub trouble: Option<String>,
 }
+
+/// A command names a worker that is not connected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no worker {0} is connected; the status lists those that are")]
+pub struct UnknownWorker(pub u64);
 
 /// Why a farm cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -252,6 +265,49 @@ impl Farm {
         self.driver.status()
     }
 
+    /// Lets a worker finish what it holds and then leave for good; a worker of the same name may come later.
+    ///
+    /// # Errors
+    /// [`UnknownWorker`], as for all commands to a worker.
+    pub fn drain(&self, worker: u64) -> Result<(), UnknownWorker> {
+        self.command(worker, |worker| Event::DrainRequested { worker })
+    }
+
+    /// Gives a worker no more leases until [`Farm::resume`]. It stays connected and finishes what it holds. A farm whose
+    /// workers are all paused renders nothing.
+    ///
+    /// # Errors
+    /// [`UnknownWorker`].
+    pub fn pause(&self, worker: u64) -> Result<(), UnknownWorker> {
+        self.command(worker, |worker| Event::PauseRequested { worker })
+    }
+
+    /// Gives a paused worker leases again. One that drains goes on draining.
+    ///
+    /// # Errors
+    /// [`UnknownWorker`].
+    pub fn resume(&self, worker: u64) -> Result<(), UnknownWorker> {
+        self.command(worker, |worker| Event::ResumeRequested { worker })
+    }
+
+    /// Sends a worker away at once, with the reason; others render what it held. From then on, whoever connects under
+    /// its name from its address is refused, until [`Farm::allow`] or the end of this master.
+    ///
+    /// # Errors
+    /// [`UnknownWorker`].
+    pub fn kick(&self, worker: u64, reason: &str) -> Result<(), UnknownWorker> {
+        found(worker, self.driver.kick(WorkerId(worker), reason))
+    }
+
+    /// Lets kicked workers of this name connect again. Returns how many were kept out.
+    pub fn allow(&self, name: &str) -> usize {
+        self.driver.allow(name)
+    }
+
+    fn command(&self, worker: u64, event: impl FnOnce(WorkerId) -> Event) -> Result<(), UnknownWorker> {
+        found(worker, self.driver.command(WorkerId(worker), event(WorkerId(worker))))
+    }
+
     /// Says goodbye to all workers and waits, not for long, until the local ones have ended; kills what has not.
     pub async fn shut_down(self) {
         // First of all, so that nobody starts a worker again that ends because it was told goodbye.
@@ -264,6 +320,10 @@ impl Farm {
             tasks.wait().await;
         }
     }
+}
+
+fn found(worker: u64, found: bool) -> Result<(), UnknownWorker> {
+    if found { Ok(()) } else { Err(UnknownWorker(worker)) }
 }
 
 /// Binds the address asked for, or else the usual one, or else whatever is free.
