@@ -16,6 +16,7 @@ use rayfarm_tracer::scene::FrameView;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 
+use crate::accounting::{Accounts, TraceSink};
 use crate::assets::Assets;
 use crate::farm::{FarmError, FarmStatus, FinishedFrame, WorkerStatus};
 use crate::framebuffer::{Framebuffers, Misfit, Written};
@@ -42,6 +43,8 @@ pub(crate) struct Driver {
 
 struct Inner {
     scheduler: Scheduler,
+    accounts: Accounts,
+    trace: Option<TraceSink>,
     roster: Roster,
     /// What the frames that wait or are in flight show.
     views: BTreeMap<FrameId, Requested>,
@@ -76,6 +79,8 @@ impl Driver {
     pub(crate) fn new(policy: SegmentPolicy, assets: Assets) -> Self {
         let inner = Inner {
             scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64, TILE_SIZE),
+            accounts: Accounts::default(),
+            trace: None,
             roster: Roster::default(),
             views: BTreeMap::new(),
             unfetched: VecDeque::new(),
@@ -185,10 +190,23 @@ impl Driver {
 
     /// A session has begun.
     pub(crate) fn join(&self, worker: WorkerId, session: Session) {
-        let threads = session.hello.threads;
+        let Hello { name, threads, .. } = session.hello.clone();
         let mut inner = self.lock();
         inner.roster.add(worker, session);
         self.drive(&mut inner, Event::WorkerJoined { worker, threads });
+        inner.accounts.name(worker, &name);
+    }
+
+    /// A worker asks for an asset.
+    pub(crate) fn asset_wanted(&self, worker: WorkerId) {
+        self.lock().accounts.asset_wanted(self.started.elapsed(), worker);
+    }
+
+    /// Tells a timeline of everything from now on.
+    pub(crate) fn trace_into(&self, sink: TraceSink) {
+        let mut inner = self.lock();
+        inner.accounts.keep_marks();
+        inner.trace = Some(sink);
     }
 
     /// Brings what a user wants of a connected worker; `false` if it is not connected.
@@ -254,7 +272,11 @@ impl Driver {
         };
         match standing {
             Standing::Granted => match self.framebuffers.write(lease, bytes)? {
-                Written::Kept => self.handle(Event::SegmentDone { worker, lease, cost }),
+                Written::Kept => {
+                    let mut inner = self.lock();
+                    inner.accounts.taken_in(worker, bytes.len(), Duration::ZERO);
+                    self.drive(&mut inner, Event::SegmentDone { worker, lease, cost });
+                }
                 Written::Superseded => {}
             },
             Standing::Revoked => {}
@@ -321,10 +343,16 @@ impl Driver {
     fn drive(&self, inner: &mut Inner, event: Event) {
         let mut events = VecDeque::from([event]);
         while let Some(event) = events.pop_front() {
-            inner.scheduler.handle(self.started.elapsed(), event);
+            let now = self.started.elapsed();
+            inner.accounts.event(now, &event);
+            inner.scheduler.handle(now, event);
             while let Some(action) = inner.scheduler.poll_action() {
+                inner.accounts.action(now, &action);
                 events.extend(self.perform(inner, action));
             }
+        }
+        if let Some(trace) = &inner.trace {
+            std::iter::from_fn(|| inner.accounts.poll_mark()).for_each(|mark| trace.tell(mark));
         }
         let wanted = inner.scheduler.poll_timeout();
         if wanted.is_some_and(|wanted| inner.armed_for.is_none_or(|armed| wanted < armed)) {
@@ -388,6 +416,7 @@ impl Driver {
             sent_bytes: bytes.sent,
             received_bytes: bytes.received,
             scene_bytes: bytes.scene,
+            account: inner.accounts.take_done(),
         };
         self.hand_out(inner, Ok(finished));
     }

@@ -26,13 +26,15 @@ use tokio::net::TcpListener;
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tokio_util::task::TaskTracker;
 
+use crate::accounting::TraceSink;
 use crate::assets::Assets;
 use crate::driver::Driver;
 use crate::local_workers::LocalWorkers;
-use crate::scheduler::{Event, WorkerId};
 use crate::server;
 
+pub use crate::accounting::{FrameAccount, Parts, SegmentNote, WorkerAccount};
 pub use crate::assets::AssetError;
+pub use crate::farm_control::FarmControl;
 pub use crate::framebuffer::FramePixels;
 pub use crate::scheduler::WorkerState;
 pub use crate::scheduler::policy::SegmentPolicy;
@@ -102,6 +104,8 @@ pub struct FinishedFrame {
     pub received_bytes: u64,
     /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
     pub scene_bytes: u64,
+    /// What the workers did with their time since the frame before, and who rendered what.
+    pub account: FrameAccount,
 }
 
 /// A look at the farm, for overlays and progress bars.
@@ -265,47 +269,14 @@ impl Farm {
         self.driver.status()
     }
 
-    /// Lets a worker finish what it holds and then leave for good; a worker of the same name may come later.
-    ///
-    /// # Errors
-    /// [`UnknownWorker`], as for all commands to a worker.
-    pub fn drain(&self, worker: u64) -> Result<(), UnknownWorker> {
-        self.command(worker, |worker| Event::DrainRequested { worker })
+    /// Another handle, for whoever steers the farm beside the one who asks for frames. Call it inside the runtime.
+    pub fn control(&self) -> FarmControl {
+        FarmControl::new(self.driver.clone())
     }
 
-    /// Gives a worker no more leases until [`Farm::resume`]. It stays connected and finishes what it holds. A farm whose
-    /// workers are all paused renders nothing.
-    ///
-    /// # Errors
-    /// [`UnknownWorker`].
-    pub fn pause(&self, worker: u64) -> Result<(), UnknownWorker> {
-        self.command(worker, |worker| Event::PauseRequested { worker })
-    }
-
-    /// Gives a paused worker leases again. One that drains goes on draining.
-    ///
-    /// # Errors
-    /// [`UnknownWorker`].
-    pub fn resume(&self, worker: u64) -> Result<(), UnknownWorker> {
-        self.command(worker, |worker| Event::ResumeRequested { worker })
-    }
-
-    /// Sends a worker away at once, with the reason; others render what it held. From then on, whoever connects under
-    /// its name from its address is refused, until [`Farm::allow`] or the end of this master.
-    ///
-    /// # Errors
-    /// [`UnknownWorker`].
-    pub fn kick(&self, worker: u64, reason: &str) -> Result<(), UnknownWorker> {
-        found(worker, self.driver.kick(WorkerId(worker), reason))
-    }
-
-    /// Lets kicked workers of this name connect again. Returns how many were kept out.
-    pub fn allow(&self, name: &str) -> usize {
-        self.driver.allow(name)
-    }
-
-    fn command(&self, worker: u64, event: impl FnOnce(WorkerId) -> Event) -> Result<(), UnknownWorker> {
-        found(worker, self.driver.command(WorkerId(worker), event(WorkerId(worker))))
+    /// Tells a timeline of everything from now on.
+    pub(crate) fn trace_into(&self, sink: TraceSink) {
+        self.driver.trace_into(sink);
     }
 
     /// Says goodbye to all workers and waits, not for long, until the local ones have ended; kills what has not.
@@ -320,10 +291,6 @@ impl Farm {
             tasks.wait().await;
         }
     }
-}
-
-fn found(worker: u64, found: bool) -> Result<(), UnknownWorker> {
-    if found { Ok(()) } else { Err(UnknownWorker(worker)) }
 }
 
 /// Binds the address asked for, or else the usual one, or else whatever is free.

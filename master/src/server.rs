@@ -142,7 +142,10 @@ async fn listen(
             ToMaster::Pixels { header, bytes } => match header.encoding {
                 Encoding::Raw => driver.pixels(worker, header.lease, header.cost, &bytes)?,
             },
-            ToMaster::NeedAsset { id } => want.try_send(id).map_err(|_| SessionError::Greedy)?,
+            ToMaster::NeedAsset { id } => {
+                driver.asset_wanted(worker);
+                want.try_send(id).map_err(|_| SessionError::Greedy)?;
+            }
             ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
             ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
