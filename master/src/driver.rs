@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
-use rayfarm_protocol::{FrameAnnounce, FrameId, Hello, Lease, ToWorker, codec};
+use rayfarm_protocol::{FrameAnnounce, FrameId, Hello, Lease, PixelsHeader, ToWorker, codec};
 use rayfarm_tracer::TILE_SIZE;
 use rayfarm_tracer::scene::FrameView;
 use tokio::sync::Notify;
@@ -262,19 +262,19 @@ impl Driver {
     pub(crate) fn pixels(
         &self,
         worker: WorkerId,
-        lease: Lease,
-        cost: Cost,
+        header: PixelsHeader,
         bytes: &[u8],
     ) -> Result<(), AnswerError> {
+        let PixelsHeader { lease, encoding, cost } = header;
         let standing = match self.lock().roster.get_mut(worker) {
             Some(session) => session.leases.answer(&lease),
             None => Standing::Revoked,
         };
         match standing {
-            Standing::Granted => match self.framebuffers.write(lease, bytes)? {
-                Written::Kept => {
+            Standing::Granted => match self.framebuffers.write(lease, encoding, bytes)? {
+                Written::Kept { decode } => {
                     let mut inner = self.lock();
-                    inner.accounts.taken_in(worker, bytes.len(), Duration::ZERO);
+                    inner.accounts.taken_in(worker, bytes.len(), decode);
                     self.drive(&mut inner, Event::SegmentDone { worker, lease, cost });
                 }
                 Written::Superseded => {}

@@ -7,7 +7,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
-use rayfarm_protocol::{AssetId, Encoding, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake};
+use rayfarm_protocol::{AssetId, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, mpsc};
 use tokio_util::sync::CancellationToken;
@@ -139,9 +139,7 @@ async fn listen(
 ) -> Result<String, SessionError> {
     while let Some(message) = receiver.recv().await {
         match message? {
-            ToMaster::Pixels { header, bytes } => match header.encoding {
-                Encoding::Raw => driver.pixels(worker, header.lease, header.cost, &bytes)?,
-            },
+            ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
             ToMaster::NeedAsset { id } => {
                 driver.asset_wanted(worker);
                 want.try_send(id).map_err(|_| SessionError::Greedy)?;

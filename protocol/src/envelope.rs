@@ -23,7 +23,7 @@ use crate::limits::{
 pub const HEADER_BYTES: usize = 8;
 
 /// Bytes of the longest hand-laid head between a header and the bulk bytes of a message.
-pub(crate) const MAX_HEAD_BYTES: usize = 64;
+pub(crate) const MAX_HEAD_BYTES: usize = 88;
 
 /// The types of envelopes. Their numbers are the wire's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -30,4 +30,4 @@ pub use message::{FrameAnnounce, Hello, ToMaster, ToWorker, Welcome};
 pub use pixels::{Cost, Encoding, PixelsHeader};
 
 /// Version of everything behind the preamble. It grows with every change that an older peer would misread.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;

@@ -52,8 +52,8 @@ const SLOWEST_BYTES_PER_SECOND: u64 = 256 << 10;
 
 /// How long an envelope with a body of `body_bytes` may take once it has begun, in either direction.
 /// Between envelopes a peer may be silent for ever.
-pub fn envelope_deadline(body_bytes: usize) -> Duration {
-    Duration::from_secs(10) + Duration::from_millis(body_bytes as u64 * 1000 / SLOWEST_BYTES_PER_SECOND)
+pub const fn envelope_deadline(body_bytes: usize) -> Duration {
+    Duration::from_millis(10_000 + body_bytes as u64 * 1000 / SLOWEST_BYTES_PER_SECOND)
 }
 
 /// The most rows of a frame that one lease may cover, so that their raw pixels fit into one envelope; at least 1.

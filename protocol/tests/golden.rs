@@ -8,7 +8,8 @@ use bytes::Bytes;
 use rayfarm_protocol::envelope::{Kind, read_body, read_header};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{
-    AssetId, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, ToMaster, ToWorker, Welcome, codec, limits,
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, ToMaster, ToWorker,
+    Welcome, codec, limits,
 };
 
 use common::{lease, pixels, wire};
@@ -28,7 +29,7 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 
 #[test]
 fn these_bytes_belong_to_this_version() {
-    assert_eq!(PROTOCOL_VERSION, 1);
+    assert_eq!(PROTOCOL_VERSION, 2);
 }
 
 #[tokio::test]
@@ -68,18 +69,26 @@ async fn to_worker() {
 async fn to_master() {
     let number = [5, 0, 0, 0, 0, 0, 0, 0];
     golden(ToMaster::NeedAsset { id: ID }, &[&[32, 0, 0, 0, 0x20, 0, 0, 0], &ID.0]).await;
-    let rows: [&[u8]; 9] = [
-        &[66, 0, 0, 0, 0x21, 0, 0, 0],
+    let rows: [&[u8]; 12] = [
+        &[90, 0, 0, 0, 0x21, 0, 0, 0],
         &[4, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0],
         &[16, 0, 0, 0, 8, 0, 0, 0],
         &[0; 8],
         &number,
+        &[9, 0, 0, 0, 0, 0, 0, 0],
+        &[10, 0, 0, 0, 0, 0, 0, 0],
+        &[11, 0, 0, 0, 0, 0, 0, 0],
         &[6, 0, 0, 0, 0, 0, 0, 0],
         &[7, 0, 0, 0, 0, 0, 0, 0],
         &[8, 0, 0, 0, 0, 0, 0, 0],
         &[2, 2],
     ];
     golden(pixels(2, 2), &rows).await;
+    let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("pixels are pixels") };
+    let packed = PixelsHeader { encoding: Encoding::Lz4, ..header };
+    let mut rows = rows;
+    rows[3] = &[1, 0, 0, 0, 0, 0, 0, 0];
+    golden(ToMaster::Pixels { header: packed, bytes }, &rows).await;
     golden(ToMaster::Pong { nonce: 5 }, &[&[8, 0, 0, 0, 0x31, 0, 0, 0], &number]).await;
     let failed = ToMaster::Failed { frame: FrameId(5), reason: "no".into() };
     golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;

@@ -161,7 +161,7 @@ fn bodies_that_break_a_rule_are_refused_with_the_rule() {
     let master_goodbye = ToWorker::from_body(Kind::Goodbye, Bytes::from_static(&[2])).unwrap_err();
     assert!(master_goodbye.to_string().contains("2 is neither yes nor no"), "{master_goodbye}");
 
-    let mut pixels = vec![0; 64];
+    let mut pixels = vec![0; 88];
     assert!(malformed(Kind::Pixels, &pixels).contains("no run of rows"));
     pixels[20] = 1;
     pixels[24] = 9;

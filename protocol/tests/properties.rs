@@ -10,7 +10,8 @@ use proptest::prelude::*;
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::session::spawn;
 use rayfarm_protocol::{
-    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Lease, PixelsHeader, ToMaster, ToWorker, limits,
+    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelsHeader, ToMaster,
+    ToWorker, Welcome, codec, handshake, limits,
 };
 use tokio::io::{AsyncWriteExt, duplex};
 
@@ -58,20 +59,52 @@ fn to_worker() -> impl Strategy<Value = ToWorker> {
     ]
 }
 
+fn headers() -> impl Strategy<Value = PixelsHeader> {
+    let encodings = prop_oneof![Just(Encoding::Raw), Just(Encoding::Lz4)];
+    (leases(), encodings, any::<[u64; 7]>()).prop_map(|(lease, encoding, numbers)| {
+        let [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary] = numbers;
+        let cost = Cost { trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary };
+        PixelsHeader { lease, encoding, cost }
+    })
+}
+
 fn to_master() -> impl Strategy<Value = ToMaster> {
     prop_oneof![
         ids().prop_map(|id| ToMaster::NeedAsset { id }),
-        (leases(), any::<[u64; 4]>(), bytes(0..3000)).prop_map(
-            |(lease, [trace_ns, primary, shadow, secondary], bytes)| {
-                let cost = Cost { trace_ns, primary, shadow, secondary };
-                ToMaster::Pixels { header: PixelsHeader { lease, encoding: Encoding::Raw, cost }, bytes }
-            }
-        ),
+        (headers(), bytes(0..3000)).prop_map(|(header, bytes)| ToMaster::Pixels { header, bytes }),
         any::<u64>().prop_map(|nonce| ToMaster::Pong { nonce }),
         (any::<u64>(), "[ -~äöü]{0,200}")
             .prop_map(|(frame, reason)| ToMaster::Failed { frame: FrameId(frame), reason }),
         Just(ToMaster::Drain),
     ]
+}
+
+fn hellos() -> impl Strategy<Value = Hello> {
+    let text = "\\PC{0,20}";
+    (text, 1..200u32, text, text).prop_map(|(name, threads, simd, software)| Hello {
+        name,
+        threads,
+        simd,
+        software,
+    })
+}
+
+/// Says these bytes to a master, and then to a worker. Each must come to an end by itself; the worker that the master
+/// took, if any. An error means that somebody waited for ever.
+async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::Elapsed> {
+    let (mut ours, mut theirs) = duplex(4096);
+    theirs.write_all(input).await.unwrap();
+    theirs.shutdown().await.unwrap();
+    let take = |_: &Hello| Ok(Welcome { worker: 1 });
+    let patience = 2 * limits::HANDSHAKE_DEADLINE;
+    let met = tokio::time::timeout(patience, handshake::as_master(&mut ours, take)).await?.ok();
+
+    let (mut ours, mut theirs) = duplex(4096);
+    theirs.write_all(input).await.unwrap();
+    theirs.shutdown().await.unwrap();
+    let hello = Hello { name: String::new(), threads: 1, simd: String::new(), software: String::new() };
+    let _ = tokio::time::timeout(patience, handshake::as_worker(&mut ours, &hello)).await?;
+    Ok(met)
 }
 
 fn block_on<T>(work: impl Future<Output = T>) -> T {
@@ -143,6 +176,53 @@ proptest! {
             hear::<ToWorker, ToMaster>(bytes, 64).await
         });
         prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+    }
+
+    #[test]
+    fn a_mutated_stream_of_a_worker_ends_in_at_most_one_error(
+        messages in vec(to_master(), 1..5),
+        hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let heard = block_on(async {
+            let mut bytes = stream(&messages).await;
+            for (at, value) in hits {
+                let at = at.index(bytes.len());
+                bytes[at] = value;
+            }
+            hear::<ToMaster, ToWorker>(bytes, 64).await
+        });
+        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+    }
+
+    #[test]
+    fn a_handshake_with_arbitrary_bytes_is_refused(input in vec(any::<u8>(), 0..200), is_rayfarm: bool) {
+        let input = if is_rayfarm { [b"RAYFARM\n".as_slice(), &input].concat() } else { input };
+        prop_assert!(block_on(shake_hands(&input)).is_ok());
+    }
+
+    #[test]
+    fn a_mutated_handshake_is_refused_or_still_one(
+        hello in hellos(),
+        hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+    ) {
+        let mut bytes = [b"RAYFARM\n".as_slice(), &PROTOCOL_VERSION.to_le_bytes(), &[2, 0]].concat();
+        let body = codec::encode(&hello).unwrap();
+        bytes.extend((body.len() as u32).to_le_bytes());
+        bytes.extend([0x01, 0, 0, 0]);
+        bytes.extend(body);
+        for (at, value) in hits {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        if let Ok(Some(hello)) = block_on(shake_hands(&bytes)) {
+            let texts = [&hello.name, &hello.simd, &hello.software];
+            prop_assert!(hello.threads > 0);
+            prop_assert!(texts.iter().all(|text| !text.chars().any(char::is_control)));
+        }
     }
 
     #[test]

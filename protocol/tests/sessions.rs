@@ -297,7 +297,7 @@ async fn an_inbox_that_nobody_empties_stops_the_reader() {
     for _ in 0..1000 {
         tokio::task::yield_now().await;
     }
-    assert!(traffic.received_bytes() <= 3 * (limits::MAX_PIXELS_BYTES as u64 + 72));
+    assert!(traffic.received_bytes() <= 3 * (limits::MAX_PIXELS_BYTES as u64 + 96));
     for _ in 0..4 {
         received.recv().await.unwrap().unwrap();
     }

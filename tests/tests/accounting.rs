@@ -46,7 +46,8 @@ fn the_parts_of_every_workers_time_sum_to_a_hundred() {
     let header: Vec<&str> = log.lines().next().unwrap().split(',').collect();
     assert_eq!(header[11..18], PARTS.map(|part| format!("{part}_percent")));
     for line in log.lines().skip(1) {
-        let columns: Vec<f64> = line.split(',').skip(11).take(7).map(|column| column.parse().unwrap()).collect();
+        let columns: Vec<f64> =
+            line.split(',').skip(11).take(7).map(|column| column.parse().unwrap()).collect();
         assert!(sums_to_a_hundred(&columns), "{line}");
     }
 }

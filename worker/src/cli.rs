@@ -2,13 +2,16 @@
 
 use std::ffi::OsString;
 use std::io::{IsTerminal, Read};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser};
-use tokio_util::sync::CancellationToken;
+use clap::{Args, Parser, ValueEnum};
+use rayfarm_protocol::Encoding;
 use tracing_subscriber::EnvFilter;
 
-use crate::client::{WorkerOptions, run};
+use crate::client::{DiskCacheOptions, WorkerOptions, run};
+use crate::disk_cache::user_folder;
+use crate::ending::Ending;
 
 /// A render node of rayfarm: traces segments for a master, with all its cores.
 #[derive(Debug, Parser)]
@@ -37,6 +40,23 @@ pub struct WorkerArgs {
     #[arg(long, value_name = "MIB", default_value_t = 2048, value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
     pub asset_cache: u64,
 
+    /// Folder for scenes and meshes that are to be here after a restart [default: in the user's cache folder, for
+    /// masters on other machines]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+
+    /// Keep nothing on the disk
+    #[arg(long, conflicts_with_all = ["cache", "cache_limit"])]
+    pub no_cache: bool,
+
+    /// Disk space for them; what was not used for longest goes first
+    #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    pub cache_limit: u64,
+
+    /// How pixels are sent
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = PixelEncoding::Auto)]
+    pub pixels: PixelEncoding,
+
     /// End when standard input ends: with whoever started this worker
     #[arg(long)]
     pub exit_with_stdin: bool,
@@ -54,6 +74,17 @@ pub struct WorkerArgs {
     pub quiet: bool,
 }
 
+/// What `--pixels` takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PixelEncoding {
+    /// Compressed to another machine, raw within this one
+    Auto,
+    /// As they are
+    Raw,
+    /// Compressed where that makes them fewer bytes
+    Lz4,
+}
+
 impl WorkerArgs {
     fn options(&self) -> WorkerOptions {
         WorkerOptions {
@@ -62,7 +93,20 @@ impl WorkerArgs {
             name: self.name.clone().unwrap_or_else(machine_name),
             reconnect: !self.no_reconnect,
             asset_cache_bytes: self.asset_cache << 20,
+            disk_cache: self.disk_cache(),
+            encoding: match self.pixels {
+                PixelEncoding::Auto => None,
+                PixelEncoding::Raw => Some(Encoding::Raw),
+                PixelEncoding::Lz4 => Some(Encoding::Lz4),
+            },
         }
+    }
+
+    /// A folder that was asked for serves every master.
+    fn disk_cache(&self) -> Option<DiskCacheOptions> {
+        let folder = self.cache.clone().or_else(user_folder).filter(|_| !self.no_cache)?;
+        let limit_bytes = self.cache_limit << 20;
+        Some(DiskCacheOptions { folder, limit_bytes, within_machine: self.cache.is_some() })
     }
 }
 
@@ -94,13 +138,13 @@ pub fn main_with(args: &WorkerArgs) -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    let stop = CancellationToken::new();
+    let ending = Ending::new();
     if args.exit_with_stdin {
-        stop_with_stdin(stop.clone());
+        stop_with_stdin(ending.clone());
     }
     let result = runtime.block_on(async {
-        tokio::spawn(stop_on_signal(stop.clone()));
-        run(args.options(), stop).await
+        tokio::spawn(end_on_signals(ending.clone()));
+        run(args.options(), ending).await
     });
     // A mesh that is still being decoded is not waited for.
     runtime.shutdown_background();
@@ -127,42 +171,53 @@ fn log_to_stderr(args: &WorkerArgs) {
     let _ = log.try_init();
 }
 
-async fn stop_on_signal(stop: CancellationToken) {
-    let name = match wait_for_signal().await {
-        Ok(name) => name,
-        Err(error) => {
-            tracing::warn!("cannot listen for signals: {error}; end this worker through its master");
-            return;
-        }
-    };
-    tracing::info!("{name}: leaving");
-    stop.cancel();
+/// The first signal lets the worker finish what it holds, the second does not.
+async fn end_on_signals(ending: Ending) {
+    if let Err(error) = wait_for_signals(&ending).await {
+        tracing::warn!("cannot listen for signals: {error}; end this worker through its master");
+    }
+}
+
+fn drain(ending: &Ending, signal: &str) {
+    tracing::info!(
+        "{signal}: leaving when the segments that this worker holds are done; again to leave at once"
+    );
+    ending.drain();
 }
 
 #[cfg(unix)]
-async fn wait_for_signal() -> std::io::Result<&'static str> {
+async fn wait_for_signals(ending: &Ending) -> std::io::Result<()> {
     use tokio::signal::unix::{SignalKind, signal};
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
-    Ok(tokio::select! {
-        _ = terminate.recv() => "terminated",
-        _ = interrupt.recv() => "interrupted",
-    })
+    tokio::select! {
+        _ = terminate.recv() => drain(ending, "terminated"),
+        _ = interrupt.recv() => drain(ending, "interrupted"),
+    }
+    tokio::select! {
+        _ = terminate.recv() => ending.stop(),
+        _ = interrupt.recv() => ending.stop(),
+    }
+    Ok(())
 }
 
 #[cfg(not(unix))]
-async fn wait_for_signal() -> std::io::Result<&'static str> {
-    tokio::signal::ctrl_c().await.map(|()| "interrupted")
+async fn wait_for_signals(ending: &Ending) -> std::io::Result<()> {
+    tokio::signal::ctrl_c().await?;
+    drain(ending, "interrupted");
+    tokio::signal::ctrl_c().await?;
+    ending.stop();
+    Ok(())
 }
 
 /// Whoever started us holds the other end, and need not do anything for us to end with it: not even live.
-fn stop_with_stdin(stop: CancellationToken) {
+fn stop_with_stdin(ending: Ending) {
     let wait = move || {
         let mut stdin = std::io::stdin().lock();
         let mut sink = [0; 256];
         while matches!(stdin.read(&mut sink), Ok(more) if more > 0) {}
         tracing::debug!("standard input has ended: leaving");
-        stop.cancel();
+        ending.stop();
     };
     if let Err(error) = std::thread::Builder::new().name("stdin".to_owned()).spawn(wait) {
         tracing::warn!("cannot watch standard input: {error}");

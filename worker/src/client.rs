@@ -1,14 +1,17 @@
 //! Connects to the master, serves it, and comes back when the connection fails.
 
 use std::io;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::{Hello, Welcome, handshake};
+use rayfarm_protocol::{Encoding, Hello, Welcome, handshake};
 use tokio::net::TcpStream;
-use tokio_util::sync::CancellationToken;
 
-use crate::duty::{End, Keep, serve};
+use crate::disk_cache::DiskCache;
+use crate::disk_writer::DiskWriter;
+use crate::duty::{End, Keep, Terms, serve};
+use crate::ending::Ending;
 use crate::error::WorkerError;
 use crate::pause::Pauses;
 use crate::render_pool::RenderPool;
@@ -35,16 +38,32 @@ pub struct WorkerOptions {
     pub reconnect: bool,
     /// Bytes of scenes and meshes that are kept.
     pub asset_cache_bytes: u64,
+    /// Where assets outlive the worker, if anywhere.
+    pub disk_cache: Option<DiskCacheOptions>,
+    /// How pixels are sent; `None`: in fewer bytes to another machine, and as they are within this one, where that is
+    /// quicker than to encode them.
+    pub encoding: Option<Encoding>,
 }
 
-/// Renders for a master until it says goodbye or `stop` is cancelled; both are `Ok`.
+/// A folder of assets for the next run, and for the other workers of this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DiskCacheOptions {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Bytes that it may take.
+    pub limit_bytes: u64,
+    /// Whether it serves a master on this machine as well, whose assets are here already.
+    pub within_machine: bool,
+}
+
+/// Renders for a master until it says goodbye or the worker is told to end; both are `Ok`.
 ///
 /// Must run in a tokio runtime with I/O and time. Render threads end by themselves soon after this has returned.
 ///
 /// # Errors
 /// The master is of another version or refuses; or, when `reconnect` is off, any failure to connect or stay connected.
-pub async fn run(options: WorkerOptions, stop: CancellationToken) -> Result<(), WorkerError> {
-    run_with(TracerRenderer, options, stop).await
+pub async fn run(options: WorkerOptions, ending: Ending) -> Result<(), WorkerError> {
+    run_with(TracerRenderer, options, ending).await
 }
 
 /// As [`run`], with another renderer.
@@ -54,7 +73,7 @@ pub async fn run(options: WorkerOptions, stop: CancellationToken) -> Result<(), 
 pub async fn run_with<R: Renderer>(
     renderer: R,
     options: WorkerOptions,
-    stop: CancellationToken,
+    ending: Ending,
 ) -> Result<(), WorkerError> {
     let renderer = Arc::new(renderer);
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -67,18 +86,45 @@ pub async fn run_with<R: Renderer>(
         simd: renderer.simd(),
         software: env!("CARGO_PKG_VERSION").to_owned(),
     };
-    let mut keep = Keep { renderer, pool, loader: SceneLoader::new(options.asset_cache_bytes) };
+    let disk = options.disk_cache.as_ref().and_then(open_disk);
+    let mut keep = Keep { renderer, pool, loader: SceneLoader::new(options.asset_cache_bytes), disk };
+    let result = attend(&options, &hello, &mut keep, &ending).await;
+    if let Some(disk) = keep.disk {
+        disk.finish().await;
+    }
+    result
+}
+
+fn open_disk(options: &DiskCacheOptions) -> Option<DiskWriter> {
+    let cache = DiskCache::new(options.folder.clone(), options.limit_bytes);
+    match DiskWriter::new(cache) {
+        Ok(disk) => Some(disk),
+        Err(error) => {
+            tracing::warn!("assets are not kept on the disk: {error}");
+            None
+        }
+    }
+}
+
+/// Session after session.
+async fn attend<R: Renderer>(
+    options: &WorkerOptions,
+    hello: &Hello,
+    keep: &mut Keep<R>,
+    ending: &Ending,
+) -> Result<(), WorkerError> {
     let mut pauses = Pauses::new();
     loop {
         let connected = tokio::select! {
             biased;
-            () = stop.cancelled() => return Ok(()),
-            connected = connect(&options.master, &hello) => connected,
+            () = ending.draining() => return Ok(()),
+            connected = connect(&options.master, hello) => connected,
         };
         let error = match connected {
             Ok(stream) => {
                 let begun = Instant::now();
-                let end = serve(stream, &mut keep, &stop).await;
+                let terms = terms(options, is_within_machine(&stream));
+                let end = serve(stream, terms, keep, ending).await;
                 // One that ends as soon as it has begun is no success.
                 if begun.elapsed() > LASTING_SESSION {
                     pauses.reset();
@@ -93,6 +139,10 @@ pub async fn run_with<R: Renderer>(
             }
             Err(error) => error,
         };
+        if ending.is_draining() {
+            tracing::info!("{error}; leaving all the same");
+            return Ok(());
+        }
         if !options.reconnect || !error.is_passing() {
             return Err(error);
         }
@@ -100,10 +150,22 @@ pub async fn run_with<R: Renderer>(
         tracing::warn!("{error}; trying again in {} s", pause.as_secs());
         tokio::select! {
             biased;
-            () = stop.cancelled() => return Ok(()),
+            () = ending.draining() => return Ok(()),
             () = tokio::time::sleep(pause) => {}
         }
     }
+}
+
+fn is_within_machine(stream: &TcpStream) -> bool {
+    let ends = stream.local_addr().and_then(|ours| Ok((ours.ip(), stream.peer_addr()?.ip())));
+    ends.is_ok_and(|(ours, theirs)| ours == theirs || theirs.is_loopback())
+}
+
+/// Memory is quicker than LZ4, and than most disks.
+fn terms(options: &WorkerOptions, within_machine: bool) -> Terms {
+    let usual = if within_machine { Encoding::Raw } else { Encoding::Lz4 };
+    let uses_disk = options.disk_cache.as_ref().is_some_and(|disk| disk.within_machine || !within_machine);
+    Terms { encoding: options.encoding.unwrap_or(usual), uses_disk }
 }
 
 fn report(end: &End) {

@@ -1,9 +1,11 @@
-//! What a worker does about what its master says. Pure: messages and results go in, effects come out.
+//! What a worker does about what its master says. Pure: messages, results and the time go in, effects come out.
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 
-use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
+use bytes::Bytes;
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
 
 use crate::frames::{Frames, Verdict};
 use crate::render_pool::ReadyFrame;
@@ -16,8 +18,10 @@ pub(crate) enum Effect<R: Renderer> {
     Say(ToMaster),
     /// Do it on a blocking thread, and bring the result to [`Desk::done`].
     Work(Work<R>),
+    /// Keep an asset on the disk.
+    Save(AssetId, Bytes),
     /// Render a lease.
-    Render { lease: Lease, rows: Range<u32>, frame: Arc<ReadyFrame<R::Frame>> },
+    Render { lease: Lease, rows: Range<u32>, frame: Arc<ReadyFrame<R::Frame>>, arrived: Instant },
     /// Forget leases of earlier frames.
     CancelBefore(FrameId),
     /// Forget leases of this frame.
@@ -48,9 +52,9 @@ pub(crate) struct Desk<'a, R: Renderer> {
 }
 
 impl<'a, R: Renderer> Desk<'a, R> {
-    /// Begins a session with what earlier ones have left in the store.
-    pub(crate) fn new(loader: &'a mut SceneLoader<R>) -> Self {
-        loader.reset();
+    /// Begins a session with what earlier ones have left in the store, and on the disk if there is one.
+    pub(crate) fn new(loader: &'a mut SceneLoader<R>, has_disk: bool) -> Self {
+        loader.reset(has_disk);
         Self { loader, frames: Frames::new(), effects: Default::default() }
     }
 
@@ -63,11 +67,11 @@ impl<'a, R: Renderer> Desk<'a, R> {
         self.frames.has_waiting()
     }
 
-    /// The master says something.
-    pub(crate) fn handle(&mut self, message: ToWorker) {
+    /// The master says something, now.
+    pub(crate) fn handle(&mut self, now: Instant, message: ToWorker) {
         match message {
             ToWorker::Frame(announce) => self.announced(announce),
-            ToWorker::Segment(lease) => self.leased(lease),
+            ToWorker::Segment(lease) => self.leased(lease, now),
             ToWorker::Cancel { before } => {
                 self.frames.cancel(before);
                 self.effects.push_back(Effect::CancelBefore(before));
@@ -87,8 +91,8 @@ impl<'a, R: Renderer> Desk<'a, R> {
         match done {
             Done::Scene(done) => self.loader.done(done),
             Done::Prepared { frame, width, result: Ok(ready) } => {
-                for lease in self.frames.ready(frame, ReadyFrame { frame: ready, width }) {
-                    self.leased(lease);
+                for (lease, arrived) in self.frames.ready(frame, ReadyFrame { frame: ready, width }) {
+                    self.leased(lease, arrived);
                 }
             }
             Done::Prepared { frame, result: Err(reason), .. } => self.frame_failed(frame, reason),
@@ -113,9 +117,11 @@ impl<'a, R: Renderer> Desk<'a, R> {
         }
     }
 
-    fn leased(&mut self, lease: Lease) {
-        match self.frames.lease(lease) {
-            Verdict::Render(rows, frame) => self.effects.push_back(Effect::Render { lease, rows, frame }),
+    fn leased(&mut self, lease: Lease, arrived: Instant) {
+        match self.frames.lease(lease, arrived) {
+            Verdict::Render(rows, frame) => {
+                self.effects.push_back(Effect::Render { lease, rows, frame, arrived });
+            }
             Verdict::Nothing => {}
             Verdict::Refuse(reason) => {
                 self.frames.failed(lease.frame);
@@ -128,6 +134,7 @@ impl<'a, R: Renderer> Desk<'a, R> {
         while let Some(step) = self.loader.poll_step() {
             match step {
                 Step::Ask(id) => self.effects.push_back(Effect::Say(ToMaster::NeedAsset { id })),
+                Step::Save(id, bytes) => self.effects.push_back(Effect::Save(id, bytes)),
                 Step::Work(work) => self.effects.push_back(Effect::Work(Work::Scene(work))),
                 Step::Ready(id, scene) => {
                     let frames = self.frames.scene_ready(id).into_iter();

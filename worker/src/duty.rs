@@ -2,20 +2,24 @@
 //! threads or on blocking ones, so a ping is answered at once.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
-use rayfarm_protocol::{ToMaster, ToWorker};
+use rayfarm_protocol::session::{self, Receiver, SendError, Sender, Traffic};
+use rayfarm_protocol::{Encoding, ToMaster, ToWorker};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
-use tokio_util::sync::CancellationToken;
+use tokio::time::{MissedTickBehavior, interval};
 
 use crate::desk::{Desk, Done, Effect, Work};
+use crate::disk_cache::DiskCache;
+use crate::disk_writer::DiskWriter;
+use crate::ending::Ending;
 use crate::guard::guarded;
 use crate::render_pool::{Answers, PoolJob, RenderPool};
 use crate::renderer::Renderer;
 use crate::scene_loader::{SceneDone, SceneLoader, SceneWork};
+use crate::silence::{LOOK_EVERY, Silence};
 
 /// Finished segments between the render threads and the session's own queue.
 const UNSENT_SEGMENTS: usize = 8;
@@ -34,6 +38,16 @@ pub(crate) struct Keep<R: Renderer> {
     pub(crate) renderer: Arc<R>,
     pub(crate) pool: RenderPool<R>,
     pub(crate) loader: SceneLoader<R>,
+    pub(crate) disk: Option<DiskWriter>,
+}
+
+/// What depends on where the master is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms {
+    /// How pixels are written where that makes them fewer bytes.
+    pub(crate) encoding: Encoding,
+    /// Whether assets are kept on the disk.
+    pub(crate) uses_disk: bool,
 }
 
 /// How a session ended.
@@ -50,17 +64,29 @@ pub(crate) enum End {
 }
 
 /// Serves a master until one of the two has enough. Says goodbye if it is we.
-pub(crate) async fn serve<R, S>(io: S, keep: &mut Keep<R>, stop: &CancellationToken) -> End
+pub(crate) async fn serve<R, S>(io: S, terms: Terms, keep: &mut Keep<R>, ending: &Ending) -> End
 where
     R: Renderer,
     S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
 {
-    let (sender, receiver, _traffic) = session::spawn(io);
-    let Keep { renderer, pool, loader } = keep;
-    let duty = Duty { renderer, pool, desk: Desk::new(loader), sender: sender.clone(), work: JoinSet::new() };
+    let (sender, receiver, traffic) = session::spawn(io);
+    let Keep { renderer, pool, loader, disk } = keep;
+    let disk = disk.as_ref().filter(|_| terms.uses_disk);
+    let (desk, work) = (Desk::new(loader, disk.is_some()), JoinSet::new());
+    let duty = Duty {
+        renderer,
+        pool,
+        disk,
+        desk,
+        sender: sender.clone(),
+        work,
+        encoding: terms.encoding,
+        ending,
+        traffic,
+    };
     let end = tokio::select! {
         biased;
-        () = stop.cancelled() => End::Stopped,
+        () = ending.stopped() => End::Stopped,
         end = duty.run(receiver) => end,
     };
     pool.cancel(|_| true);
@@ -85,9 +111,13 @@ where
 struct Duty<'a, R: Renderer> {
     renderer: &'a Arc<R>,
     pool: &'a RenderPool<R>,
+    disk: Option<&'a DiskWriter>,
     desk: Desk<'a, R>,
     sender: Sender<ToMaster>,
     work: JoinSet<Done<R>>,
+    encoding: Encoding,
+    ending: &'a Ending,
+    traffic: Arc<Traffic>,
 }
 
 impl<R: Renderer> Duty<'_, R> {
@@ -95,18 +125,22 @@ impl<R: Renderer> Duty<'_, R> {
         let (pixels, finished) = mpsc::channel(UNSENT_SEGMENTS);
         let (failures, mut failed) = mpsc::unbounded_channel();
         // Dropped when draining: the mailman ends when the last lease has been answered.
-        let mut answers = Some(Answers { pixels, failures });
+        let mut answers = Some(Answers { pixels, failures, encoding: self.encoding });
         let mut mailman = JoinSet::new();
         mailman.spawn(send_finished(finished, self.sender.clone()));
         let mut draining = false;
+        let mut has_asked_to_drain = false;
+        let (mut silence, mut looks) = (Silence::default(), interval(LOOK_EVERY));
+        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             while let Some(effect) = self.desk.poll_effect() {
                 match effect {
                     Effect::Drain => draining = true,
-                    Effect::End { reason, again: true } => {
+                    // What we asked for is no loss.
+                    Effect::End { reason, again: true } if !has_asked_to_drain => {
                         return End::Lost(format!("it ends this session: {reason}"));
                     }
-                    Effect::End { reason, again: false } => return End::Goodbye(reason),
+                    Effect::End { reason, .. } => return End::Goodbye(reason),
                     Effect::Say(message) => self.say(message).await,
                     effect => {
                         if let Err(why) = self.perform(effect, answers.as_ref()) {
@@ -120,7 +154,7 @@ impl<R: Renderer> Duty<'_, R> {
             }
             tokio::select! {
                 message = receiver.recv(), if self.work.len() < MAX_WORK => match message {
-                    Some(Ok(message)) => self.desk.handle(message),
+                    Some(Ok(message)) => self.desk.handle(Instant::now(), message),
                     Some(Err(error)) => return End::Lost(error.to_string()),
                     None => return End::Lost("the master closed the connection without a goodbye".to_owned()),
                 },
@@ -131,6 +165,17 @@ impl<R: Renderer> Duty<'_, R> {
                 },
                 Some((frame, reason)) = failed.recv() => self.desk.frame_failed(frame, reason),
                 Some(_) = mailman.join_next(), if answers.is_none() => return End::Drained,
+                () = self.ending.draining(), if !has_asked_to_drain => {
+                    has_asked_to_drain = true;
+                    // The master gives no more from now on, and says goodbye when it has got the rest.
+                    self.say(ToMaster::Drain).await;
+                }
+                // While we do not listen it is our own silence.
+                _ = looks.tick(), if self.work.len() < MAX_WORK => {
+                    if silence.is_too_long(self.traffic.received_bytes()) {
+                        return End::Lost(Silence::reason());
+                    }
+                }
             }
         }
     }
@@ -139,9 +184,15 @@ impl<R: Renderer> Duty<'_, R> {
         match effect {
             Effect::Work(work) => {
                 let renderer = Arc::clone(self.renderer);
-                self.work.spawn_blocking(move || do_work(&*renderer, work));
+                let disk = self.disk.map(|disk| Arc::clone(disk.cache()));
+                self.work.spawn_blocking(move || do_work(&*renderer, disk.as_deref(), work));
             }
-            Effect::Render { lease, rows, frame } => {
+            Effect::Save(id, bytes) => {
+                if let Some(disk) = self.disk {
+                    disk.save(id, bytes);
+                }
+            }
+            Effect::Render { lease, rows, frame, arrived } => {
                 let Some(answers) = answers else {
                     tracing::warn!("the master leases {lease} after it said that no more would come");
                     return Ok(());
@@ -149,7 +200,7 @@ impl<R: Renderer> Duty<'_, R> {
                 if self.pool.len() >= MAX_LEASES {
                     return Err(format!("the master leases more than {MAX_LEASES} segments at a time"));
                 }
-                self.pool.submit(PoolJob::<R>::new(lease, rows, frame, answers.clone()));
+                self.pool.submit(PoolJob::<R>::new(lease, rows, frame, answers.clone(), arrived));
             }
             Effect::CancelBefore(before) => self.pool.cancel(|frame| frame < before),
             Effect::CancelFrame(stale) => self.pool.cancel(|frame| frame == stale),
@@ -178,8 +229,14 @@ async fn send_finished(mut finished: mpsc::Receiver<ToMaster>, sender: Sender<To
     }
 }
 
-fn do_work<R: Renderer>(renderer: &R, work: Work<R>) -> Done<R> {
+fn do_work<R: Renderer>(renderer: &R, disk: Option<&DiskCache>, work: Work<R>) -> Done<R> {
     match work {
+        Work::Scene(SceneWork::Find { id }) => {
+            Done::Scene(SceneDone::Found { id, size: disk.and_then(|disk| disk.find(id)) })
+        }
+        Work::Scene(SceneWork::Read { id, size }) => {
+            Done::Scene(SceneDone::Read { id, bytes: disk.and_then(|disk| disk.read(id, size)) })
+        }
         Work::Scene(SceneWork::DecodeScene { id, body }) => {
             let result = guarded(|| renderer.decode_scene(&body)).flatten();
             Done::Scene(SceneDone::SceneDecoded { id, result })

@@ -1,8 +1,9 @@
 //! Sessions with a master at the other end of a pipe.
 
-use rayfarm_protocol::{FrameId, ToMaster, ToWorker};
+use rayfarm_protocol::{Encoding, FrameId, ToMaster, ToWorker};
 
-use crate::duty::End;
+use crate::duty::{End, Terms};
+use crate::ending::Ending;
 use crate::testing::{HEIGHT, Master, WIDTH, expected, keep, lease, scene};
 
 const MESH: &[u8] = b"mesh of a teapot";
@@ -247,7 +248,7 @@ async fn a_worker_that_is_told_to_stop_says_goodbye_though_it_renders() {
     master.say(ToWorker::Segment(lease(0, 0..8))).await;
     master.say(ToWorker::Ping { nonce: 0 }).await;
     master.hear().await;
-    master.stop.cancel();
+    master.ending.stop();
     assert!(matches!(master.hear().await, Some(ToMaster::Goodbye { .. })));
     assert!(master.hear().await.is_none());
     assert_eq!(master.worker.await.unwrap().0, End::Stopped);
@@ -280,8 +281,8 @@ async fn a_master_that_vanishes_or_babbles_is_lost_with_the_reason() {
     use tokio::io::AsyncWriteExt;
     let (mut ours, theirs) = tokio::io::duplex(1 << 10);
     ours.write_all(b"HTTP/1.1 200 OK\r\n\r\n").await.unwrap();
-    let stop = tokio_util::sync::CancellationToken::new();
-    let end = crate::duty::serve(theirs, &mut keep(1, PLENTY).0, &stop).await;
+    let terms = Terms { encoding: Encoding::Raw, uses_disk: false };
+    let end = crate::duty::serve(theirs, terms, &mut keep(1, PLENTY).0, &Ending::new()).await;
     assert!(matches!(&end, End::Lost(why) if why.contains("unknown type")), "{end:?}");
 }
 
@@ -308,4 +309,35 @@ async fn of_many_frames_the_oldest_gives_way() {
     assert!(master.failure(0).await.contains("does not hold"));
     master.say(ToWorker::Segment(lease(1, 0..8))).await;
     assert_eq!(master.pixels().await.0, lease(1, 0..8));
+}
+
+#[tokio::test]
+async fn a_worker_that_is_to_leave_finishes_what_it_holds_and_does_not_come_back() {
+    let body = scene(1, &[]);
+    let (kept, gate) = keep(1, PLENTY);
+    let mut master = Master::meet(kept, &[&body]);
+    master.announce(0, &body, b"wait").await;
+    master.say(ToWorker::Segment(lease(0, 0..8))).await;
+    master.ending.drain();
+    assert_eq!(master.hear().await, Some(ToMaster::Drain));
+    // One more was on its way when the master heard of it.
+    master.say(ToWorker::Segment(lease(0, 8..16))).await;
+    gate.open();
+    for rows in [0..8, 8..16] {
+        assert_eq!(master.pixels().await, (lease(0, rows.clone()), expected(&body, b"wait", rows).into()));
+    }
+    master.say(ToWorker::Goodbye { reason: "all done".into(), again: true }).await;
+    assert_eq!(master.worker.await.unwrap().0, End::Goodbye("all done".into()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_master_that_falls_silent_is_lost_and_one_that_pings_is_not() {
+    let mut master = Master::meet(keep(1, PLENTY).0, &[]);
+    for nonce in 0..60 {
+        master.say(ToWorker::Ping { nonce }).await;
+        assert_eq!(master.hear().await, Some(ToMaster::Pong { nonce }));
+        tokio::time::sleep(std::time::Duration::from_secs(2)).await;
+    }
+    let (end, _) = master.worker.await.unwrap();
+    assert!(matches!(&end, End::Lost(why) if why.contains("silent")), "{end:?}");
 }

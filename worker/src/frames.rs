@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, pixels};
 
@@ -27,7 +28,8 @@ enum State<F> {
 struct Held<F> {
     announce: FrameAnnounce,
     state: State<F>,
-    waiting: Vec<Lease>,
+    /// With the moment of their arrival.
+    waiting: Vec<(Lease, Instant)>,
 }
 
 /// What to do with a lease.
@@ -99,7 +101,7 @@ impl<F> Frames<F> {
     }
 
     /// A frame is ready: the leases that waited for it.
-    pub(crate) fn ready(&mut self, frame: FrameId, ready: F) -> Vec<Lease> {
+    pub(crate) fn ready(&mut self, frame: FrameId, ready: F) -> Vec<(Lease, Instant)> {
         let held = self.held.get_mut(&frame).filter(|held| matches!(held.state, State::Preparing));
         let Some(held) = held else { return Vec::new() };
         held.state = State::Ready(Arc::new(ready));
@@ -112,8 +114,8 @@ impl<F> Frames<F> {
         held.filter(|held| !matches!(held.state, State::Failed)).map(|held| held.fail()).is_some()
     }
 
-    /// Decides on a lease.
-    pub(crate) fn lease(&mut self, lease: Lease) -> Verdict<F> {
+    /// Decides on a lease that has arrived at that moment.
+    pub(crate) fn lease(&mut self, lease: Lease, arrived: Instant) -> Verdict<F> {
         let Some(held) = self.held.get_mut(&lease.frame) else {
             if lease.frame < self.before {
                 return Verdict::Nothing;
@@ -134,7 +136,7 @@ impl<F> Frames<F> {
                 Verdict::Refuse(format!("more than {MAX_WAITING} leases wait for frame {}", lease.frame))
             }
             State::Loading | State::Preparing => {
-                held.waiting.push(lease);
+                held.waiting.push((lease, arrived));
                 Verdict::Nothing
             }
         }

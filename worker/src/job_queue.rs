@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use rayfarm_protocol::{Cost, FrameId, Lease};
+use rayfarm_protocol::{Cost, Encoding, FrameId, Lease};
 
 use crate::renderer::Counts;
 
@@ -17,6 +18,7 @@ pub(crate) struct Job<F, A> {
     pub(crate) lease: Lease,
     pub(crate) frame: Arc<F>,
     pub(crate) answer: A,
+    arrived: Instant,
     cancelled: AtomicBool,
     progress: Mutex<Progress>,
 }
@@ -26,10 +28,35 @@ struct Progress {
     /// Rows that no thread has taken yet, and the bytes they go to.
     rows: Range<u32>,
     room: Option<BytesMut>,
+    /// When the first rows were taken.
+    begun: Option<Instant>,
     /// Finished bands by their first row.
-    done: BTreeMap<u32, BytesMut>,
+    done: BTreeMap<u32, Pixels>,
     done_rows: u32,
     cost: Cost,
+}
+
+/// The pixels of a band: as they are, and as a block where blocks are wanted.
+#[derive(Debug)]
+pub(crate) struct Pixels {
+    pub(crate) raw: BytesMut,
+    pub(crate) block: Option<Vec<u8>>,
+}
+
+/// What a band took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BandCost {
+    pub(crate) counts: Counts,
+    pub(crate) trace: Duration,
+    pub(crate) encode: Duration,
+}
+
+/// A lease whose bands are all back.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Rendered {
+    pub(crate) encoding: Encoding,
+    pub(crate) bytes: Bytes,
+    pub(crate) cost: Cost,
 }
 
 /// Rows of a job for one thread. `bytes` is theirs alone, and a part of the job's one buffer.
@@ -42,10 +69,10 @@ pub(crate) struct Band<F, A> {
 
 impl<F, A> Job<F, A> {
     /// `rows` are the lease's.
-    pub(crate) fn new(lease: Lease, rows: Range<u32>, frame: Arc<F>, answer: A) -> Self {
-        let progress =
-            Progress { rows, room: None, done: BTreeMap::new(), done_rows: 0, cost: Cost::default() };
-        Self { lease, frame, answer, cancelled: AtomicBool::new(false), progress: Mutex::new(progress) }
+    pub(crate) fn new(lease: Lease, rows: Range<u32>, frame: Arc<F>, answer: A, arrived: Instant) -> Self {
+        let (done, cost) = (BTreeMap::new(), Cost::default());
+        let progress = Mutex::new(Progress { rows, room: None, begun: None, done, done_rows: 0, cost });
+        Self { lease, frame, answer, arrived, cancelled: AtomicBool::new(false), progress }
     }
 
     /// Asked between bands of rows; never taken back.
@@ -69,6 +96,7 @@ impl<F, A> Job<F, A> {
         if start >= end || self.is_cancelled() {
             return None;
         }
+        progress.begun.get_or_insert_with(Instant::now);
         let stop = (start + 1).next_multiple_of(band_rows).min(end);
         let all_bytes = (end - start) as usize * row_bytes;
         let room = progress.room.get_or_insert_with(|| BytesMut::zeroed(all_bytes));
@@ -77,35 +105,49 @@ impl<F, A> Job<F, A> {
         Some((start..stop, bytes))
     }
 
-    /// Takes a finished band back. The last one completes the lease: all its bytes, and what it cost.
-    pub(crate) fn finish_band(
-        &self,
-        rows: Range<u32>,
-        bytes: BytesMut,
-        counts: Counts,
-        trace_ns: u64,
-    ) -> Option<(Bytes, Cost)> {
+    /// Takes a finished band back. The last one completes the lease.
+    pub(crate) fn finish_band(&self, rows: Range<u32>, pixels: Pixels, cost: BandCost) -> Option<Rendered> {
         let mut progress = self.progress();
-        add(&mut progress.cost, counts, trace_ns);
+        progress.cost += cost.on_the_wire();
         progress.done_rows += rows.end - rows.start;
-        progress.done.insert(rows.start, bytes);
+        progress.done.insert(rows.start, pixels);
         if progress.done_rows < self.lease.row_count || self.is_cancelled() {
             return None;
         }
-        let mut whole = BytesMut::new();
-        for (_, band) in std::mem::take(&mut progress.done) {
-            // Neighbours in one buffer: joining them moves no byte.
-            whole.unsplit(band);
-        }
-        Some((whole.freeze(), progress.cost))
+        let (encoding, bytes) = whole(std::mem::take(&mut progress.done));
+        let begun = progress.begun.unwrap_or(self.arrived);
+        let wait_ns = nanoseconds(begun.saturating_duration_since(self.arrived));
+        let span_ns = nanoseconds(begun.elapsed());
+        Some(Rendered { encoding, bytes, cost: Cost { wait_ns, span_ns, ..progress.cost } })
     }
 }
 
-fn add(cost: &mut Cost, counts: Counts, trace_ns: u64) {
-    cost.trace_ns = cost.trace_ns.saturating_add(trace_ns);
-    cost.primary = cost.primary.saturating_add(counts.primary);
-    cost.shadow = cost.shadow.saturating_add(counts.shadow);
-    cost.secondary = cost.secondary.saturating_add(counts.secondary);
+/// All bands from top to bottom: as blocks if every one has its own and together they are fewer bytes.
+fn whole(bands: BTreeMap<u32, Pixels>) -> (Encoding, Bytes) {
+    let raw_bytes: usize = bands.values().map(|band| band.raw.len()).sum();
+    let blocks: Option<Vec<&[u8]>> = bands.values().map(|band| band.block.as_deref()).collect();
+    match blocks.map(|blocks| blocks.concat()).filter(|packed| packed.len() < raw_bytes) {
+        Some(packed) => (Encoding::Lz4, packed.into()),
+        None => {
+            let mut whole = BytesMut::new();
+            // Neighbours in one buffer: joining them moves no byte.
+            bands.into_values().for_each(|band| whole.unsplit(band.raw));
+            (Encoding::Raw, whole.freeze())
+        }
+    }
+}
+
+impl BandCost {
+    /// Its share of a lease's cost; waiting and the span are the lease's as a whole.
+    fn on_the_wire(self) -> Cost {
+        let Self { counts: Counts { primary, shadow, secondary }, trace, encode } = self;
+        let (trace_ns, encode_ns) = (nanoseconds(trace), nanoseconds(encode));
+        Cost { trace_ns, encode_ns, primary, shadow, secondary, ..Cost::default() }
+    }
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// Jobs from their arrival until their last band is back.
@@ -154,6 +196,8 @@ impl<F, A> JobQueue<F, A> {
 
 #[cfg(test)]
 mod tests {
+    use rayfarm_protocol::pixels::{Packer, unpack};
+
     use super::*;
 
     const WIDTH: usize = 4;
@@ -161,7 +205,7 @@ mod tests {
     fn job(segment: u32, rows: Range<u32>) -> Job<(), ()> {
         let (first_row, row_count) = (rows.start, rows.end - rows.start);
         let lease = Lease { frame: FrameId(u64::from(segment)), segment, attempt: 0, first_row, row_count };
-        Job::new(lease, rows, Arc::new(()), ())
+        Job::new(lease, rows, Arc::new(()), (), Instant::now())
     }
 
     fn take(queue: &JobQueue<(), ()>) -> Option<(u32, Range<u32>, Band<(), ()>)> {
@@ -183,29 +227,64 @@ mod tests {
         assert_eq!(taken, [(1, 5..8), (1, 8..16), (1, 16..20), (2, 20..21)]);
     }
 
+    /// All bands of a job, each of its rows filled with its number, the last band first.
+    fn filled_bands(queue: &JobQueue<(), ()>) -> Vec<Band<(), ()>> {
+        let mut bands: Vec<_> = std::iter::from_fn(|| take(queue)).map(|(_, _, band)| band).collect();
+        for band in &mut bands {
+            assert_eq!(band.bytes.len(), band.rows.len() * WIDTH * 3);
+            for (row, line) in band.rows.clone().zip(band.bytes.chunks_mut(WIDTH * 3)) {
+                line.fill(row as u8);
+            }
+        }
+        bands.reverse();
+        bands
+    }
+
     #[test]
     fn bands_become_one_buffer_in_order_whoever_finishes_first() {
         let queue = queue([job(1, 5..20)]);
-        let mut bands: Vec<_> = std::iter::from_fn(|| take(&queue)).map(|(_, _, band)| band).collect();
-        let first = bands[0].bytes.as_ptr();
-        bands.reverse();
+        let bands = filled_bands(&queue);
+        let first = bands.last().unwrap().bytes.as_ptr();
         let last = bands.len() - 1;
-        for (index, Band { job, rows, mut bytes }) in bands.into_iter().enumerate() {
-            assert_eq!(bytes.len(), rows.len() * WIDTH * 3);
-            for (row, line) in rows.clone().zip(bytes.chunks_mut(WIDTH * 3)) {
-                line.fill(row as u8);
-            }
+        for (index, Band { job, rows, bytes }) in bands.into_iter().enumerate() {
             let counts = Counts { primary: 2, shadow: 3, secondary: 4 };
-            match job.finish_band(rows, bytes, counts, 5) {
-                None => assert!(index < last),
-                Some((whole, cost)) => {
-                    assert_eq!(index, last);
-                    assert_eq!(cost, Cost { trace_ns: 15, primary: 6, shadow: 9, secondary: 12 });
-                    let expected: Vec<u8> = (5..20).flat_map(|row| [row; WIDTH * 3]).collect();
-                    assert_eq!(whole, expected);
-                    assert_eq!(whole.as_ptr(), first, "the bands were copied");
-                }
+            let cost = BandCost { counts, trace: Duration::from_nanos(5), encode: Duration::from_nanos(1) };
+            let Some(rendered) = job.finish_band(rows, Pixels { raw: bytes, block: None }, cost) else {
+                assert!(index < last);
+                continue;
+            };
+            assert_eq!(index, last);
+            let Cost { trace_ns, encode_ns, primary, shadow, secondary, .. } = rendered.cost;
+            assert_eq!((trace_ns, encode_ns, primary, shadow, secondary), (15, 3, 6, 9, 12));
+            assert_eq!((rendered.encoding, &rendered.bytes), (Encoding::Raw, &expected(5..20)));
+            assert_eq!(rendered.bytes.as_ptr(), first, "the bands were copied");
+        }
+    }
+
+    fn expected(rows: Range<u32>) -> Bytes {
+        rows.flat_map(|row| [row as u8; WIDTH * 3]).collect()
+    }
+
+    #[test]
+    fn blocks_are_sent_where_they_are_fewer_bytes() {
+        for (first_row, encoding) in [(0, Encoding::Lz4), (5, Encoding::Raw)] {
+            let queue = queue([job(1, first_row..24)]);
+            let mut packer = Packer::new();
+            let rendered = filled_bands(&queue).into_iter().find_map(|Band { job, rows, bytes }| {
+                // A block of one's own for each row makes them more than the rows.
+                let part = if first_row == 0 { bytes.len() } else { 3 };
+                let block = bytes.chunks(part).flat_map(|part| packer.block(part).unwrap()).collect();
+                job.finish_band(rows, Pixels { raw: bytes, block: Some(block) }, BandCost::default())
+            });
+            let Rendered { encoding: chosen, bytes, .. } = rendered.unwrap();
+            let expected = expected(first_row..24);
+            assert_eq!((chosen, bytes.len() < expected.len()), (encoding, encoding == Encoding::Lz4));
+            let mut rows = vec![0; expected.len()];
+            match chosen {
+                Encoding::Lz4 => unpack(&bytes, &mut rows).unwrap(),
+                Encoding::Raw => rows.copy_from_slice(&bytes),
             }
+            assert_eq!(rows, expected);
         }
     }
 
@@ -218,7 +297,8 @@ mod tests {
         assert_eq!(take(&queue).unwrap().0, 2);
         assert_eq!(queue.len(), 1);
         let single = Band { rows: 0..16, ..running };
-        assert!(single.job.finish_band(single.rows, single.bytes, Counts::default(), 0).is_none());
+        let pixels = Pixels { raw: single.bytes, block: None };
+        assert!(single.job.finish_band(single.rows, pixels, BandCost::default()).is_none());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //!
 //! 1. `client` connects, introduces itself, and comes back when the connection fails.
 //! 2. `desk` takes the master's messages and decides what they lead to. It is pure: no socket, no thread, no clock.
-//! 3. `scene_loader` fetches a scene by hash (`transfer`), and keeps it (`asset_store`); `frames` holds the leases of a
+//! 3. `scene_loader` fetches a scene by hash (`transfer`), keeps it (`asset_store`), and leaves its assets to later runs (`disk_cache`); `frames` holds the leases of a
 //!    frame until it is ready.
 //! 4. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads, hands out leases.
 //! 5. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
@@ -15,9 +15,14 @@ mod asset_store;
 pub mod cli;
 mod client;
 mod desk;
+mod disk_cache;
+#[cfg(test)]
+mod disk_tests;
+mod disk_writer;
 mod duty;
 #[cfg(test)]
 mod duty_tests;
+mod ending;
 mod error;
 mod frames;
 mod guard;
@@ -26,12 +31,14 @@ mod pause;
 mod render_pool;
 mod renderer;
 mod scene_loader;
+mod silence;
 #[cfg(test)]
 mod testing;
 mod tracer;
 mod transfer;
 
-pub use client::{WorkerOptions, run, run_with};
+pub use client::{DiskCacheOptions, WorkerOptions, run, run_with};
+pub use ending::Ending;
 pub use error::WorkerError;
 pub use renderer::{Cancelled, Counts, Renderer};
 pub use tracer::TracerRenderer;

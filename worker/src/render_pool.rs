@@ -4,13 +4,13 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use bytes::Bytes;
+use rayfarm_protocol::pixels::Packer;
 use rayfarm_protocol::{Encoding, FrameId, PixelsHeader, ToMaster};
 use tokio::sync::mpsc;
 
 use crate::guard::guarded;
-use crate::job_queue::{Band, Job, JobQueue};
-use crate::renderer::{Cancelled, Counts, Renderer};
+use crate::job_queue::{Band, BandCost, Job, JobQueue, Pixels, Rendered};
+use crate::renderer::{Cancelled, Renderer};
 
 /// Where a session wants the results of its leases.
 #[derive(Clone, Debug)]
@@ -19,6 +19,8 @@ pub(crate) struct Answers {
     pub(crate) pixels: mpsc::Sender<ToMaster>,
     /// Frames that a bug made fail, and the reason.
     pub(crate) failures: mpsc::UnboundedSender<(FrameId, String)>,
+    /// How pixels are written where that makes them fewer bytes.
+    pub(crate) encoding: Encoding,
 }
 
 /// A frame as a lease refers to it.
@@ -94,8 +96,9 @@ impl<R: Renderer> Shared<R> {
     }
 
     fn run(&self) {
+        let mut packer = Packer::new();
         while let Some(band) = self.next_band() {
-            self.render(band);
+            self.render(band, &mut packer);
         }
     }
 
@@ -113,7 +116,7 @@ impl<R: Renderer> Shared<R> {
         }
     }
 
-    fn render(&self, band: PoolBand<R>) {
+    fn render(&self, band: PoolBand<R>, packer: &mut Packer) {
         let Band { job, rows, mut bytes } = band;
         let begun = Instant::now();
         let rendered = guarded(|| {
@@ -121,8 +124,8 @@ impl<R: Renderer> Shared<R> {
         });
         match rendered {
             Ok(Ok(counts)) => {
-                let trace_ns = u64::try_from(begun.elapsed().as_nanos()).unwrap_or(u64::MAX);
-                self.finish(Band { job, rows, bytes }, counts, trace_ns);
+                let cost = BandCost { counts, trace: begun.elapsed(), ..BandCost::default() };
+                self.finish(Band { job, rows, bytes }, cost, packer);
             }
             // Whoever cancelled it has taken it off the queue.
             Ok(Err(Cancelled)) => {}
@@ -130,12 +133,21 @@ impl<R: Renderer> Shared<R> {
         }
     }
 
-    fn finish(&self, band: PoolBand<R>, counts: Counts, trace_ns: u64) {
-        let Band { job, rows, bytes } = band;
-        if let Some((bytes, cost)) = job.finish_band(rows, bytes, counts, trace_ns) {
+    /// Encodes a band while its pixels are warm, and gives it back.
+    fn finish(&self, band: PoolBand<R>, mut cost: BandCost, packer: &mut Packer) {
+        let Band { job, rows, bytes: raw } = band;
+        let block = match job.answer.encoding {
+            Encoding::Raw => None,
+            Encoding::Lz4 => {
+                let begun = Instant::now();
+                let block = packer.block(&raw);
+                cost.encode = begun.elapsed();
+                block
+            }
+        };
+        if let Some(rendered) = job.finish_band(rows, Pixels { raw, block }, cost) {
             self.state().queue.remove(&job);
-            let header = PixelsHeader { lease: job.lease, encoding: Encoding::Raw, cost };
-            send(&job.answer, header, bytes);
+            send(&job, rendered);
         }
     }
 
@@ -148,7 +160,9 @@ impl<R: Renderer> Shared<R> {
     }
 }
 
-fn send(answers: &Answers, header: PixelsHeader, bytes: Bytes) {
+fn send<F>(job: &Job<F, Answers>, rendered: Rendered) {
+    let Rendered { encoding, bytes, cost } = rendered;
+    let header = PixelsHeader { lease: job.lease, encoding, cost };
     // It fails when the session has ended: then the master has given the lease to somebody else.
-    let _ = answers.pixels.blocking_send(ToMaster::Pixels { header, bytes });
+    let _ = job.answer.pixels.blocking_send(ToMaster::Pixels { header, bytes });
 }

@@ -1,10 +1,12 @@
 //! From the hash of a scene to a scene that can be rendered: ask for its body, decode it, ask for the meshes and
-//! textures it names (its *parts*), compile. Pure: what has to be done comes out as [`Step`]s, and what became of it goes in again.
+//! textures it names (its *parts*), compile. What the disk still has from an earlier run is not asked for. Pure: what has
+//! to be done comes out as [`Step`]s, and what became of it goes in again.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use bytes::Bytes;
 use rayfarm_protocol::{AssetId, limits};
 
 use crate::asset_store::AssetStore;
@@ -23,6 +25,8 @@ pub(crate) enum Step<R: Renderer> {
     Ask(AssetId),
     /// Do this on a blocking thread.
     Work(SceneWork<R>),
+    /// Keep this asset on the disk, when there is time.
+    Save(AssetId, Bytes),
     /// Frames of this scene can be prepared.
     Ready(AssetId, Arc<R::Scene>),
     /// Frames of this scene cannot be rendered here.
@@ -31,13 +35,34 @@ pub(crate) enum Step<R: Renderer> {
 
 /// Work that takes its time.
 pub(crate) enum SceneWork<R: Renderer> {
-    DecodeScene { id: AssetId, body: Vec<u8> },
-    DecodePart { id: AssetId, bytes: Vec<u8> },
-    Compile { id: AssetId, draft: R::Draft, parts: Vec<Arc<R::Part>> },
+    /// See whether the disk has it.
+    Find {
+        id: AssetId,
+    },
+    /// Read it from there.
+    Read {
+        id: AssetId,
+        size: u64,
+    },
+    DecodeScene {
+        id: AssetId,
+        body: Bytes,
+    },
+    DecodePart {
+        id: AssetId,
+        bytes: Bytes,
+    },
+    Compile {
+        id: AssetId,
+        draft: R::Draft,
+        parts: Vec<Arc<R::Part>>,
+    },
 }
 
 /// What became of it.
 pub(crate) enum SceneDone<R: Renderer> {
+    Found { id: AssetId, size: Option<u64> },
+    Read { id: AssetId, bytes: Option<Vec<u8>> },
     SceneDecoded { id: AssetId, result: Result<(R::Draft, Vec<AssetId>), String> },
     PartDecoded { id: AssetId, result: Result<R::Part, String> },
     Compiled { id: AssetId, result: Result<R::Scene, String> },
@@ -51,6 +76,10 @@ enum Stored<R: Renderer> {
 /// An asset between the wish for it and its place in the store.
 enum Incoming {
     Wished,
+    /// Looked for on the disk.
+    Sought,
+    /// Read from there.
+    Reading,
     Asked,
     Arriving(Transfer),
     Decoding,
@@ -73,6 +102,8 @@ pub(crate) struct SceneLoader<R: Renderer> {
     refused: BTreeMap<AssetId, String>,
     current: BTreeSet<AssetId>,
     steps: VecDeque<Step<R>>,
+    /// Whether there is a disk to look at first.
+    has_disk: bool,
 }
 
 impl<R: Renderer> SceneLoader<R> {
@@ -85,11 +116,13 @@ impl<R: Renderer> SceneLoader<R> {
             refused: BTreeMap::new(),
             current: BTreeSet::new(),
             steps: VecDeque::new(),
+            has_disk: false,
         }
     }
 
     /// A new session: nothing is on its way any more, and what failed may succeed.
-    pub(crate) fn reset(&mut self) {
+    pub(crate) fn reset(&mut self, has_disk: bool) {
+        self.has_disk = has_disk;
         self.incoming.clear();
         self.wishes.clear();
         self.loads.clear();
@@ -141,15 +174,49 @@ impl<R: Renderer> SceneLoader<R> {
     }
 
     fn ask(&mut self) {
-        let is_asked = |state: &Incoming| matches!(state, Incoming::Asked | Incoming::Arriving(_));
+        let is_asked = |state: &Incoming| !matches!(state, Incoming::Wished | Incoming::Decoding);
         let mut asked = self.incoming.values().filter(|(state, _)| is_asked(state)).count();
         while asked < MAX_ASKED
             && let Some(id) = self.wishes.pop_front()
         {
-            self.incoming.insert(id, (Incoming::Asked, 0));
-            self.steps.push_back(Step::Ask(id));
+            if self.has_disk {
+                self.incoming.insert(id, (Incoming::Sought, 0));
+                self.steps.push_back(Step::Work(SceneWork::Find { id }));
+            } else {
+                self.ask_master(id);
+            }
             asked += 1;
         }
+    }
+
+    fn ask_master(&mut self, id: AssetId) {
+        self.incoming.insert(id, (Incoming::Asked, 0));
+        self.steps.push_back(Step::Ask(id));
+    }
+
+    /// What the disk has of an asset. One that does not fit is the master's to announce: only its size is to be believed.
+    fn found(&mut self, id: AssetId, size: Option<u64>) {
+        if !matches!(self.incoming.get(&id), Some((Incoming::Sought, _))) {
+            return;
+        }
+        match size.filter(|size| self.admit(id, *size).is_ok()) {
+            Some(size) => {
+                self.incoming.insert(id, (Incoming::Reading, size));
+                self.steps.push_back(Step::Work(SceneWork::Read { id, size }));
+            }
+            None => self.ask_master(id),
+        }
+    }
+
+    fn read(&mut self, id: AssetId, bytes: Option<Vec<u8>>) {
+        if !matches!(self.incoming.get(&id), Some((Incoming::Reading, _))) {
+            return;
+        }
+        match bytes {
+            Some(bytes) => self.decode(id, bytes.into()),
+            None => self.ask_master(id),
+        }
+        self.ask();
     }
 
     /// The master announces an asset.
@@ -158,7 +225,8 @@ impl<R: Renderer> SceneLoader<R> {
             tracing::warn!("the master sends asset {id}, which was not asked for; it is not kept");
             return;
         }
-        match self.admit(id, size) {
+        let begun = self.admit(id, size).and_then(|()| Transfer::begin(id, size).map_err(|e| e.to_string()));
+        match begun {
             Ok(transfer) => {
                 self.incoming.insert(id, (Incoming::Arriving(transfer), size));
                 self.complete(id);
@@ -167,7 +235,8 @@ impl<R: Renderer> SceneLoader<R> {
         }
     }
 
-    fn admit(&mut self, id: AssetId, size: u64) -> Result<Transfer, String> {
+    /// Makes room for an asset of that size.
+    fn admit(&mut self, id: AssetId, size: u64) -> Result<(), String> {
         if self.loads.contains_key(&id) && size > limits::MAX_DECODE_BYTES as u64 {
             let limit = limits::MAX_DECODE_BYTES;
             return Err(format!("the scene body has {size} bytes, at most {limit} are decoded"));
@@ -181,7 +250,7 @@ impl<R: Renderer> SceneLoader<R> {
                  start it with a larger --asset-cache"
             ));
         }
-        Transfer::begin(id, size).map_err(|error| error.to_string())
+        Ok(())
     }
 
     /// A part of an asset. Parts of what was given up meanwhile are dropped.
@@ -207,20 +276,39 @@ impl<R: Renderer> SceneLoader<R> {
             return;
         }
         let Incoming::Arriving(transfer) = std::mem::replace(state, Incoming::Decoding) else { return };
-        match (transfer.finish(), self.loads.contains_key(&id)) {
-            (Ok(body), true) => self.steps.push_back(Step::Work(SceneWork::DecodeScene { id, body })),
-            (Ok(bytes), false) => self.steps.push_back(Step::Work(SceneWork::DecodePart { id, bytes })),
-            (Err(error @ TransferError::Damaged { .. }), _) => {
+        match transfer.finish() {
+            Ok(bytes) => {
+                let bytes = Bytes::from(bytes);
+                self.decode(id, bytes.clone());
+                if self.has_disk {
+                    self.steps.push_back(Step::Save(id, bytes));
+                }
+            }
+            Err(error @ TransferError::Damaged { .. }) => {
                 self.fail(id, &format!("{error}; the master's memory or its software is at fault"));
             }
-            (Err(error), _) => self.fail(id, &error.to_string()),
+            Err(error) => self.fail(id, &error.to_string()),
         }
         self.ask();
+    }
+
+    /// Has the bytes decoded that bear this name.
+    fn decode(&mut self, id: AssetId, bytes: Bytes) {
+        if let Some((state, _)) = self.incoming.get_mut(&id) {
+            *state = Incoming::Decoding;
+        }
+        let work = match self.loads.contains_key(&id) {
+            true => SceneWork::DecodeScene { id, body: bytes },
+            false => SceneWork::DecodePart { id, bytes },
+        };
+        self.steps.push_back(Step::Work(work));
     }
 
     /// Takes the result of a [`Step::Work`].
     pub(crate) fn done(&mut self, done: SceneDone<R>) {
         match done {
+            SceneDone::Found { id, size } => self.found(id, size),
+            SceneDone::Read { id, bytes } => self.read(id, bytes),
             SceneDone::SceneDecoded { id, result } => match (self.arrived(id), result) {
                 (bytes, Ok((draft, parts))) => self.scene_decoded(id, bytes, draft, parts),
                 (_, Err(reason)) => self.fail(id, &reason),

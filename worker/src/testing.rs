@@ -4,15 +4,18 @@
 //! a view says how the frame behaves.
 
 use std::ops::Range;
+use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex};
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{self, Receiver, Sender};
-use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
+use rayfarm_protocol::{AssetId, Encoding, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
 use tokio::task::JoinHandle;
-use tokio_util::sync::CancellationToken;
 
-use crate::duty::{End, Keep, serve};
+use crate::disk_cache::DiskCache;
+use crate::disk_writer::DiskWriter;
+use crate::duty::{End, Keep, Terms, serve};
+use crate::ending::Ending;
 use crate::render_pool::RenderPool;
 use crate::renderer::{Cancelled, Counts, Renderer};
 use crate::scene_loader::SceneLoader;
@@ -121,7 +124,13 @@ pub(crate) fn keep(threads: usize, cache_bytes: u64) -> (Keep<Fake>, Arc<Gate>) 
     let renderer = Arc::new(Fake::default());
     let gate = Arc::clone(&renderer.gate);
     let pool = RenderPool::new(Arc::clone(&renderer), threads).unwrap();
-    (Keep { renderer, pool, loader: SceneLoader::new(cache_bytes) }, gate)
+    (Keep { renderer, pool, loader: SceneLoader::new(cache_bytes), disk: None }, gate)
+}
+
+/// A worker that has just been started, with a disk cache in that folder.
+pub(crate) fn keep_with_disk(folder: &Path, limit_bytes: u64) -> Keep<Fake> {
+    let disk = DiskWriter::new(DiskCache::new(folder.to_owned(), limit_bytes)).unwrap();
+    Keep { disk: Some(disk), ..keep(1, 1 << 20).0 }
 }
 
 pub(crate) fn scene(salt: u8, meshes: &[&[u8]]) -> Vec<u8> {
@@ -139,7 +148,7 @@ pub(crate) struct Master {
     pub(crate) out: Sender<ToWorker>,
     pub(crate) inbox: Receiver<ToMaster>,
     pub(crate) worker: JoinHandle<(End, Keep<Fake>)>,
-    pub(crate) stop: CancellationToken,
+    pub(crate) ending: Ending,
     assets: Vec<(AssetId, Vec<u8>)>,
     /// What the worker asked for, in order.
     pub(crate) asked: Vec<AssetId>,
@@ -149,15 +158,16 @@ impl Master {
     /// Starts a session with a worker that keeps what it has.
     pub(crate) fn meet(mut keep: Keep<Fake>, assets: &[&[u8]]) -> Self {
         let (ours, theirs) = tokio::io::duplex(1 << 16);
-        let stop = CancellationToken::new();
-        let stopped = stop.clone();
+        let ending = Ending::new();
+        let told = ending.clone();
         let worker = tokio::spawn(async move {
-            let end = serve(theirs, &mut keep, &stopped).await;
+            let terms = Terms { encoding: Encoding::Raw, uses_disk: keep.disk.is_some() };
+            let end = serve(theirs, terms, &mut keep, &told).await;
             (end, keep)
         });
         let (out, inbox, _) = session::spawn(ours);
         let assets = assets.iter().map(|bytes| (AssetId::of(bytes), bytes.to_vec())).collect();
-        Self { out, inbox, worker, stop, assets, asked: Vec::new() }
+        Self { out, inbox, worker, ending, assets, asked: Vec::new() }
     }
 
     /// Sends other bytes under the name of an asset.

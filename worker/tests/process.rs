@@ -76,17 +76,41 @@ async fn it_ends_with_its_standard_input() {
 }
 
 #[cfg(unix)]
+async fn signal(worker: &Child, name: &str) {
+    let id = worker.id().unwrap().to_string();
+    assert!(Command::new("kill").args([name, &id]).status().await.unwrap().success());
+}
+
+#[cfg(unix)]
 #[tokio::test]
-async fn signals_end_it_with_a_goodbye_and_status_0() {
-    for signal in ["-TERM", "-INT"] {
+async fn a_signal_drains_it_and_it_ends_with_status_0() {
+    for name in ["-TERM", "-INT"] {
         let (listener, address) = listen().await;
+        let stage = Stage::new();
         let mut worker = start(&address, &[]);
         let mut link = Link::accept(&listener).await;
         // Once it renders, it listens for signals.
-        link.check_frame(&Stage::new(), 0, 0.0).await;
-        let id = worker.id().unwrap().to_string();
-        assert!(Command::new("kill").args([signal, &id]).status().await.unwrap().success());
-        assert!(matches!(link.hear(&Stage::new()).await, Some(ToMaster::Goodbye { .. })));
+        link.check_frame(&stage, 0, 0.0).await;
+        signal(&worker, name).await;
+        assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
+        // What the master had granted meanwhile is rendered.
+        link.check_frame(&stage, 1, 20.0).await;
+        link.out.send(ToWorker::Goodbye { reason: "all done".into(), again: true }).await.unwrap();
         assert_eq!(worker.wait().await.unwrap().code(), Some(0));
     }
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_second_signal_ends_it_at_once_with_a_goodbye() {
+    let (listener, address) = listen().await;
+    let stage = Stage::new();
+    let mut worker = start(&address, &[]);
+    let mut link = Link::accept(&listener).await;
+    link.check_frame(&stage, 0, 0.0).await;
+    signal(&worker, "-TERM").await;
+    assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
+    signal(&worker, "-INT").await;
+    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Goodbye { .. })));
+    assert_eq!(worker.wait().await.unwrap().code(), Some(0));
 }

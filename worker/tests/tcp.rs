@@ -3,10 +3,9 @@
 
 mod common;
 
-use rayfarm_protocol::{PROTOCOL_VERSION, ToMaster, ToWorker, handshake};
-use rayfarm_worker::{WorkerError, WorkerOptions, run};
+use rayfarm_protocol::{Encoding, PROTOCOL_VERSION, ToMaster, ToWorker, handshake};
+use rayfarm_worker::{Ending, WorkerError, WorkerOptions, run};
 use tokio::io::AsyncWriteExt;
-use tokio_util::sync::CancellationToken;
 
 use common::{Link, Stage, listen};
 
@@ -17,6 +16,8 @@ fn options(master: &str) -> WorkerOptions {
         name: "attic".to_owned(),
         reconnect: false,
         asset_cache_bytes: 1 << 20,
+        encoding: None,
+        disk_cache: None,
     }
 }
 
@@ -24,7 +25,7 @@ fn options(master: &str) -> WorkerOptions {
 async fn a_worker_renders_the_same_pixels_as_this_process() {
     let (listener, address) = listen().await;
     let stage = Stage::new();
-    let worker = tokio::spawn(run(options(&address), CancellationToken::new()));
+    let worker = tokio::spawn(run(options(&address), Ending::new()));
     let mut link = Link::accept(&listener).await;
     assert_eq!((link.hello.name.as_str(), link.hello.threads), ("attic", 2));
     assert_eq!(link.hello.simd, rayfarm_tracer::simd_level());
@@ -37,18 +38,33 @@ async fn a_worker_renders_the_same_pixels_as_this_process() {
 }
 
 #[tokio::test]
+async fn pixels_come_packed_where_that_is_asked_for_and_raw_within_a_machine() {
+    let stage = Stage::new();
+    for (encoding, packed) in [(None, 0), (Some(Encoding::Raw), 0), (Some(Encoding::Lz4), 5)] {
+        let (listener, address) = listen().await;
+        let options = WorkerOptions { encoding, ..options(&address) };
+        let worker = tokio::spawn(run(options, Ending::new()));
+        let mut link = Link::accept(&listener).await;
+        link.check_frame(&stage, 0, 3.0).await;
+        assert_eq!(link.packed, packed, "{encoding:?}");
+        link.out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
+        worker.await.unwrap().unwrap();
+    }
+}
+
+#[tokio::test]
 async fn a_worker_comes_back_and_has_kept_its_scene() {
     let (listener, address) = listen().await;
     let stage = Stage::new();
-    let stop = CancellationToken::new();
-    let worker = tokio::spawn(run(WorkerOptions { reconnect: true, ..options(&address) }, stop.clone()));
+    let ending = Ending::new();
+    let worker = tokio::spawn(run(WorkerOptions { reconnect: true, ..options(&address) }, ending.clone()));
     let mut link = Link::accept(&listener).await;
     link.check_frame(&stage, 0, 0.0).await;
     link.out.abort();
     let mut link = Link::accept(&listener).await;
     link.check_frame(&stage, 0, 5.0).await;
     assert_eq!(link.asked, 0);
-    stop.cancel();
+    ending.stop();
     assert!(matches!(link.hear(&stage).await, Some(ToMaster::Goodbye { .. })));
     worker.await.unwrap().unwrap();
 }
@@ -56,12 +72,12 @@ async fn a_worker_comes_back_and_has_kept_its_scene() {
 #[tokio::test]
 async fn without_reconnect_a_lost_master_is_an_error() {
     let (listener, address) = listen().await;
-    let worker = tokio::spawn(run(options(&address), CancellationToken::new()));
+    let worker = tokio::spawn(run(options(&address), Ending::new()));
     drop(Link::accept(&listener).await);
     let error = worker.await.unwrap().unwrap_err();
     assert!(matches!(error, WorkerError::Lost { .. }), "{error}");
     drop(listener);
-    let error = run(options(&address), CancellationToken::new()).await.unwrap_err();
+    let error = run(options(&address), Ending::new()).await.unwrap_err();
     assert!(matches!(error, WorkerError::Connect { .. }) && error.to_string().contains(&address), "{error}");
 }
 
@@ -70,7 +86,7 @@ async fn a_refusal_another_version_and_another_program_end_it_though_it_may_reco
     let persistent = |address: &str| WorkerOptions { reconnect: true, ..options(address) };
 
     let (listener, address) = listen().await;
-    let worker = tokio::spawn(run(persistent(&address), CancellationToken::new()));
+    let worker = tokio::spawn(run(persistent(&address), Ending::new()));
     let mut stream = listener.accept().await.unwrap().0;
     handshake::as_master(&mut stream, |_| Err("full house".into())).await.unwrap_err();
     let text = worker.await.unwrap().unwrap_err().to_string();
@@ -82,7 +98,7 @@ async fn a_refusal_another_version_and_another_program_end_it_though_it_may_reco
         (b"HTTP/1.1 400 Bad Request\r\n", "which is HTTP"),
     ] {
         let (listener, address) = listen().await;
-        let worker = tokio::spawn(run(persistent(&address), CancellationToken::new()));
+        let worker = tokio::spawn(run(persistent(&address), Ending::new()));
         let mut stream = listener.accept().await.unwrap().0;
         stream.write_all(greeting).await.unwrap();
         let text = worker.await.unwrap().unwrap_err().to_string();
@@ -94,9 +110,9 @@ async fn a_refusal_another_version_and_another_program_end_it_though_it_may_reco
 async fn stopping_while_waiting_to_reconnect_is_no_error() {
     let (listener, address) = listen().await;
     drop(listener);
-    let stop = CancellationToken::new();
-    let worker = tokio::spawn(run(WorkerOptions { reconnect: true, ..options(&address) }, stop.clone()));
+    let ending = Ending::new();
+    let worker = tokio::spawn(run(WorkerOptions { reconnect: true, ..options(&address) }, ending.clone()));
     tokio::task::yield_now().await;
-    stop.cancel();
+    ending.stop();
     worker.await.unwrap().unwrap();
 }

@@ -121,11 +121,7 @@ impl Frame {
         segment.done = true;
         segment.holders.clear();
         self.rows_done += segment.count;
-        let sum = &mut self.cost;
-        sum.trace_ns = sum.trace_ns.saturating_add(cost.trace_ns);
-        sum.primary = sum.primary.saturating_add(cost.primary);
-        sum.shadow = sum.shadow.saturating_add(cost.shadow);
-        sum.secondary = sum.secondary.saturating_add(cost.secondary);
+        self.cost += cost;
         true
     }
 

@@ -18,7 +18,8 @@ pub(crate) fn lease(segment: u32) -> Lease {
 }
 
 pub(crate) fn pixels(segment: u32, len: usize) -> ToMaster {
-    let cost = Cost { trace_ns: 5, primary: 6, shadow: 7, secondary: 8 };
+    let times = Cost { trace_ns: 5, wait_ns: 9, encode_ns: 10, span_ns: 11, ..Cost::default() };
+    let cost = Cost { primary: 6, shadow: 7, secondary: 8, ..times };
     let header = PixelsHeader { lease: lease(segment), encoding: Encoding::Raw, cost };
     ToMaster::Pixels { header, bytes: Bytes::from(vec![segment as u8; len]) }
 }

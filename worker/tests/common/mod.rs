@@ -7,9 +7,10 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use glam::{DVec3, Vec2, Vec3};
+use rayfarm_protocol::pixels::unpack;
 use rayfarm_protocol::session::{self, Receiver, Sender};
 use rayfarm_protocol::{
-    AssetId, FrameAnnounce, FrameId, Hello, Lease, ToMaster, ToWorker, Welcome, codec, handshake,
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, Lease, ToMaster, ToWorker, Welcome, codec, handshake,
 };
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
@@ -135,6 +136,8 @@ pub(crate) struct Link {
     pub(crate) inbox: Receiver<ToMaster>,
     /// Assets that were asked for.
     pub(crate) asked: usize,
+    /// Segments that came in fewer bytes than they have pixels.
+    pub(crate) packed: usize,
 }
 
 impl Link {
@@ -142,7 +145,7 @@ impl Link {
         let mut stream: TcpStream = listener.accept().await.unwrap().0;
         let hello = handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
         let (out, inbox, _) = session::spawn(stream);
-        Self { hello, out, inbox, asked: 0 }
+        Self { hello, out, inbox, asked: 0, packed: 0 }
     }
 
     /// The next message that is no wish for an asset; those of the stage are sent.
@@ -171,8 +174,19 @@ impl Link {
         for _ in &segments {
             match self.hear(stage).await {
                 Some(ToMaster::Pixels { header, bytes }) => {
-                    assert_eq!(bytes, stage.expected(spin, header.lease.rows().unwrap()));
-                    assert!(header.cost.primary > 0);
+                    let expected = stage.expected(spin, header.lease.rows().unwrap());
+                    match header.encoding {
+                        Encoding::Raw => assert_eq!(bytes, expected),
+                        Encoding::Lz4 => {
+                            let mut rows = vec![0; expected.len()];
+                            unpack(&bytes, &mut rows).unwrap();
+                            assert!(rows == expected && bytes.len() < rows.len());
+                            self.packed += 1;
+                        }
+                    }
+                    let cost = header.cost;
+                    assert!(cost.primary > 0 && cost.span_ns > 0 && cost.trace_ns > 0);
+                    assert_eq!(cost.encode_ns > 0, self.packed > 0, "what is not encoded takes no time");
                 }
                 other => panic!("pixels were expected, not {other:?}"),
             }
