@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The walls between the rooms, checked by a machine:
 # - tracer and protocol know neither each other nor master nor worker; the tracer no sockets, the protocol no pixels;
-# - the scheduler knows neither clock, socket, async runtime, window nor image.
+# - the scheduler knows neither clock, socket, async runtime, window nor image; nor does the accounting.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -25,6 +25,8 @@ forbid worker/src 'rayfarm_master|minifb::' \
     'worker: knows tracer and protocol only'
 forbid master/src/scheduler '\btokio\b|Instant::now|SystemTime|std::net|minifb|rayfarm_tracer|std::thread' \
     'scheduler: pure; time is passed in, pixels bypass it'
+forbid master/src/accounting '\btokio\b|Instant::now|SystemTime|std::net|minifb|rayfarm_tracer' \
+    'accounting: time is passed in; it is told what happens, and asks nobody'
 
 [ "$failed" = 0 ] && echo "the walls stand"
 exit "$failed"

@@ -12,6 +12,7 @@ use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
+use crate::control::Place;
 use crate::farm::{FarmOptions, SegmentPolicy};
 use values::{Size, degrees, frame_count, listen_address, sample_count, size, thread_count, worker_count};
 
@@ -26,7 +27,7 @@ pub(crate) enum Invocation {
     /// Be a render node of a master on this machine; the arguments are the worker's, the first in place of its name.
     LocalWorker(Vec<OsString>),
     /// Do one of the commands.
-    Command(Command, LogArgs),
+    Command(Box<Command>, LogArgs),
 }
 
 impl Invocation {
@@ -42,7 +43,7 @@ impl Invocation {
         let matches = Cli::command().try_get_matches_from(args)?;
         refuse_options_before_the_command(&matches)?;
         let cli = Cli::from_arg_matches(&matches)?;
-        Ok(Self::Command(cli.command.unwrap_or(Command::View(cli.view)), cli.log))
+        Ok(Self::Command(Box::new(cli.command.unwrap_or(Command::View(cli.view))), cli.log))
     }
 }
 
@@ -104,6 +105,8 @@ pub(crate) struct ViewArgs {
     /// Write a CSV line per frame.
     #[arg(long, value_name = "FILE")]
     pub(crate) fps_log: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) oversight: OversightArgs,
 }
 
 /// `render`.
@@ -130,6 +133,8 @@ pub(crate) struct RenderArgs {
     /// Print one line of JSON about the run on standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) oversight: OversightArgs,
 }
 
 /// `compile`.
@@ -210,6 +215,18 @@ impl FarmArgs {
             policy: self.segment,
         }
     }
+}
+
+/// What watches and steers a run.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct OversightArgs {
+    /// Write what every worker did when, for ui.perfetto.dev or chrome://tracing.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trace: Option<PathBuf>,
+    /// Take commands, one a line: from standard input (-), a port of this machine (127.0.0.1:PORT) or a Unix
+    /// socket (a path with a slash in it). The command help lists them.
+    #[arg(long, value_name = "PLACE", value_parser = Place::parse, allow_hyphen_values = true)]
+    pub(crate) control: Option<Place>,
 }
 
 /// What the picture is like; each wins over the scene file.

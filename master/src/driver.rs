@@ -4,26 +4,30 @@
 //! anything: messages to workers go into bounded queues, and a worker whose queue is full is let go.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
-use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, PixelsHeader, ToWorker, codec};
+use rayfarm_protocol::{FrameAnnounce, FrameId, Hello, Lease, PixelsHeader, ToWorker, codec};
 use rayfarm_tracer::TILE_SIZE;
 use rayfarm_tracer::scene::FrameView;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 
+use crate::accounting::{Accounts, TraceSink};
 use crate::assets::Assets;
 use crate::farm::{FarmError, FarmStatus, FinishedFrame, WorkerStatus};
 use crate::framebuffer::{Framebuffers, Misfit, Written};
 use crate::lease_book::Standing;
-use crate::roster::{ByteCount, Return, Roster, Session, Unreachable};
-use crate::scheduler::{Action, Cost, Event, Scheduler, SegmentPolicy, WorkerId};
+use crate::roster::{ByteCount, Roster, Session, Unreachable};
+use crate::scheduler::{Action, Cost, Event, Return, Scheduler, SegmentPolicy, WorkerId};
 
 /// Finished frames that wait to be fetched. Beyond that, the oldest is thrown away.
 const MAX_UNFETCHED: usize = 8;
+/// Workers that are let in.
+const MAX_WORKERS: usize = 1024;
 
 /// The farm's state and its clock.
 pub(crate) struct Driver {
@@ -39,15 +43,25 @@ pub(crate) struct Driver {
 
 struct Inner {
     scheduler: Scheduler,
+    accounts: Accounts,
+    trace: Option<TraceSink>,
     roster: Roster,
     /// What the frames that wait or are in flight show.
-    views: BTreeMap<FrameId, (FrameView, FrameAnnounce)>,
+    views: BTreeMap<FrameId, Requested>,
     unfetched: VecDeque<Result<FinishedFrame, FarmError>>,
     last_frame: u64,
     last_worker: u64,
     /// All traffic up to the frame before.
     counted: ByteCount,
     armed_for: Option<Duration>,
+}
+
+/// A frame that was asked for.
+struct Requested {
+    view: FrameView,
+    announce: FrameAnnounce,
+    /// On the driver's clock.
+    at: Duration,
 }
 
 /// Why an answer ends its session.
@@ -65,6 +79,8 @@ impl Driver {
     pub(crate) fn new(policy: SegmentPolicy, assets: Assets) -> Self {
         let inner = Inner {
             scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64, TILE_SIZE),
+            accounts: Accounts::default(),
+            trace: None,
             roster: Roster::default(),
             views: BTreeMap::new(),
             unfetched: VecDeque::new(),
@@ -123,8 +139,8 @@ impl Driver {
         let frame = FrameId(inner.last_frame);
         match self.announcement(frame, &view) {
             Ok(announce) => {
-                inner.views.insert(frame, (view, announce));
                 let FrameView { width, height, .. } = view;
+                inner.views.insert(frame, Requested { view, announce, at: self.started.elapsed() });
                 self.drive(&mut inner, Event::FrameRequested { frame, width, height });
             }
             Err(error) => self.hand_out(&mut inner, Err(error)),
@@ -174,10 +190,64 @@ impl Driver {
 
     /// A session has begun.
     pub(crate) fn join(&self, worker: WorkerId, session: Session) {
-        let threads = session.hello.threads;
+        let Hello { name, threads, .. } = session.hello.clone();
         let mut inner = self.lock();
         inner.roster.add(worker, session);
         self.drive(&mut inner, Event::WorkerJoined { worker, threads });
+        inner.accounts.name(worker, &name);
+    }
+
+    /// A worker asks for an asset.
+    pub(crate) fn asset_wanted(&self, worker: WorkerId) {
+        self.lock().accounts.asset_wanted(self.started.elapsed(), worker);
+    }
+
+    /// Tells a timeline of everything from now on.
+    pub(crate) fn trace_into(&self, sink: TraceSink) {
+        let mut inner = self.lock();
+        inner.accounts.keep_marks();
+        inner.trace = Some(sink);
+    }
+
+    /// Brings what a user wants of a connected worker; `false` if it is not connected.
+    pub(crate) fn command(&self, worker: WorkerId, event: Event) -> bool {
+        let mut inner = self.lock();
+        let known = inner.roster.get(worker).is_some();
+        if known {
+            self.drive(&mut inner, event);
+        }
+        known
+    }
+
+    /// Sends a worker away at once and keeps it out; `false` if it is not connected.
+    pub(crate) fn kick(&self, worker: WorkerId, reason: &str) -> bool {
+        let mut inner = self.lock();
+        let known = inner.roster.get(worker).is_some();
+        if known {
+            inner.roster.log_dismissal(worker, reason);
+            inner.roster.bar(worker);
+            inner.roster.end(worker, reason, Return::Unwanted);
+            self.drive(&mut inner, Event::WorkerLeft { worker });
+        }
+        known
+    }
+
+    /// Lets kicked workers of this name in again. Returns how many were kept out.
+    pub(crate) fn allow(&self, name: &str) -> usize {
+        self.lock().roster.allow(name)
+    }
+
+    /// Why a worker that shakes hands is not let in, if it is not.
+    pub(crate) fn refusal(&self, hello: &Hello, address: IpAddr) -> Option<String> {
+        let inner = self.lock();
+        let count = inner.roster.len();
+        if inner.roster.is_barred(&hello.name, address) {
+            return Some(format!(
+                "a worker called {} was kicked from this master; it is kept out until the master allows it or ends",
+                hello.name
+            ));
+        }
+        (count >= MAX_WORKERS).then(|| format!("this master has {count} workers already, the most it takes"))
     }
 
     /// A session has ended; its worker is told why, where it still listens.
@@ -203,8 +273,9 @@ impl Driver {
         match standing {
             Standing::Granted => match self.framebuffers.write(lease, encoding, bytes)? {
                 Written::Kept { decode } => {
-                    tracing::trace!("{worker} has done {lease}: {cost:?}, {decode:?} to decode");
-                    self.handle(Event::SegmentDone { worker, lease, cost });
+                    let mut inner = self.lock();
+                    inner.accounts.taken_in(worker, bytes.len(), decode);
+                    self.drive(&mut inner, Event::SegmentDone { worker, lease, cost });
                 }
                 Written::Superseded => {}
             },
@@ -237,12 +308,14 @@ impl Driver {
                 threads: session.hello.threads,
                 segments_done: record.segments_done,
                 speed: record.speed,
+                state: record.state,
                 trouble: session.trouble.clone(),
             })
         });
         let progress = inner.scheduler.progress();
         FarmStatus {
             workers: workers.collect(),
+            kicked: inner.roster.barred(),
             frame: progress.map(|progress| progress.frame),
             rows_done: progress.map_or(0, |progress| progress.rows_done),
             rows: progress.map_or(0, |progress| progress.rows),
@@ -254,7 +327,7 @@ impl Driver {
         let farewells: Vec<_> = {
             let mut inner = self.lock();
             let farewells = inner.roster.ids().into_iter().map(|worker| {
-                let farewell = inner.roster.end(worker, reason, Return::Useless);
+                let farewell = inner.roster.end(worker, reason, Return::Unwanted);
                 self.drive(&mut inner, Event::WorkerLeft { worker });
                 farewell
             });
@@ -270,10 +343,16 @@ impl Driver {
     fn drive(&self, inner: &mut Inner, event: Event) {
         let mut events = VecDeque::from([event]);
         while let Some(event) = events.pop_front() {
-            inner.scheduler.handle(self.started.elapsed(), event);
+            let now = self.started.elapsed();
+            inner.accounts.event(now, &event);
+            inner.scheduler.handle(now, event);
             while let Some(action) = inner.scheduler.poll_action() {
+                inner.accounts.action(now, &action);
                 events.extend(self.perform(inner, action));
             }
+        }
+        if let Some(trace) = &inner.trace {
+            std::iter::from_fn(|| inner.accounts.poll_mark()).for_each(|mark| trace.tell(mark));
         }
         let wanted = inner.scheduler.poll_timeout();
         if wanted.is_some_and(|wanted| inner.armed_for.is_none_or(|armed| wanted < armed)) {
@@ -286,7 +365,7 @@ impl Driver {
     fn perform(&self, inner: &mut Inner, action: Action) -> Option<Event> {
         match action {
             Action::BeginFrame { frame } => {
-                if let Some((view, _)) = inner.views.get(&frame) {
+                if let Some(Requested { view, .. }) = inner.views.get(&frame) {
                     self.framebuffers.open(frame, view.width, view.height);
                 }
             }
@@ -296,7 +375,7 @@ impl Driver {
                 self.framebuffers.discard(frame);
             }
             Action::Announce { worker, frame } => {
-                let announce = inner.views.get(&frame).map(|(_, announce)| announce.clone())?;
+                let announce = inner.views.get(&frame).map(|requested| requested.announce.clone())?;
                 return send(inner, worker, ToWorker::Frame(announce));
             }
             Action::Grant { worker, lease } => {
@@ -308,9 +387,10 @@ impl Driver {
                 return send(inner, worker, ToWorker::Cancel { before });
             }
             Action::Ping { worker, nonce } => return send(inner, worker, ToWorker::Ping { nonce }),
-            Action::Dismiss { worker, reason } => {
+            Action::Drain { worker } => return send(inner, worker, ToWorker::Drain),
+            Action::Dismiss { worker, reason, again } => {
                 inner.roster.log_dismissal(worker, &reason);
-                inner.roster.end(worker, &reason, Return::Welcome);
+                inner.roster.end(worker, &reason, again);
             }
         }
         None
@@ -318,7 +398,7 @@ impl Driver {
 
     fn frame_done(&self, inner: &mut Inner, frame: FrameId, cost: Cost, elapsed: Duration) {
         let picture = inner.views.remove(&frame).zip(self.framebuffers.finish(frame));
-        let Some(((view, _), pixels)) = picture else {
+        let Some((Requested { view, at, .. }, pixels)) = picture else {
             debug_assert!(false, "frame {frame} was done without all of its pixels");
             return;
         };
@@ -330,11 +410,13 @@ impl Driver {
             pixels,
             counts: cost,
             elapsed,
+            latency: self.started.elapsed().saturating_sub(at),
             workers: u32::try_from(inner.roster.len()).unwrap_or(u32::MAX),
             threads: inner.roster.threads(),
             sent_bytes: bytes.sent,
             received_bytes: bytes.received,
             scene_bytes: bytes.scene,
+            account: inner.accounts.take_done(),
         };
         self.hand_out(inner, Ok(finished));
     }

@@ -40,6 +40,8 @@ pub(crate) struct Outcome {
     pub(crate) goodbye: Option<String>,
     /// Leases granted.
     pub(crate) leases: usize,
+    /// Whether it was told that no more would come.
+    pub(crate) drained: bool,
 }
 
 /// The pixels of rows: a function of the view, x and y, like any picture.
@@ -71,7 +73,7 @@ async fn live(stream: TcpStream, mut script: Script) -> Outcome {
         return babble(stream).await;
     }
     let (sender, mut receiver, _) = session::spawn::<_, ToMaster, ToWorker>(stream);
-    let mut outcome = Outcome { goodbye: None, leases: 0 };
+    let mut outcome = Outcome { goodbye: None, leases: 0, drained: false };
     let mut views: Vec<(FrameId, FrameView)> = Vec::new();
     while let Some(Ok(message)) = receiver.recv().await {
         match message {
@@ -89,7 +91,8 @@ async fn live(stream: TcpStream, mut script: Script) -> Outcome {
             }
             ToWorker::Ping { nonce } => sender.send(ToMaster::Pong { nonce }).await.unwrap(),
             ToWorker::Goodbye { reason, .. } => outcome.goodbye = Some(reason),
-            ToWorker::Cancel { .. } | ToWorker::Drain => {}
+            ToWorker::Drain => outcome.drained = true,
+            ToWorker::Cancel { .. } => {}
             ToWorker::AssetBegin { .. } | ToWorker::AssetChunk { .. } | ToWorker::AssetUnknown { .. } => {
                 unreachable!("a fake worker asks for no assets")
             }
@@ -145,5 +148,5 @@ async fn babble(stream: TcpStream) -> Outcome {
     let mut heard = Vec::new();
     // Whether the end comes as EOF or as a reset is the operating system's business.
     let _ = read.read_to_end(&mut heard).await;
-    Outcome { goodbye: None, leases: 0 }
+    Outcome { goodbye: None, leases: 0, drained: false }
 }

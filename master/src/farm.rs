@@ -26,13 +26,17 @@ use tokio::net::TcpListener;
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tokio_util::task::TaskTracker;
 
+use crate::accounting::TraceSink;
 use crate::assets::Assets;
 use crate::driver::Driver;
 use crate::local_workers::LocalWorkers;
 use crate::server;
 
+pub use crate::accounting::{FrameAccount, Parts, SegmentNote, WorkerAccount};
 pub use crate::assets::AssetError;
+pub use crate::farm_control::FarmControl;
 pub use crate::framebuffer::FramePixels;
+pub use crate::scheduler::WorkerState;
 pub use crate::scheduler::policy::SegmentPolicy;
 pub use rayfarm_protocol::{Cost as FrameCounts, FrameId};
 
@@ -88,6 +92,8 @@ pub struct FinishedFrame {
     pub counts: FrameCounts,
     /// From the moment the frame began to its last row.
     pub elapsed: Duration,
+    /// From the request to the last row: how old the camera is that the picture shows.
+    pub latency: Duration,
     /// Workers connected when it completed.
     pub workers: u32,
     /// Render threads of these workers together.
@@ -98,6 +104,8 @@ pub struct FinishedFrame {
     pub received_bytes: u64,
     /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
     pub scene_bytes: u64,
+    /// What the workers did with their time since the frame before, and who rendered what.
+    pub account: FrameAccount,
 }
 
 /// A look at the farm, for overlays and progress bars.
@@ -105,6 +113,8 @@ pub struct FinishedFrame {
 pub struct FarmStatus {
     /// The workers connected now, in the order in which they came.
     pub workers: Vec<WorkerStatus>,
+    /// The names of workers that were kicked and are kept out.
+    pub kicked: Vec<String>,
     /// The oldest frame being rendered.
     pub frame: Option<FrameId>,
     /// Its finished rows.
@@ -128,9 +138,16 @@ pub struct WorkerStatus {
     pub segments_done: u64,
     /// Rows of average cost per second, smoothed; 0 before that is known.
     pub speed: f64,
+    /// Whether it is given work, and why not.
+    pub state: WorkerState,
     /// Why it could not render a frame, the last time it could not.
     pub trouble: Option<String>,
 }
+
+/// A command names a worker that is not connected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no worker {0} is connected; the status lists those that are")]
+pub struct UnknownWorker(pub u64);
 
 /// Why a farm cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -250,6 +267,16 @@ impl Farm {
     /// What is going on right now.
     pub fn status(&self) -> FarmStatus {
         self.driver.status()
+    }
+
+    /// Another handle, for whoever steers the farm beside the one who asks for frames. Call it inside the runtime.
+    pub fn control(&self) -> FarmControl {
+        FarmControl::new(self.driver.clone())
+    }
+
+    /// Tells a timeline of everything from now on.
+    pub(crate) fn trace_into(&self, sink: TraceSink) {
+        self.driver.trace_into(sink);
     }
 
     /// Says goodbye to all workers and waits, not for long, until the local ones have ended; kills what has not.

@@ -4,14 +4,17 @@
 //! reports) asks for frames and shows them; everything below it (scheduler, sessions, framebuffers, local worker
 //! processes) sees to it that each one completes.
 
+mod accounting;
 mod assets;
 mod camera_control;
 mod cli;
 mod commands;
+mod control;
 mod display;
 mod driver;
 mod error;
 pub mod farm;
+mod farm_control;
 mod framebuffer;
 mod lease_book;
 mod local_workers;
@@ -49,7 +52,7 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     logging::start(log);
-    match commands::run(command) {
+    match commands::run(*command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");

@@ -116,7 +116,13 @@ impl Nursery {
                             end(&mut child, self.number).await;
                             return None;
                         }
-                        status = child.wait() => told(status),
+                        status = child.wait() => {
+                            if status.as_ref().is_ok_and(ExitStatus::success) {
+                                // It failed at nothing: it was drained, kicked, or stopped by hand.
+                                return Some(format!("local worker {} has left in order", self.number));
+                            }
+                            told(status)
+                        }
                     }
                 }
                 Err(error) => format!("cannot be started from {}: {error}", self.program.display()),

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::accounting::{AccountReport, PART_COUNT, PART_NAMES};
 use crate::error::CommandError;
 use crate::farm::FinishedFrame;
 
@@ -31,10 +32,14 @@ pub(crate) struct RenderReport {
     pub(crate) rays_per_frame: RaysPerFrame,
     /// Over the frames.
     pub(crate) ms_per_frame: MsPerFrame,
+    /// Over the frames: from the request of a frame to its last row.
+    pub(crate) latency_ms: MsPerFrame,
     /// The mean over the frames, all workers together.
     pub(crate) bytes_per_frame: BytesPerFrame,
     /// Bytes of scene and frame descriptions sent in the whole run, all workers together.
     pub(crate) scene_bytes: u64,
+    /// What became of the workers' time, from the first frame's beginning to the last one's end.
+    pub(crate) accounting: AccountReport,
     /// Of the last frame's pixels: RGB8 rows, top to bottom.
     pub(crate) blake3: String,
 }
@@ -186,6 +191,10 @@ pub(crate) struct FrameLine {
     pub(crate) rays: RaysPerFrame,
     /// Bytes on the wire for the frame.
     pub(crate) bytes: BytesPerFrame,
+    /// What became of all workers' time since the frame before, in per cent.
+    pub(crate) percent: [f64; PART_COUNT],
+    /// From the frame's request to its last row.
+    pub(crate) latency: Duration,
 }
 
 impl FrameLine {
@@ -205,6 +214,8 @@ impl FrameLine {
                 secondary: counts.secondary,
             },
             bytes: BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes },
+            percent: frame.account.sum().percent(),
+            latency: frame.latency,
         }
     }
 }
@@ -216,7 +227,7 @@ pub(crate) struct FpsLog<W: Write> {
     name: String,
 }
 
-/// What the columns are.
+/// What the columns are; those of [`PART_NAMES`] follow, in per cent of thread time, and milliseconds of latency.
 const CSV_HEADER: &str =
     "frame,seconds,ms,fps,workers,threads,primary_rays,shadow_rays,secondary_rays,sent_bytes,received_bytes";
 
@@ -236,7 +247,8 @@ impl FpsLog<BufWriter<File>> {
 impl<W: Write> FpsLog<W> {
     fn new(out: W, name: String) -> Result<Self, CommandError> {
         let mut log = Self { out, name };
-        log.write_line(CSV_HEADER)?;
+        let parts: String = PART_NAMES.iter().map(|part| format!(",{part}_percent")).collect();
+        log.write_line(&format!("{CSV_HEADER}{parts},latency_ms"))?;
         Ok(log)
     }
 
@@ -245,9 +257,10 @@ impl<W: Write> FpsLog<W> {
     /// # Errors
     /// A full disk, for one.
     pub(crate) fn add(&mut self, line: &FrameLine) -> Result<(), CommandError> {
-        let FrameLine { frame, at, elapsed, fps, workers, threads, rays, bytes } = line;
+        let FrameLine { frame, at, elapsed, fps, workers, threads, rays, bytes, percent, latency } = line;
+        let parts: String = percent.iter().map(|part| format!(",{part:.3}")).collect();
         self.write_line(&format!(
-            "{frame},{:.6},{:.3},{fps:.3},{workers},{threads},{},{},{},{},{}",
+            "{frame},{:.6},{:.3},{fps:.3},{workers},{threads},{},{},{},{},{}{parts},{:.3}",
             at.as_secs_f64(),
             elapsed.as_secs_f64() * 1e3,
             rays.primary,
@@ -255,6 +268,7 @@ impl<W: Write> FpsLog<W> {
             rays.secondary,
             bytes.sent,
             bytes.received,
+            latency.as_secs_f64() * 1e3,
         ))
     }
 
@@ -309,8 +323,10 @@ mod tests {
             triangles: 12,
             rays_per_frame: RaysPerFrame { primary: 12_288, shadow: 7, secondary: 0 },
             ms_per_frame: MsPerFrame { min: 1.5, median: 2.0, p95: 2.45, max: 2.5 },
+            latency_ms: MsPerFrame::default(),
             bytes_per_frame: BytesPerFrame { sent: 100, received: 9_216 },
             scene_bytes: 4_096,
+            accounting: AccountReport::default(),
             blake3: "00ff".to_owned(),
         };
         assert_eq!(
@@ -319,7 +335,10 @@ mod tests {
                 r#"{"frames":2,"width":64,"height":48,"samples":4,"workers":1,"threads":2,"triangles":12,"#,
                 r#""rays_per_frame":{"primary":12288,"shadow":7,"secondary":0},"#,
                 r#""ms_per_frame":{"min":1.5,"median":2.0,"p95":2.45,"max":2.5},"#,
-                r#""bytes_per_frame":{"sent":100,"received":9216},"scene_bytes":4096,"blake3":"00ff"}"#,
+                r#""latency_ms":{"min":0.0,"median":0.0,"p95":0.0,"max":0.0},"#,
+                r#""bytes_per_frame":{"sent":100,"received":9216},"scene_bytes":4096,"#,
+                r#""accounting":{"percent":{"trace":0.0,"wait":0.0,"encode":0.0,"send":0.0,"decode":0.0,"#,
+                r#""idle_tail":0.0,"scene":0.0},"workers":[]},"blake3":"00ff"}"#,
             )
         );
     }
@@ -333,7 +352,13 @@ mod tests {
         let text = String::from_utf8(log.out).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 2);
-        assert_eq!(lines[1], "3,0.000000,12.345,80.000,0,0,0,0,0,0,0");
+        assert_eq!(
+            lines[1],
+            "3,0.000000,12.345,80.000,0,0,0,0,0,0,0,0.000,0.000,0.000,0.000,0.000,0.000,0.000,0.000"
+        );
+        let last = "received_bytes,trace_percent,wait_percent,encode_percent,send_percent,decode_percent,\
+                    idle_tail_percent,scene_percent,latency_ms";
+        assert!(lines[0].ends_with(last));
         assert_eq!(lines[0].split(',').count(), lines[1].split(',').count());
     }
 }

@@ -1,7 +1,7 @@
 //! Who is connected: their senders, what they were granted, and the bytes that went to and fro.
 
-use std::collections::BTreeMap;
-use std::net::SocketAddr;
+use std::collections::{BTreeMap, VecDeque};
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,10 +10,12 @@ use rayfarm_protocol::{Hello, ToWorker};
 use tokio::task::JoinHandle;
 
 use crate::lease_book::LeaseBook;
-use crate::scheduler::WorkerId;
+use crate::scheduler::{Return, WorkerId};
 
 /// How long a worker's last messages may take.
 const FAREWELL: Duration = Duration::from_secs(1);
+/// Kicked workers that are kept out; beyond that, the one kicked longest ago is forgotten.
+const MAX_KICKED: usize = 1024;
 
 /// The sessions that are wanted.
 #[derive(Default)]
@@ -21,6 +23,8 @@ pub(crate) struct Roster {
     sessions: BTreeMap<WorkerId, Session>,
     /// Traffic of sessions that have ended.
     ended: ByteCount,
+    /// Who was kicked, by name and address: whoever shakes hands as such is refused.
+    kicked: VecDeque<(String, IpAddr)>,
 }
 
 /// A connected worker.
@@ -46,15 +50,6 @@ pub(crate) struct ByteCount {
 /// A worker lets its queue fill up, or its session has ended without anybody knowing yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Unreachable;
-
-/// Whether a worker that is sent away may come back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Return {
-    /// It is this session that has failed: a worker that was suspended is welcome when it wakes.
-    Welcome,
-    /// The farm itself ends.
-    Useless,
-}
 
 impl Session {
     /// A session that has shaken hands.
@@ -125,6 +120,35 @@ impl Roster {
             let _ = tokio::time::timeout(FAREWELL, last_words).await;
             sender.abort();
         }))
+    }
+
+    /// Keeps a connected worker's name and address out from now on. Its session goes on until it is ended.
+    pub(crate) fn bar(&mut self, worker: WorkerId) {
+        let Some(Session { hello, address, .. }) = self.sessions.get(&worker) else { return };
+        let kicked = (hello.name.clone(), address.ip());
+        if !self.kicked.contains(&kicked) {
+            self.kicked.push_back(kicked);
+        }
+        while self.kicked.len() > MAX_KICKED {
+            self.kicked.pop_front();
+        }
+    }
+
+    /// Whether a worker of this name from this address was kicked.
+    pub(crate) fn is_barred(&self, name: &str, address: IpAddr) -> bool {
+        self.kicked.iter().any(|(kicked, from)| kicked == name && *from == address)
+    }
+
+    /// Lets workers of this name in again. Returns how many were kept out.
+    pub(crate) fn allow(&mut self, name: &str) -> usize {
+        let before = self.kicked.len();
+        self.kicked.retain(|(kicked, _)| kicked != name);
+        before - self.kicked.len()
+    }
+
+    /// The names of those who are kept out, in the order in which they were kicked.
+    pub(crate) fn barred(&self) -> Vec<String> {
+        self.kicked.iter().map(|(name, _)| name.clone()).collect()
     }
 
     /// All bytes up to now.

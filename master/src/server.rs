@@ -17,8 +17,6 @@ use crate::driver::{AnswerError, Driver};
 use crate::roster::Session;
 use crate::scheduler::{Event, WorkerId};
 
-/// Workers that are let in.
-const MAX_WORKERS: usize = 1024;
 /// Connections that have not shaken hands yet; more wait in the operating system's queue.
 const MAX_HANDSHAKES: usize = 64;
 /// Assets that a worker has asked for and not been sent yet.
@@ -92,11 +90,9 @@ async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> O
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
     let mut number = None;
-    let decide = |_: &Hello| match driver.worker_count() {
-        count if count >= MAX_WORKERS => {
-            Err(format!("this master has {count} workers already, the most it takes"))
-        }
-        _ => Ok(Welcome { worker: number.insert(driver.next_worker()).0 }),
+    let decide = |hello: &Hello| match driver.refusal(hello, address.ip()) {
+        Some(reason) => Err(reason),
+        None => Ok(Welcome { worker: number.insert(driver.next_worker()).0 }),
     };
     match handshake::as_master(&mut stream, decide).await {
         Ok(hello) => number.map(|worker| Newcomer { worker, hello, stream }),
@@ -144,7 +140,10 @@ async fn listen(
     while let Some(message) = receiver.recv().await {
         match message? {
             ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
-            ToMaster::NeedAsset { id } => want.try_send(id).map_err(|_| SessionError::Greedy)?,
+            ToMaster::NeedAsset { id } => {
+                driver.asset_wanted(worker);
+                want.try_send(id).map_err(|_| SessionError::Greedy)?;
+            }
             ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
             ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),

@@ -1,8 +1,8 @@
 //! Child processes that never outlive their test.
 
 use std::fmt::Write as _;
-use std::io::Read;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::io::{Read, Write};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -41,6 +41,7 @@ impl Outcome {
 /// A process under way, with what it has said so far. Killed when dropped.
 pub struct Running {
     child: Child,
+    stdin: Option<ChildStdin>,
     stdout: Said,
     stderr: Said,
     name: String,
@@ -81,16 +82,35 @@ impl Said {
 impl Running {
     /// Starts a command with its output captured.
     pub fn start(command: &mut Command) -> Self {
+        Self::spawn(command.stdin(Stdio::null()))
+    }
+
+    /// Starts a command that [`Running::say`] talks to.
+    pub fn start_listening(command: &mut Command) -> Self {
+        Self::spawn(command.stdin(Stdio::piped()))
+    }
+
+    fn spawn(command: &mut Command) -> Self {
         let name = format!("{command:?}");
         let mut child = command
-            .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap_or_else(|error| panic!("cannot start {name}: {error}"));
         let stdout = Said::by(child.stdout.take().unwrap());
         let stderr = Said::by(child.stderr.take().unwrap());
-        Self { child, stdout, stderr, name }
+        Self { stdin: child.stdin.take(), child, stdout, stderr, name }
+    }
+
+    /// Writes a line to its standard input.
+    pub fn say(&mut self, line: &str) {
+        let stdin = self.stdin.as_mut().expect("started with start_listening");
+        writeln!(stdin, "{line}").unwrap_or_else(|error| panic!("{} does not listen: {error}", self.name));
+    }
+
+    /// What it has written to standard output so far.
+    pub fn stdout(&self) -> String {
+        self.stdout.so_far()
     }
 
     /// The process id.

@@ -4,16 +4,23 @@ fn parse(line: &str) -> Result<Invocation, clap::Error> {
     Invocation::parse(line.split_whitespace().map(OsString::from))
 }
 
-fn view(line: &str) -> ViewArgs {
+fn command(line: &str) -> Command {
     match parse(line) {
-        Ok(Invocation::Command(Command::View(view), _)) => view,
+        Ok(Invocation::Command(command, _)) => *command,
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+fn view(line: &str) -> ViewArgs {
+    match command(line) {
+        Command::View(view) => view,
         other => panic!("{line}: {other:?}"),
     }
 }
 
 fn render(line: &str) -> RenderArgs {
-    match parse(line) {
-        Ok(Invocation::Command(Command::Render(render), _)) => render,
+    match command(line) {
+        Command::Render(render) => render,
         other => panic!("{line}: {other:?}"),
     }
 }
@@ -66,14 +73,14 @@ fn every_common_option_is_read() {
 
 #[test]
 fn the_other_commands_are_read() {
-    match parse("rayfarm-master compile bust.obj -o bust.rfm") {
-        Ok(Invocation::Command(Command::Compile(args), _)) => {
+    match command("rayfarm-master compile bust.obj -o bust.rfm") {
+        Command::Compile(args) => {
             assert_eq!((args.model, args.output), ("bust.obj".into(), "bust.rfm".into()));
         }
         other => panic!("{other:?}"),
     }
-    match parse("rayfarm-master bench a.toml --threads 1 --frames 5 --samples 4 --json") {
-        Ok(Invocation::Command(Command::Bench(args), _)) => {
+    match command("rayfarm-master bench a.toml --threads 1 --frames 5 --samples 4 --json") {
+        Command::Bench(args) => {
             assert_eq!((args.threads, args.frames, args.json), (Some(1), 5, true));
             assert_eq!(args.picture.samples, Some(4));
         }
@@ -161,4 +168,13 @@ fn help_and_version_are_no_errors() {
 #[test]
 fn the_definition_itself_is_sound() {
     Cli::command().debug_assert();
+}
+
+#[test]
+fn a_run_is_watched_and_steered() {
+    let oversight = render("rayfarm-master render a.toml -o a.png --trace t.json --control -").oversight;
+    assert_eq!(oversight.trace, Some("t.json".into()));
+    assert_eq!(oversight.control, Some(Place::StandardInput));
+    assert!(view("rayfarm-master --control 127.0.0.1:7118").oversight.control.is_some());
+    assert!(refused("rayfarm-master --control 0.0.0.0:7118").contains("other machines"));
 }

@@ -3,6 +3,7 @@
 mod bench;
 mod compile;
 mod interrupt;
+mod oversight;
 mod render;
 mod source;
 mod view;

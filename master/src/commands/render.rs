@@ -10,7 +10,9 @@ use rayfarm_tracer::scene::FrameView;
 use tokio_util::sync::CancellationToken;
 
 use super::interrupt::cancelled_by_signals;
+use super::oversight::Oversight;
 use super::source::{Source, animation};
+use crate::accounting::RunAccount;
 use crate::cli::RenderArgs;
 use crate::display::frame_rate::FrameRate;
 use crate::error::CommandError;
@@ -44,6 +46,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let view = source.view(&args.picture)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
+    let oversight = Oversight::new(&args.oversight)?;
     let run = Run {
         view,
         animation: animation(&args.picture, args.frames),
@@ -53,6 +56,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         unwritten: VecDeque::new(),
         writer: FrameWriter::new(pattern),
         totals: Totals::new(triangles, log),
+        oversight,
     };
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let report = super::runtime()?.block_on(run.carry_out(args.farm.options(), scene))?;
@@ -74,6 +78,7 @@ struct Run {
     unwritten: VecDeque<(u64, RgbImage)>,
     writer: FrameWriter,
     totals: Totals,
+    oversight: Oversight,
 }
 
 impl Run {
@@ -86,6 +91,10 @@ impl Run {
         let interrupted = cancelled_by_signals();
         let local_workers = options.local_workers;
         let mut farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
+        if let Err(error) = self.oversight.begin(&farm, &interrupted) {
+            farm.shut_down().await;
+            return Err(error);
+        }
         let mut progress = Progress::new(self.frames, farm.address(), local_workers);
         self.muster(&farm, local_workers, &mut progress, &interrupted).await;
         self.totals.begin();
@@ -93,7 +102,8 @@ impl Run {
         let written = self.writer.finish().await;
         progress.finish(self.writer.written());
         farm.shut_down().await;
-        match rendered.and(written) {
+        let traced = self.oversight.end();
+        match rendered.and(written).and(traced) {
             Err(CommandError::Interrupted(_)) => Err(CommandError::Interrupted(format!(
                 "{} of {} frames are written",
                 self.writer.written(),
@@ -187,9 +197,11 @@ struct Totals {
     started: Instant,
     previous: Duration,
     times: Vec<Duration>,
+    latencies: Vec<Duration>,
     rays: RaysPerFrame,
     bytes: BytesPerFrame,
     scene_bytes: u64,
+    account: RunAccount,
     workers: u32,
     threads: u32,
     triangles: u64,
@@ -205,9 +217,11 @@ impl Totals {
             started: Instant::now(),
             previous: Duration::ZERO,
             times: Vec::new(),
+            latencies: Vec::new(),
             rays: RaysPerFrame::default(),
             bytes: BytesPerFrame::default(),
             scene_bytes: 0,
+            account: RunAccount::default(),
             workers: 0,
             threads: 0,
             triangles,
@@ -230,9 +244,11 @@ impl Totals {
         self.rate.completed(at, elapsed);
         let line = FrameLine::of(frame, self.times.len() as u64, at, elapsed, self.rate.fps(at));
         self.times.push(elapsed);
+        self.latencies.push(frame.latency);
         self.rays.add(line.rays);
         self.bytes.add(line.bytes);
         self.scene_bytes += frame.scene_bytes;
+        self.account.add(&frame.account);
         (self.workers, self.threads) = (frame.workers, frame.threads);
         self.log.as_mut().map_or(Ok(()), |log| log.add(&line))
     }
@@ -253,11 +269,13 @@ impl Totals {
             triangles: self.triangles,
             rays_per_frame: self.rays.mean(frames),
             ms_per_frame: MsPerFrame::of(&self.times),
+            latency_ms: MsPerFrame::of(&self.latencies),
             bytes_per_frame: BytesPerFrame {
                 sent: mean(self.bytes.sent, frames),
                 received: mean(self.bytes.received, frames),
             },
             scene_bytes: self.scene_bytes,
+            accounting: self.account.report(),
             blake3: self.hash.to_hex().to_string(),
         }
     }

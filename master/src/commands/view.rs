@@ -6,6 +6,7 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::interrupt::cancelled_by_signals;
+use super::oversight::Oversight;
 use super::source::{Source, animation, default_scene};
 use crate::camera_control::CameraControl;
 use crate::cli::ViewArgs;
@@ -35,6 +36,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let camera = CameraControl::new(view.camera, compiled.bounds());
     drop(compiled);
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
+    let mut oversight = Oversight::new(&args.oversight)?;
     let display = Display::open(about, view.width, view.height).map_err(|problem| {
         CommandError::Failed(format!(
             "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
@@ -51,10 +53,11 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
         log,
     };
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
-    let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, interrupted.child_token()))?;
+    let stop = interrupted.child_token();
+    let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, &oversight, stop))?;
     let shown = display.run(view, camera, &link).map_err(CommandError::Failed);
     let ended = runtime.block_on(farm).map_err(CommandError::failed)?;
-    ended.and(shown).and_then(|()| all_shown(&args, &link, &interrupted))
+    ended.and(shown).and(oversight.end()).and_then(|()| all_shown(&args, &link, &interrupted))
 }
 
 /// Starts the farm and the task that keeps it busy.
@@ -63,11 +66,13 @@ async fn start(
     source: Source,
     wanted: watch::Sender<FrameView>,
     orders: Orders,
+    oversight: &Oversight,
     stop: CancellationToken,
 ) -> Result<(Link, JoinHandle<Result<(), CommandError>>), CommandError> {
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let farm = Farm::start(args.farm.options(), scene).await.map_err(CommandError::failed)?;
-    let link = Link { wanted, desk: NewsDesk::new(), address: farm.address(), stop };
+    oversight.begin(&farm, &stop)?;
+    let link = Link { wanted, desk: NewsDesk::new(), control: farm.control(), address: farm.address(), stop };
     let task = tokio::spawn(feed::run(farm, orders, link.desk.clone(), link.stop.clone()));
     Ok((link, task))
 }

@@ -37,6 +37,20 @@ pub(super) struct Rect {
     pub(super) height: usize,
 }
 
+/// How a row of the picture is coloured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum RowTint {
+    /// Not at all.
+    #[default]
+    None,
+    /// Half of it is this colour.
+    Blend(u32),
+    /// Its brightness in this colour.
+    Grey(u32),
+    /// The first row of a segment: this colour alone.
+    Edge(u32),
+}
+
 impl Canvas {
     /// Pixels per row.
     pub(super) fn width(&self) -> usize {
@@ -87,6 +101,35 @@ impl Canvas {
         }
     }
 
+    /// Colours the picture that is shown over the whole canvas: `rows` are the picture's, from the top.
+    pub(super) fn tint(&mut self, rows: &[RowTint]) {
+        let height = self.height;
+        let mut above = None;
+        for (y, pixels) in self.pixels.chunks_exact_mut(self.width.max(1)).enumerate() {
+            let source = y * rows.len() / height.max(1);
+            // A row that is stretched over several lines has its edge once.
+            let repeated = above.replace(source) == Some(source);
+            match rows.get(source).copied().unwrap_or_default() {
+                RowTint::None => {}
+                RowTint::Edge(color) if !repeated => pixels.fill(color),
+                RowTint::Blend(color) | RowTint::Edge(color) => {
+                    pixels.iter_mut().for_each(|pixel| *pixel = halfway(*pixel, color));
+                }
+                RowTint::Grey(color) => pixels.iter_mut().for_each(|pixel| *pixel = lit(color, *pixel)),
+            }
+        }
+    }
+
+    /// Fills a rectangle.
+    pub(super) fn paint(&mut self, rect: Rect, color: u32) {
+        for y in rect.y..rect.y.saturating_add(rect.height).min(self.height) {
+            let end = rect.x.saturating_add(rect.width).min(self.width);
+            if rect.x < end {
+                self.pixels[y * self.width + rect.x..y * self.width + end].fill(color);
+            }
+        }
+    }
+
     /// Darkens a rectangle to a quarter, so that text on it can be read whatever the picture shows there.
     pub(super) fn darken(&mut self, rect: Rect) {
         for y in rect.y..rect.y.saturating_add(rect.height).min(self.height) {
@@ -133,6 +176,20 @@ impl Canvas {
 fn glyph(character: char) -> [u8; GLYPH] {
     let fonts = || font8x8::BASIC_FONTS.get(character).or_else(|| font8x8::LATIN_FONTS.get(character));
     fonts().or_else(|| font8x8::BASIC_FONTS.get('?')).unwrap_or([0; GLYPH])
+}
+
+/// The mean of two colours.
+fn halfway(a: u32, b: u32) -> u32 {
+    ((a >> 1) & 0x007f_7f7f) + ((b >> 1) & 0x007f_7f7f)
+}
+
+/// A colour, two fifths of it always and the rest as bright as `pixel` is.
+fn lit(color: u32, pixel: u32) -> u32 {
+    let [_, r, g, b] = pixel.to_be_bytes().map(u32::from);
+    // Rec. 601 luma in 256ths, then 0.4 + 0.6 of it.
+    let light = 102 + (77 * r + 150 * g + 29 * b) / 256 * 153 / 255;
+    let [_, r, g, b] = color.to_be_bytes().map(|channel| (u32::from(channel) * light / 256).min(255) as u8);
+    u32::from_be_bytes([0, r, g, b])
 }
 
 fn packed(rgb: &[u8]) -> u32 {
@@ -186,6 +243,27 @@ mod tests {
         assert_eq!(canvas.pixels()[2 * 4 + 2], 0x003f_2010);
         assert_eq!(canvas.pixels().iter().filter(|&&pixel| pixel == 0x00ff_8040).count(), 12);
         canvas.darken(Rect { x: 50, y: 50, width: 9, height: 9 });
+    }
+
+    #[test]
+    fn tints_follow_the_rows_of_the_picture() {
+        let mut canvas = canvas(2, 4, 0x0010_2030);
+        canvas.tint(&[RowTint::Edge(0x00ff_0000), RowTint::Blend(0x0010_2032)]);
+        let rows: Vec<u32> = canvas.pixels().chunks(2).map(|row| row[0]).collect();
+        assert_eq!(rows, [0x00ff_0000, 0x0087_1018, 0x0010_2031, 0x0010_2031]);
+        canvas.fill(0x00ff_ffff);
+        canvas.tint(&[RowTint::Grey(0x0080_4020), RowTint::None]);
+        assert_eq!([canvas.pixels()[0], canvas.pixels()[7]], [0x007f_3f1f, 0x00ff_ffff]);
+        canvas.tint(&[]);
+        assert_eq!(canvas.pixels()[7], 0x00ff_ffff);
+    }
+
+    #[test]
+    fn paint_stays_inside() {
+        let mut canvas = canvas(3, 3, 0);
+        canvas.paint(Rect { x: 1, y: 1, width: 1, height: usize::MAX }, 5);
+        canvas.paint(Rect { x: 7, y: 0, width: 9, height: 9 }, 6);
+        assert_eq!(canvas.pixels(), [0, 0, 0, 0, 5, 0, 0, 5, 0]);
     }
 
     #[test]

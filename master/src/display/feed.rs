@@ -14,6 +14,8 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use super::frame_rate::FrameRate;
+use super::latency::Latency;
+use crate::accounting::Fading;
 use crate::error::CommandError;
 use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame, FrameId};
 use crate::orbit::Animation;
@@ -40,10 +42,12 @@ pub(crate) struct Orders {
 #[derive(Debug)]
 pub(crate) struct News {
     started: Instant,
-    /// The newest picture that the window has not taken yet.
-    latest: Option<FinishedFrame>,
+    /// The newest picture that the window has not taken yet, and when it was asked for.
+    latest: Option<(FinishedFrame, Instant)>,
     status: FarmStatus,
     rate: FrameRate,
+    latency: Latency,
+    accounts: Fading,
     completed: u64,
     last_completed: Duration,
     trouble: Option<String>,
@@ -61,15 +65,32 @@ impl NewsDesk {
             latest: None,
             status: FarmStatus::default(),
             rate: FrameRate::default(),
+            latency: Latency::default(),
+            accounts: Fading::default(),
             completed: 0,
             last_completed: Duration::ZERO,
             trouble: None,
         })))
     }
 
-    /// The newest picture, once.
-    pub(crate) fn take_picture(&self) -> Option<FinishedFrame> {
+    /// The newest picture, once, and when it was asked for.
+    pub(crate) fn take_picture(&self) -> Option<(FinishedFrame, Instant)> {
         self.lock().latest.take()
+    }
+
+    /// A picture is on the screen, so long after it was asked for.
+    pub(crate) fn shown(&self, after: Duration) {
+        self.lock().latency.shown(after);
+    }
+
+    /// From an input to its picture on the screen, if that is known.
+    pub(crate) fn latency(&self) -> Option<Duration> {
+        self.lock().latency.median()
+    }
+
+    /// Where the workers' time went lately.
+    pub(crate) fn accounts(&self) -> Fading {
+        self.lock().accounts.clone()
     }
 
     /// The farm as last seen.
@@ -114,14 +135,15 @@ impl NewsDesk {
     }
 
     /// Notes a finished frame and returns its line for the log.
-    fn completed_frame(&self, frame: FinishedFrame) -> FrameLine {
+    fn completed_frame(&self, frame: FinishedFrame, asked_at: Instant) -> FrameLine {
         let mut news = self.lock();
         let at = news.started.elapsed();
         news.rate.completed(at, frame.elapsed);
+        news.accounts.add(at, &frame.account);
         let line = FrameLine::of(&frame, news.completed, at, frame.elapsed, news.rate.fps(at));
         news.completed += 1;
         news.last_completed = at;
-        news.latest = Some(frame);
+        news.latest = Some((frame, asked_at));
         line
     }
 
@@ -155,7 +177,7 @@ async fn drive(
     stop: &CancellationToken,
 ) -> Result<(), CommandError> {
     let Orders { mut wanted, animation, limit, mut log } = orders;
-    let mut requests = Requests { animation, limit, next: 0, open: VecDeque::new() };
+    let mut requests = Requests::new(animation, limit);
     let mut look = tokio::time::interval(STATUS_EVERY);
     let mut window_is_there = true;
     requests.fill(farm, &wanted.borrow_and_update().clone());
@@ -165,8 +187,8 @@ async fn drive(
             () = stop.cancelled() => return Ok(()),
             frame = farm.finished() => {
                 let Some(frame) = desk.frame_or_trouble(frame)? else { continue };
-                requests.finished(frame.frame);
-                let line = desk.completed_frame(frame);
+                let asked_at = requests.finished(frame.frame);
+                let line = desk.completed_frame(frame, asked_at);
                 if let Some(log) = &mut log {
                     log.add(&line)?;
                 }
@@ -190,18 +212,37 @@ struct Requests {
     limit: Option<u64>,
     /// The number, within the animation, of the next frame to ask for.
     next: u64,
-    open: VecDeque<(FrameId, u32, u32)>,
+    open: VecDeque<Open>,
+    /// When the camera moved last, until a frame that shows it is finished.
+    moved_at: Option<Instant>,
+}
+
+/// A frame that was asked for.
+struct Open {
+    frame: FrameId,
+    size: (u32, u32),
+    /// When what it shows was first wanted.
+    asked_at: Instant,
 }
 
 impl Requests {
+    fn new(animation: Animation, limit: Option<u64>) -> Self {
+        Self { animation, limit, next: 0, open: VecDeque::new(), moved_at: None }
+    }
+
     /// Asks until two are open.
     fn fill(&mut self, farm: &Farm, base: &FrameView) {
         while self.open.len() < OPEN_REQUESTS && self.ask(farm, base) {}
     }
 
-    /// Frames come in order: all up to `frame` are done, or were replaced and will never come.
-    fn finished(&mut self, frame: FrameId) {
-        self.open.retain(|(open, ..)| *open > frame);
+    /// Frames come in order: all up to `frame` are done, or were replaced and will never come. When this one was
+    /// asked for.
+    fn finished(&mut self, frame: FrameId) -> Instant {
+        let asked_at =
+            self.open.iter().find(|open| open.frame == frame).map_or_else(Instant::now, |open| open.asked_at);
+        self.open.retain(|open| open.frame > frame);
+        self.moved_at = self.moved_at.filter(|&moved_at| moved_at > asked_at);
+        asked_at
     }
 
     /// The next one is due. Asking even when two seem open costs nothing: one of them was replaced, or this replaces
@@ -213,6 +254,7 @@ impl Requests {
 
     /// The camera has moved: the last request shall show what it sees now.
     fn replace(&mut self, farm: &Farm, base: &FrameView) {
+        self.moved_at = Some(Instant::now());
         self.next = self.next.saturating_sub(1);
         self.ask(farm, base);
         self.fill(farm, base);
@@ -223,9 +265,12 @@ impl Requests {
             return false;
         }
         let view = self.animation.view(base, self.next);
+        let size = (view.width, view.height);
         // The farm gives up all requests of another size.
-        self.open.retain(|&(_, width, height)| (width, height) == (view.width, view.height));
-        self.open.push_back((farm.request(view), view.width, view.height));
+        self.open.retain(|open| open.size == size);
+        // A request that is asked for again, because the one before was replaced, is as old as the camera it shows.
+        let asked_at = self.moved_at.unwrap_or_else(Instant::now);
+        self.open.push_back(Open { frame: farm.request(view), size, asked_at });
         self.next += 1;
         true
     }

@@ -41,8 +41,28 @@ pub(super) struct Happened {
     pub(super) toggle_help: bool,
     /// O was pressed.
     pub(super) toggle_figures: bool,
+    /// F was pressed.
+    pub(super) toggle_accounts: bool,
+    /// How often C was pressed.
+    pub(super) next_coloring: usize,
+    /// How often Tab was pressed.
+    pub(super) select_next: usize,
+    /// P was pressed.
+    pub(super) toggle_pause: bool,
+    /// L was pressed.
+    pub(super) let_go: bool,
+    /// K was pressed.
+    pub(super) kick: bool,
     /// Esc was pressed.
     pub(super) end: bool,
+}
+
+impl Happened {
+    /// Whether workers are meant.
+    pub(super) fn steers(&self) -> bool {
+        let Self { toggle_accounts, select_next, toggle_pause, let_go, kick, .. } = *self;
+        toggle_accounts || select_next > 0 || toggle_pause || let_go || kick
+    }
 }
 
 impl Controls {
@@ -77,6 +97,12 @@ impl Controls {
             },
             toggle_help: strokes.toggled(Key::H),
             toggle_figures: strokes.toggled(Key::O),
+            toggle_accounts: strokes.toggled(Key::F),
+            next_coloring: strokes.count(Key::C),
+            select_next: strokes.count(Key::Tab),
+            toggle_pause: strokes.toggled(Key::P),
+            let_go: strokes.pressed.contains(&Key::L),
+            kick: strokes.pressed.contains(&Key::K),
             end: strokes.pressed.contains(&Key::Escape),
         }
     }
@@ -111,7 +137,11 @@ struct Strokes {
 impl Strokes {
     /// Whether a switch that `key` turns has turned: twice is back again.
     fn toggled(&self, key: Key) -> bool {
-        self.pressed.iter().filter(|&&pressed| pressed == key).count() % 2 == 1
+        self.count(key) % 2 == 1
+    }
+
+    fn count(&self, key: Key) -> usize {
+        self.pressed.iter().filter(|&&pressed| pressed == key).count()
     }
 }
 

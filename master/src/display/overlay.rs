@@ -5,6 +5,9 @@ use std::time::Duration;
 
 use super::canvas::{Canvas, GLYPH, Rect};
 
+pub(super) mod accounts;
+pub(super) mod legend;
+
 /// Between lines, and between text and the edge of its panel, in dots.
 const LINE: usize = GLYPH + 3;
 const MARGIN: usize = 5;
@@ -12,7 +15,7 @@ const WHITE: u32 = 0x00f4_f4f4;
 const SOFT: u32 = 0x00c4_ccd4;
 
 /// The keys of the window, and what each does.
-const KEYS: [(&str, &str); 9] = [
+const KEYS: [(&str, &str); 15] = [
     ("W A S D", "move"),
     ("Q E", "move down, up"),
     ("arrows", "look around"),
@@ -20,6 +23,12 @@ const KEYS: [(&str, &str); 9] = [
     ("wheel", "nearer, farther"),
     ("R", "back to the start"),
     ("O", "hide the figures"),
+    ("F", "where the time goes"),
+    ("C", "colour by worker, by cost"),
+    ("Tab", "select a worker"),
+    ("P", "pause, resume (all or selected)"),
+    ("L", "let the selected worker go"),
+    ("K", "kick the selected worker"),
     ("H", "hide this list"),
     ("Esc", "end"),
 ];
@@ -31,6 +40,8 @@ pub(super) struct Figures {
     pub(super) fps: f64,
     /// What a frame takes.
     pub(super) frame_time: Duration,
+    /// From an input to its picture on the screen, where that is known.
+    pub(super) latency: Option<Duration>,
     /// Pixels per row and rows.
     pub(super) size: (u32, u32),
     /// Rays per pixel.
@@ -57,6 +68,9 @@ impl Figures {
             counted(self.threads.into(), "thread")
         ));
         lines.push(counted(self.triangles, "triangle"));
+        if let Some(latency) = self.latency {
+            lines.push(format!("latency {} ms", three_digits(latency.as_secs_f64() * 1e3)));
+        }
         if let Some(progress) = self.progress {
             lines.push(format!("next frame: {:.0} %", progress.clamp(0.0, 1.0) * 100.0));
         }
@@ -107,6 +121,11 @@ pub(super) fn waiting_for_workers(
     vec![first, String::new(), format!("To start one {where_to}:"), worker_command(address)]
 }
 
+/// What the window says while nobody may render.
+pub(super) fn all_paused() -> Vec<String> {
+    vec!["All workers are paused.".to_owned(), String::new(), "P: go on".to_owned()]
+}
+
 /// The command line that starts a worker for a master that listens on `address`.
 pub(crate) fn worker_command(address: SocketAddr) -> String {
     format!("rayfarm-worker --master {}", reachable(address))
@@ -153,7 +172,7 @@ struct Panel {
 impl Panel {
     /// The largest text that fits and suits the canvas; lines that are too long even for the smallest are broken.
     fn fit(canvas: &Canvas, lines: &[String]) -> Self {
-        let suits = ((canvas.height() + 225) / 450).clamp(1, 4);
+        let suits = Self::suited_to(canvas);
         let panel = |scale| Self { lines: lines.to_vec(), scale };
         let fits = |panel: &Self| {
             panel.width() + 2 * MARGIN <= canvas.width() && panel.height() + 2 * MARGIN <= canvas.height()
@@ -162,6 +181,11 @@ impl Panel {
             let columns = (canvas.width().saturating_sub(4 * MARGIN) / GLYPH).max(1);
             Self { lines: lines.iter().flat_map(|line| broken(line, columns)).collect(), scale: 1 }
         })
+    }
+
+    /// The scale of text that suits a canvas of this height.
+    fn suited_to(canvas: &Canvas) -> usize {
+        ((canvas.height() + 225) / 450).clamp(1, 4)
     }
 
     fn width(&self) -> usize {
@@ -175,11 +199,15 @@ impl Panel {
 
     /// The first `bright` lines stand out.
     fn draw(&self, canvas: &mut Canvas, x: usize, y: usize, bright: usize) {
+        self.draw_in(canvas, x, y, |index| if index < bright { WHITE } else { SOFT });
+    }
+
+    /// Each line in its colour.
+    fn draw_in(&self, canvas: &mut Canvas, x: usize, y: usize, color: impl Fn(usize) -> u32) {
         canvas.darken(Rect { x, y, width: self.width(), height: self.height() });
         for (index, line) in self.lines.iter().enumerate() {
-            let color = if index < bright { WHITE } else { SOFT };
             let (left, top) = (x + MARGIN * self.scale, y + (MARGIN + index * LINE) * self.scale);
-            canvas.text(left, top, self.scale, color, line);
+            canvas.text(left, top, self.scale, color(index), line);
         }
     }
 }

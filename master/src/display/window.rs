@@ -12,10 +12,12 @@ use tokio_util::sync::CancellationToken;
 use super::canvas::{Canvas, Picture};
 use super::feed::NewsDesk;
 use super::input::{Controls, Happened};
-use super::overlay::{self, Figures};
+use super::overlay::{self, Figures, accounts, legend};
 use super::screen;
+use super::steering::{self, Steering};
+use super::tint::Coloring;
 use crate::camera_control::CameraControl;
-use crate::farm::{FarmStatus, FinishedFrame};
+use crate::farm::{FarmControl, FarmStatus, FinishedFrame};
 
 /// A window whose picture has not changed is drawn again this often: another window may have covered it, and the
 /// figures want to be new.
@@ -46,8 +48,12 @@ pub(crate) struct Display {
     about: About,
     canvas: Canvas,
     picture: Option<FinishedFrame>,
+    /// When the picture was asked for, until it is on the screen.
+    asked_at: Option<Instant>,
     show_help: bool,
     show_figures: bool,
+    steering: Steering,
+    coloring: Coloring,
 }
 
 /// The two ways between the window and the farm.
@@ -56,6 +62,8 @@ pub(crate) struct Link {
     pub(crate) wanted: watch::Sender<FrameView>,
     /// Where the newest picture comes from.
     pub(crate) desk: NewsDesk,
+    /// Where commands to workers go.
+    pub(crate) control: FarmControl,
     /// Where workers connect.
     pub(crate) address: SocketAddr,
     /// Cancelled by either side to end.
@@ -70,8 +78,18 @@ impl Display {
     pub(crate) fn open(about: About, width: u32, height: u32) -> Result<Self, String> {
         let mut window = screen::open(&format!("rayfarm - {}", about.name), width, height)?;
         let controls = Controls::of(&mut window);
-        let canvas = Canvas::default();
-        Ok(Self { window, controls, about, canvas, picture: None, show_help: false, show_figures: true })
+        Ok(Self {
+            window,
+            controls,
+            about,
+            canvas: Canvas::default(),
+            picture: None,
+            asked_at: None,
+            show_help: false,
+            show_figures: true,
+            steering: Steering::default(),
+            coloring: Coloring::default(),
+        })
     }
 
     /// Shows pictures until the user ends it or `link.stop` is cancelled, and cancels that. Never waits for the farm.
@@ -96,7 +114,7 @@ impl Display {
             last_step = Instant::now();
             self.ask_for(FrameView { camera: camera.camera(), ..view }, link);
 
-            let fresh = self.take_news(&happened, link);
+            let fresh = self.take_news(&happened, link) | self.steer(&happened, link);
             if fresh || last_draw.is_none_or(|then: Instant| then.elapsed() > REDRAW_EVERY) {
                 self.draw(link)?;
                 last_draw = Some(Instant::now());
@@ -123,10 +141,24 @@ impl Display {
     fn take_news(&mut self, happened: &Happened, link: &Link) -> bool {
         self.show_help ^= happened.toggle_help;
         self.show_figures ^= happened.toggle_figures;
-        let picture = link.desk.take_picture();
-        let fresh = picture.is_some() || happened.toggle_help || happened.toggle_figures;
-        self.picture = picture.or(self.picture.take());
+        (0..happened.next_coloring).for_each(|_| self.coloring = self.coloring.next());
+        let mut fresh = happened.toggle_help || happened.toggle_figures || happened.next_coloring > 0;
+        if let Some((picture, asked_at)) = link.desk.take_picture() {
+            (self.picture, self.asked_at) = (Some(picture), Some(asked_at));
+            fresh = true;
+        }
         fresh
+    }
+
+    /// Does what keys ask of workers. Whether that can be seen.
+    fn steer(&mut self, happened: &Happened, link: &Link) -> bool {
+        if !happened.steers() && self.steering.selected.is_none() {
+            return false;
+        }
+        let before = self.steering;
+        let wishes = self.steering.step(happened, &link.desk.status());
+        wishes.iter().for_each(|wish| wish.perform(&link.control));
+        self.steering != before
     }
 
     fn draw(&mut self, link: &Link) -> Result<(), String> {
@@ -134,16 +166,23 @@ impl Display {
         self.canvas.resize(width, height);
         match &self.picture {
             None => self.canvas.fill(GROUND),
-            Some(frame) => self.canvas.show(Picture {
-                width: frame.view.width as usize,
-                height: frame.view.height as usize,
-                rgb: &frame.pixels,
-            }),
+            Some(frame) => {
+                self.canvas.show(Picture {
+                    width: frame.view.width as usize,
+                    height: frame.view.height as usize,
+                    rgb: &frame.pixels,
+                });
+                self.canvas.tint(&self.coloring.tints(&frame.account, frame.view.height));
+            }
         }
         self.draw_overlay(link);
         self.window
             .update_with_buffer(self.canvas.pixels(), width, height)
-            .map_err(|error| format!("the window takes no more pictures: {error}"))
+            .map_err(|error| format!("the window takes no more pictures: {error}"))?;
+        if let Some(asked_at) = self.asked_at.take() {
+            link.desk.shown(asked_at.elapsed());
+        }
+        Ok(())
     }
 
     fn draw_overlay(&mut self, link: &Link) {
@@ -153,6 +192,15 @@ impl Display {
             let figures = self.figures(&status, link);
             overlay::draw_figures(&mut self.canvas, &figures);
         }
+        if let Some((title, entries)) =
+            self.picture.as_ref().and_then(|frame| self.coloring.legend(&frame.account))
+        {
+            legend::draw_legend(&mut self.canvas, title, &entries);
+        }
+        if self.steering.shown {
+            let selected = self.steering.selected;
+            accounts::draw_accounts(&mut self.canvas, &status, &link.desk.accounts(), selected);
+        }
         if self.show_help {
             overlay::draw_help(&mut self.canvas);
         } else if status.workers.is_empty() {
@@ -160,6 +208,8 @@ impl Display {
             let message =
                 overlay::waiting_for_workers(link.address, self.about.local_workers, trouble.as_deref());
             overlay::draw_message(&mut self.canvas, &message);
+        } else if steering::all_paused(&status) {
+            overlay::draw_message(&mut self.canvas, &overlay::all_paused());
         } else if self.picture.is_none() {
             overlay::draw_message(&mut self.canvas, &first_picture(&status));
         }
@@ -172,6 +222,7 @@ impl Display {
         Figures {
             fps,
             frame_time,
+            latency: link.desk.latency(),
             size: (view.width, view.height),
             samples: view.samples,
             workers: status.workers.len(),

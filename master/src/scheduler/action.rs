@@ -60,5 +60,21 @@ pub enum Action {
         worker: WorkerId,
         /// Why, for the log and for the worker.
         reason: String,
+        /// Whether it may connect again.
+        again: Return,
     },
+    /// Tell a worker that it gets no more leases; it finishes those it holds.
+    Drain {
+        /// Whom.
+        worker: WorkerId,
+    },
+}
+
+/// Whether a worker that is sent away may come back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Return {
+    /// It is this session that has failed: a worker that was suspended is welcome when it wakes.
+    Welcome,
+    /// It was meant to leave, or the farm itself ends: it need not try again.
+    Unwanted,
 }

@@ -44,6 +44,23 @@ pub enum Event {
         /// The leaving worker.
         worker: WorkerId,
     },
+    /// The master's user wants a worker to leave once it has finished what it holds. It is told; it is dismissed when
+    /// it holds nothing any more.
+    DrainRequested {
+        /// Which worker.
+        worker: WorkerId,
+    },
+    /// The master's user wants a worker to get no more leases until further notice. It stays connected and finishes
+    /// what it holds; whoever is idle may render that as well.
+    PauseRequested {
+        /// Which worker.
+        worker: WorkerId,
+    },
+    /// A paused worker gets leases again. A draining one does not.
+    ResumeRequested {
+        /// Which worker.
+        worker: WorkerId,
+    },
     /// The pixels of a lease were checked and are in the framebuffer.
     SegmentDone {
         /// Who rendered them.

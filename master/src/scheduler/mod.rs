@@ -13,6 +13,7 @@ mod cost_map;
 mod event;
 mod frame;
 pub mod policy;
+mod record;
 mod worker;
 
 #[cfg(test)]
@@ -24,14 +25,15 @@ mod sizes_tests;
 #[cfg(test)]
 mod transcript;
 
-pub use action::Action;
+pub use action::{Action, Return};
 pub use event::{Event, WorkerId};
 pub use policy::SegmentPolicy;
 pub use rayfarm_protocol::{Cost, FrameId, Lease};
+pub use record::{Progress, WorkerRecord, WorkerState};
 
 use cost_map::CostMap;
 use frame::Frame;
-use worker::{PING_EVERY, Worker};
+use worker::{PING_EVERY, Service, Worker};
 
 /// A scheduler that has workers and has not been woken for this long was asleep itself: the silence was its own.
 const AWAY: Duration = PING_EVERY.saturating_mul(2);
@@ -72,28 +74,6 @@ struct Request {
     height: u32,
 }
 
-/// A worker's record, for overlays.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WorkerRecord {
-    /// Which worker.
-    pub worker: WorkerId,
-    /// Segments it has finished.
-    pub segments_done: u64,
-    /// Rows of average cost that it delivers each second; 0 before that is known.
-    pub speed: f64,
-}
-
-/// How far the oldest frame in flight is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// Which frame.
-    pub frame: FrameId,
-    /// Its finished rows.
-    pub rows_done: u32,
-    /// Its rows.
-    pub rows: u32,
-}
-
 impl Scheduler {
     /// A scheduler without workers and frames. No lease asks for more than `max_segment_bytes` bytes of RGB8
     /// pixels, except that a single row is always one lease. Workers trace `tile_rows` rows at a time: cuts elsewhere
@@ -124,7 +104,10 @@ impl Scheduler {
                 self.workers.insert(worker, Worker::new(threads, now));
             }
             Event::WorkerLeft { worker } => self.lose(worker),
-            Event::WorkerDrains { worker } => self.drain(worker),
+            Event::WorkerDrains { worker } => self.serve(worker, Service::Draining),
+            Event::DrainRequested { worker } => self.drain(worker),
+            Event::PauseRequested { worker } => self.serve(worker, Service::Paused),
+            Event::ResumeRequested { worker } => self.serve(worker, Service::Active),
             Event::SegmentDone { worker, lease, cost } => self.segment_done(now, worker, lease, cost),
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
             Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
@@ -149,21 +132,6 @@ impl Scheduler {
             [Some(pulse), worker.rested_at(self.handled_at), worker.suspect_at(self.handled_at)]
         });
         pulses.chain([self.recheck_at]).flatten().min()
-    }
-
-    /// Every worker's record, in the order in which they joined.
-    pub fn workers(&self) -> impl Iterator<Item = WorkerRecord> {
-        self.workers.iter().map(|(&worker, known)| WorkerRecord {
-            worker,
-            segments_done: known.segments_done,
-            speed: known.speed.delivered().unwrap_or(0.0),
-        })
-    }
-
-    /// How far the oldest frame in flight is; `None` when there is nothing to render.
-    pub fn progress(&self) -> Option<Progress> {
-        let frame = self.frames.front()?;
-        Some(Progress { frame: frame.id, rows_done: frame.rows_done, rows: frame.height })
     }
 
     /// A request waits for its turn, in place of the one that waited before.
@@ -229,17 +197,30 @@ impl Scheduler {
         self.take_leases(id);
     }
 
+    /// Changes whether a worker gets leases. One that drains goes on draining: it has been told already.
+    fn serve(&mut self, id: WorkerId, service: Service) {
+        if let Some(worker) = self.workers.get_mut(&id).filter(|w| w.service != Service::Draining) {
+            worker.service = service;
+        }
+    }
+
+    /// The master's side wants a worker to leave: it is told, so that it says so where it runs.
     fn drain(&mut self, id: WorkerId) {
-        if let Some(worker) = self.workers.get_mut(&id) {
-            worker.draining = true;
+        if self.workers.get(&id).is_some_and(|worker| worker.service != Service::Draining) {
+            self.serve(id, Service::Draining);
+            self.actions.push_back(Action::Drain { worker: id });
         }
     }
 
     fn dismiss_drained(&mut self) {
-        let drained = self.workers.iter().filter(|(_, worker)| worker.draining && worker.leases.is_empty());
-        for id in drained.map(|(&id, _)| id).collect::<Vec<_>>() {
-            self.dismiss(id, "it asked to leave and has finished its segments".to_owned());
+        let drained = |worker: &Worker| worker.service == Service::Draining && worker.leases.is_empty();
+        for id in self.ids_of(drained) {
+            self.dismiss(id, "it drains, and has finished its segments".to_owned(), Return::Unwanted);
         }
+    }
+
+    fn ids_of(&self, which: impl Fn(&Worker) -> bool) -> Vec<WorkerId> {
+        self.workers.iter().filter(|(_, worker)| which(worker)).map(|(&id, _)| id).collect()
     }
 
     fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64) {
@@ -256,10 +237,9 @@ impl Scheduler {
 
     /// Pings those who are due and dismisses those who have been silent for too long.
     fn check_pulses(&mut self, now: Duration) {
-        let silent = self.workers.iter().filter(|(_, worker)| worker.lost_at() <= now);
-        for id in silent.map(|(&id, _)| id).collect::<Vec<_>>() {
+        for id in self.ids_of(|worker| worker.lost_at() <= now) {
             let limit_s = worker::SILENCE_LIMIT.as_secs();
-            self.dismiss(id, format!("it has given no sign of life for {limit_s} s"));
+            self.dismiss(id, format!("it has given no sign of life for {limit_s} s"), Return::Welcome);
         }
         for (&worker, known) in self.workers.iter_mut().filter(|(_, known)| known.ping_at() <= now) {
             known.pinged(now, self.next_nonce);
@@ -276,9 +256,9 @@ impl Scheduler {
         self.handled_at = now;
     }
 
-    fn dismiss(&mut self, worker: WorkerId, reason: String) {
+    fn dismiss(&mut self, worker: WorkerId, reason: String, again: Return) {
         self.lose(worker);
-        self.actions.push_back(Action::Dismiss { worker, reason });
+        self.actions.push_back(Action::Dismiss { worker, reason, again });
     }
 
     fn lose(&mut self, id: WorkerId) {

@@ -164,7 +164,7 @@ impl Farm {
         self.plan(pause_us, Happening::NextFault);
         let nth = self.dice.roll(self.workers.len().max(1) as u64) as usize;
         let victim = self.workers.keys().nth(nth).copied();
-        match (self.dice.roll(6), victim) {
+        match (self.dice.roll(9), victim) {
             (0 | 1, _) | (_, None) => self.join(false),
             (2, Some(worker)) => {
                 self.workers.remove(&worker);
@@ -172,6 +172,9 @@ impl Farm {
             }
             (3, Some(worker)) => self.workers.get_mut(&worker).unwrap().hangs = true,
             (4, Some(worker)) => self.tell(Event::WorkerDrains { worker }),
+            (5, Some(worker)) => self.tell(Event::DrainRequested { worker }),
+            (6, Some(worker)) => self.tell(Event::PauseRequested { worker }),
+            (7, Some(worker)) => self.tell(Event::ResumeRequested { worker }),
             (_, Some(worker)) => {
                 let frame = FrameId(self.requested.saturating_sub(self.dice.roll(3)));
                 self.tell(Event::WorkerFailed { worker, frame });
@@ -221,6 +224,9 @@ impl Farm {
                     let latency_us = 2 * known.latency_us;
                     self.plan(latency_us, Happening::Tell(Event::Pong { worker, nonce }));
                 }
+            }
+            Action::Drain { worker } => {
+                assert!(self.workers.contains_key(&worker), "{worker} is told to drain and is gone");
             }
             Action::Dismiss { worker, .. } => {
                 self.workers.remove(&worker).expect("a live worker");

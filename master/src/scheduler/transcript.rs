@@ -1,13 +1,13 @@
 //! Scripts and transcripts: what is told to the scheduler (`>`), and exactly what it answers.
 //!
 //! A line of a script is `MILLISECONDS COMMAND`: `frame N WxH`, `join W THREADS`, `leave W`, `drain W`,
-//! `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`.
+//! `retire W` (the user wants it to drain), `pause W`, `resume W`, `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use super::{Action, Cost, Event, FrameId, Lease, Scheduler, WorkerId};
+use super::{Action, Cost, Event, FrameId, Lease, Return, Scheduler, WorkerId};
 
 /// Runs a script and writes the transcript.
 pub(super) fn transcript(policy: &str, script: &str) -> String {
@@ -42,6 +42,9 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
         ["join", _, threads] => Event::WorkerJoined { worker, threads: number(threads) as u32 },
         ["leave", _] => Event::WorkerLeft { worker },
         ["drain", _] => Event::WorkerDrains { worker },
+        ["retire", _] => Event::DrainRequested { worker },
+        ["pause", _] => Event::PauseRequested { worker },
+        ["resume", _] => Event::ResumeRequested { worker },
         ["done", _, segment] => {
             let (frame, segment) = pair(segment, '.');
             let lease = granted[&(worker, FrameId(frame), segment)];
@@ -69,7 +72,13 @@ fn spoken(action: &Action) -> String {
         }
         Action::Cancel { worker, before } => format!("{}: cancel before {}", worker.0, before.0),
         Action::Ping { worker, nonce } => format!("{}: ping {nonce}", worker.0),
-        Action::Dismiss { worker, reason } => format!("{}: goodbye, {reason}", worker.0),
+        Action::Dismiss { worker, reason, again: Return::Welcome } => {
+            format!("{}: goodbye, {reason}", worker.0)
+        }
+        Action::Dismiss { worker, reason, again: Return::Unwanted } => {
+            format!("{}: goodbye for good, {reason}", worker.0)
+        }
+        Action::Drain { worker } => format!("{}: drain", worker.0),
     }
 }
 

@@ -29,6 +29,17 @@ pub(super) struct Held {
     pub(super) expected_at: Option<Duration>,
 }
 
+/// What somebody wants of a worker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Service {
+    /// That it renders.
+    Active,
+    /// That it waits.
+    Paused,
+    /// That it leaves when it holds nothing any more.
+    Draining,
+}
+
 /// A connected worker.
 #[derive(Debug)]
 pub(super) struct Worker {
@@ -36,7 +47,7 @@ pub(super) struct Worker {
     pub(super) leases: BTreeMap<(FrameId, u32), Held>,
     /// The newest frames it has been told of; two are in flight at most.
     announced: [Option<FrameId>; 2],
-    pub(super) draining: bool,
+    pub(super) service: Service,
     pub(super) speed: Speed,
     pub(super) segments_done: u64,
     /// Smoothed round trip of pings, in seconds.
@@ -86,7 +97,7 @@ impl Worker {
             threads: threads.max(1),
             leases: BTreeMap::new(),
             announced: [None; 2],
-            draining: false,
+            service: Service::Active,
             speed: Speed::default(),
             segments_done: 0,
             round_trip: None,
@@ -102,7 +113,7 @@ impl Worker {
 
     /// Whether it may be given leases.
     pub(super) fn is_ready(&self, now: Duration) -> bool {
-        !self.draining && !self.is_suspect(now) && self.resting_until.is_none_or(|until| until <= now)
+        self.service == Service::Active && !self.is_suspect(now) && self.rested_at(now).is_none()
     }
 
     /// Whether it may have died without a word.
@@ -199,7 +210,7 @@ impl Worker {
 
     /// When its rest ends, if it rests.
     pub(super) fn rested_at(&self, now: Duration) -> Option<Duration> {
-        self.resting_until.filter(|&until| until > now && !self.draining)
+        self.resting_until.filter(|&until| until > now)
     }
 }
 

@@ -11,6 +11,7 @@ fn figures() -> Figures {
     Figures {
         fps: 31.25,
         frame_time: Duration::from_micros(32_100),
+        latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
         samples: 4,
         workers: 2,
@@ -50,7 +51,8 @@ fn figures_can_be_read_off_the_canvas() {
     assert_eq!(line(1, 21), "1024 x 768, 4 samples");
     assert_eq!(line(2, 20), "2 workers, 4 threads");
     assert_eq!(line(3, 19), "1,234,567 triangles");
-    assert_eq!(line(4, 16), "next frame: 42 %");
+    assert_eq!(line(4, 15), "latency 64.2 ms");
+    assert_eq!(line(5, 16), "next frame: 42 %");
 }
 
 #[test]

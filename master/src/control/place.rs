@@ -1,0 +1,42 @@
+//! Where commands come from.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+/// The value of `--control`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// `-`.
+    StandardInput,
+    /// `ADDR:PORT`, a loopback address.
+    Tcp(SocketAddr),
+    /// A path: a Unix socket that is made there.
+    Unix(PathBuf),
+}
+
+impl Place {
+    /// Reads the value of `--control`.
+    ///
+    /// # Errors
+    /// What was expected; an address that other machines could reach, and why that is refused.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        if text == "-" {
+            return Ok(Self::StandardInput);
+        }
+        match text.parse::<SocketAddr>() {
+            Ok(address) if address.ip().is_loopback() => Ok(Self::Tcp(address)),
+            Ok(address) => Err(format!(
+                "{} can be reached by other machines, and whoever reaches it may give commands; expected an address of \
+                 this machine alone, such as 127.0.0.1:{}",
+                address.ip(),
+                address.port()
+            )),
+            Err(_) if text.contains('/') => Ok(Self::Unix(text.into())),
+            Err(_) => Err(
+                "expected - for standard input, an address such as 127.0.0.1:7118, or a path with a slash in it, \
+                 such as ./control, for a Unix socket"
+                    .to_owned(),
+            ),
+        }
+    }
+}

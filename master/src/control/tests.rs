@@ -1,0 +1,231 @@
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use proptest::prelude::*;
+use serde_json::Value;
+use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
+use tokio::net::TcpStream;
+use tokio_util::sync::CancellationToken;
+
+use super::command::{Command, Whom};
+use super::console::Then;
+use super::lines::{Line, Lines, MAX_LINE_BYTES};
+use super::*;
+use crate::fake_worker::{self, Script};
+use crate::farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
+use crate::test_scene::{scene, view};
+
+/// Far beyond what any of these tests takes.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+async fn farm() -> Farm {
+    let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
+    let options = FarmOptions { listen, policy: SegmentPolicy::Adaptive, ..FarmOptions::default() };
+    Farm::start(options, FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() })
+        .await
+        .unwrap()
+}
+
+async fn until_workers(farm: &Farm, count: usize) {
+    let wait = async {
+        while farm.status().workers.len() != count {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    };
+    tokio::time::timeout(PATIENCE, wait).await.expect("they never come or go");
+}
+
+fn console(farm: &Farm) -> (Console, CancellationToken) {
+    let quit = CancellationToken::new();
+    (Console::new(farm.control(), quit.clone()), quit)
+}
+
+fn ask(console: &Console, line: &str) -> Value {
+    let answer = console.answer(&Line::Text(line.to_owned()));
+    assert!(answer.line.ends_with('\n') && answer.line.matches('\n').count() == 1);
+    serde_json::from_str(&answer.line).unwrap()
+}
+
+#[test]
+fn lines_are_read_as_documented() {
+    let one = |name: &str| Whom::One(name.to_owned());
+    for (line, command) in [
+        ("workers", Command::Workers),
+        ("  status \t", Command::Status),
+        ("drain 3", Command::Drain(one("3"))),
+        ("kick the old mill", Command::Kick(one("the old mill"))),
+        ("pause", Command::Pause(Whom::All)),
+        ("resume\tmill", Command::Resume(one("mill"))),
+        ("allow mill", Command::Allow("mill".to_owned())),
+        ("help", Command::Help),
+        ("quit", Command::Quit),
+    ] {
+        assert_eq!(Command::parse(line), Ok(command));
+    }
+    for (line, words) in [
+        ("", "help lists"),
+        ("kik 3", "\"kik\""),
+        ("kick", "kick whom?"),
+        ("drain ", "drain whom?"),
+        ("allow", "expected a worker's name"),
+        ("quit now", "stands alone"),
+    ] {
+        let error = Command::parse(line).unwrap_err();
+        assert!(error.contains(words), "{line}: {error}");
+    }
+}
+
+#[test]
+fn only_this_machine_may_give_commands() {
+    assert_eq!(Place::parse("-"), Ok(Place::StandardInput));
+    assert_eq!(Place::parse("127.0.0.1:7118"), Ok(Place::Tcp(([127, 0, 0, 1], 7118).into())));
+    assert!(matches!(Place::parse("[::1]:0"), Ok(Place::Tcp(_))));
+    assert_eq!(Place::parse("./control"), Ok(Place::Unix("./control".into())));
+    for outside in ["0.0.0.0:7118", "192.168.1.2:7118", "[::]:7118"] {
+        let error = Place::parse(outside).unwrap_err();
+        assert!(error.contains("127.0.0.1:7118") && error.contains("other machines"), "{error}");
+    }
+    assert!(Place::parse("control").unwrap_err().contains("./control"));
+}
+
+proptest! {
+    #[test]
+    fn lines_do_not_depend_on_how_they_arrive(lines in prop::collection::vec("[^\r\n]{0,40}", 0..10), open in "[a-z]{0,9}") {
+        let text: String = lines.iter().map(|line| format!("{line}\r\n")).chain([open.clone()]).collect();
+        let mut cutter = Lines::default();
+        let mut said: Vec<Line> = text.bytes().filter_map(|byte| cutter.push(byte)).collect();
+        said.extend(cutter.end());
+        let expected = lines.into_iter().chain((!open.is_empty()).then_some(open));
+        prop_assert_eq!(said, expected.map(Line::Text).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn no_bytes_make_a_line_longer_than_its_bound(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
+        let mut cutter = Lines::default();
+        for byte in bytes {
+            if let Some(Line::Text(text)) = cutter.push(byte) {
+                // A byte that is no text becomes a character of three bytes.
+                prop_assert!(text.len() <= 3 * MAX_LINE_BYTES);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_endless_line_is_refused_and_the_next_one_is_not() {
+    let mut cutter = Lines::default();
+    let text = "x".repeat(MAX_LINE_BYTES + 1) + "\nhelp\n";
+    let said: Vec<Line> = text.bytes().filter_map(|byte| cutter.push(byte)).collect();
+    assert_eq!(said, [Line::TooLong, Line::Text("help".to_owned())]);
+}
+
+#[tokio::test]
+async fn workers_are_listed_paused_resumed_kicked_and_allowed() {
+    let mut farm = farm().await;
+    let worker = fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 1).await;
+    let (console, quit) = console(&farm);
+    let listed = ask(&console, "workers");
+    assert_eq!((&listed["ok"], &listed["workers"][0]["name"]), (&true.into(), &"fake".into()));
+    let id = listed["workers"][0]["id"].as_u64().unwrap();
+
+    assert_eq!(ask(&console, "pause fake")["workers"], serde_json::json!([id]));
+    assert_eq!(ask(&console, "workers")["workers"][0]["state"], "paused");
+    assert_eq!(ask(&console, "resume")["workers"], serde_json::json!([id]));
+    farm.request(view());
+    tokio::time::timeout(PATIENCE, farm.finished()).await.unwrap().unwrap();
+
+    assert_eq!(ask(&console, &format!("kick {id}"))["ok"], true);
+    let goodbye = worker.await.unwrap().goodbye.unwrap();
+    assert!(goodbye.contains("kicked"), "{goodbye}");
+    assert_eq!(ask(&console, "status")["kicked"], serde_json::json!(["fake"]));
+    assert_eq!(ask(&console, "allow fake")["allowed"], 1);
+    assert!(ask(&console, "allow fake")["error"].as_str().unwrap().contains("fake"));
+    assert!(ask(&console, "kick fake")["error"].as_str().unwrap().contains("no worker \"fake\""));
+    assert_eq!(ask(&console, "help")["ok"], true);
+    assert_eq!(console.answer(&Line::Text("quit".to_owned())).then, Then::Quit);
+    assert!(!quit.is_cancelled(), "the answer goes first");
+    farm.shut_down().await;
+}
+
+#[tokio::test]
+async fn a_name_that_two_workers_have_is_not_guessed_at() {
+    let farm = farm().await;
+    let _workers = [
+        fake_worker::start(farm.address(), Script::Honest).await,
+        fake_worker::start(farm.address(), Script::Honest).await,
+    ];
+    until_workers(&farm, 2).await;
+    let (console, _quit) = console(&farm);
+    let error = ask(&console, "drain fake")["error"].as_str().unwrap().to_owned();
+    assert!(error.contains("2 workers are called") && error.contains("such as 1"), "{error}");
+    assert_eq!(ask(&console, "drain 2")["workers"], serde_json::json!([2]));
+    until_workers(&farm, 1).await;
+    farm.shut_down().await;
+}
+
+#[tokio::test]
+async fn every_connection_gets_its_answers_and_a_web_page_gets_none() {
+    let farm = farm().await;
+    let (console, quit) = console(&farm);
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    start(&Place::Tcp(free), console, CancellationToken::new()).unwrap();
+    let mut streams = Vec::new();
+    for _ in 0..8 {
+        let mut stream = BufReader::new(TcpStream::connect(free).await.unwrap());
+        stream.write_all(b"status\nnonsense\n").await.unwrap();
+        for ok in ["\"ok\":true", "\"ok\":false"] {
+            let mut line = String::new();
+            stream.read_line(&mut line).await.unwrap();
+            assert!(line.contains(ok), "{line}");
+        }
+        streams.push(stream);
+    }
+    let mut heard = String::new();
+    TcpStream::connect(free).await.unwrap().read_to_string(&mut heard).await.unwrap();
+    assert!(heard.contains("8 connections"), "{heard}");
+
+    let mut browser = streams.pop().unwrap();
+    browser.write_all(b"POST / HTTP/1.1\r\nquit\r\n").await.unwrap();
+    let mut heard = String::new();
+    // Closing over unread bytes may reset the connection.
+    let _ = browser.read_to_string(&mut heard).await;
+    assert!(!quit.is_cancelled());
+
+    streams[0].write_all(b"quit\n").await.unwrap();
+    tokio::time::timeout(PATIENCE, quit.cancelled()).await.unwrap();
+    farm.shut_down().await;
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_unix_socket_is_the_owners_alone_and_gone_after_the_run() {
+    use std::os::unix::fs::PermissionsExt;
+    let farm = farm().await;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("control");
+    let place = Place::Unix(path.clone());
+    // One that a killed run has left behind does not stand in the way.
+    drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
+    let stop = CancellationToken::new();
+    start(&place, console(&farm).0, stop.clone()).unwrap();
+    assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+    let mut stream = BufReader::new(tokio::net::UnixStream::connect(&path).await.unwrap());
+    stream.write_all(b"workers\n").await.unwrap();
+    let mut line = String::new();
+    stream.read_line(&mut line).await.unwrap();
+    assert_eq!(line, "{\"ok\":true,\"workers\":[]}\n");
+    let taken = start(&place, console(&farm).0, stop.clone()).unwrap_err().to_string();
+    assert!(taken.contains("choose another"), "{taken}");
+    stop.cancel();
+    let gone = async {
+        while path.exists() {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    };
+    tokio::time::timeout(PATIENCE, gone).await.unwrap();
+    std::fs::write(&path, b"a file").unwrap();
+    assert!(start(&place, console(&farm).0, stop).is_err(), "a file of somebody else stays");
+    assert_eq!(std::fs::read(&path).unwrap(), b"a file");
+    farm.shut_down().await;
+}

@@ -1,0 +1,220 @@
+//! The panel of workers: what each does with its time, and which one is selected.
+
+use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, grouped};
+use crate::accounting::{Fading, PART_COUNT, Smoothed};
+use crate::display::canvas::Canvas;
+use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
+
+/// What the parts are called where there is room for words, and where there is not.
+const WORDS: [&str; PART_COUNT] = ["trace", "wait", "encode", "send", "decode", "tail", "scene"];
+const SHORT: [&str; PART_COUNT] = ["trc", "wait", "enc", "send", "dec", "tail", "scn"];
+const SHORTEST: [&str; PART_COUNT] = ["trc", "wai", "enc", "snd", "dec", "tai", "scn"];
+const HINT: &str = "% of thread time  Tab select  P pause  L let go  K kick";
+const SHORT_HINT: &str = "Tab P L K: see H";
+/// Characters of a name.
+const NAMES: std::ops::RangeInclusive<usize> = 8..=24;
+
+/// How the columns are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Layout {
+    name: usize,
+    part: usize,
+    /// Digits behind the point of a percentage.
+    digits: usize,
+    words: [&'static str; PART_COUNT],
+    /// Widths of rows per second and kilobytes per frame, where they are shown.
+    figures: Option<(usize, usize)>,
+    hint: &'static str,
+}
+
+/// From the widest to the narrowest.
+const LAYOUTS: [Layout; 3] = [
+    Layout { name: 8, part: 7, digits: 1, words: WORDS, figures: Some((11, 11)), hint: HINT },
+    Layout { name: 8, part: 5, digits: 0, words: SHORT, figures: Some((8, 7)), hint: HINT },
+    Layout { name: 8, part: 4, digits: 0, words: SHORTEST, figures: None, hint: SHORT_HINT },
+];
+
+impl Layout {
+    /// The widest that fits, with as much of the names as fits.
+    fn of(columns: usize) -> Self {
+        let [.., narrowest] = LAYOUTS;
+        let layout = LAYOUTS.into_iter().find(|layout| layout.columns() <= columns).unwrap_or(narrowest);
+        let spare = columns.saturating_sub(layout.columns());
+        Self { name: (NAMES.start() + spare).min(*NAMES.end()), ..layout }
+    }
+
+    /// The largest text that leaves room for speeds and bytes, and what fits beside it.
+    fn fit(canvas: &Canvas) -> (Self, usize) {
+        let columns = |scale: usize| (canvas.width() / (GLYPH * scale)).saturating_sub(2);
+        let [_, medium, _] = LAYOUTS;
+        let roomy = |scale: &usize| columns(*scale) >= medium.columns();
+        let scale = (1..=Panel::suited_to(canvas)).rev().find(roomy).unwrap_or(1);
+        (Self::of(columns(scale)), scale)
+    }
+
+    fn columns(&self) -> usize {
+        let figures = self.figures.map_or(0, |(speed, bytes)| speed + bytes);
+        (2 + self.name + self.part * PART_COUNT + figures).max(self.hint.len())
+    }
+
+    fn header(&self) -> String {
+        let words: String =
+            self.words.iter().map(|word| format!("{word:>width$}", width = self.part)).collect();
+        let figures = self.figures.map(|(speed, bytes)| format!("{:>speed$}{:>bytes$}", "rows/s", "KB/fr"));
+        format!("  {:name$}{words}{}", "worker", figures.unwrap_or_default(), name = self.name)
+    }
+
+    /// A worker's line; dashes where its time is nobody's loss.
+    fn line(&self, mark: char, name: &str, account: Option<Smoothed>, speed: f64) -> String {
+        let Self { part: width, digits, .. } = *self;
+        let name: String = name.chars().take(self.name).collect();
+        let parts: String = match account {
+            Some(Smoothed { percent, .. }) => {
+                percent.iter().map(|part| format!("{part:>width$.digits$}")).collect()
+            }
+            None => format!("{:>width$}", "-").repeat(PART_COUNT),
+        };
+        let bytes = account.map_or(0.0, |account| account.bytes);
+        let rounded = |value: f64| grouped(value.round() as u64);
+        let figures = self
+            .figures
+            .map(|(s, b)| format!("{:>s$}{:>b$}", rounded(speed), rounded(bytes / 1e3)))
+            .unwrap_or_default();
+        format!("{mark} {name:name_width$}{parts}{figures}", name_width = self.name)
+    }
+}
+
+/// The panel's lines, each with its colour: a header, the workers that there is room for (among them the selected
+/// one), their sum, a hint.
+fn lines(
+    layout: &Layout,
+    status: &FarmStatus,
+    accounts: &Fading,
+    selected: Option<u64>,
+    room: usize,
+) -> Vec<(String, u32)> {
+    let workers = &status.workers;
+    let mut lines = vec![(layout.header(), SOFT)];
+    let visible = room.saturating_sub(4).clamp(1, workers.len().max(1));
+    let place = workers.iter().position(|worker| Some(worker.id) == selected).unwrap_or(0);
+    let first = place.saturating_sub(visible - 1);
+    for worker in workers.iter().skip(first).take(visible) {
+        let mark = if Some(worker.id) == selected { '>' } else { ' ' };
+        let (account, color) = match worker.state {
+            WorkerState::Working => (accounts.of(worker.id), WHITE),
+            WorkerState::Paused => (None, SOFT),
+            WorkerState::Draining | WorkerState::Resting | WorkerState::Silent => {
+                (accounts.of(worker.id), SOFT)
+            }
+        };
+        lines.push((layout.line(mark, &label(worker), account, worker.speed), color));
+    }
+    if workers.len() > visible {
+        lines.push((format!("  ... {} more", workers.len() - visible), SOFT));
+    }
+    if workers.len() > 1 {
+        let speed = workers.iter().map(|worker| worker.speed).sum();
+        lines.push((layout.line(' ', "all", accounts.sum(), speed), WHITE));
+    }
+    lines.push((layout.hint.to_owned(), SOFT));
+    lines
+}
+
+/// A worker's name, and what keeps it from working.
+fn label(worker: &WorkerStatus) -> String {
+    match worker.state {
+        WorkerState::Working => format!("{} {}", worker.id, worker.name),
+        state => format!("{} {state}: {}", worker.id, worker.name),
+    }
+}
+
+/// Draws the panel in the lower left corner.
+pub(in crate::display) fn draw_accounts(
+    canvas: &mut Canvas,
+    status: &FarmStatus,
+    accounts: &Fading,
+    selected: Option<u64>,
+) {
+    let (layout, scale) = Layout::fit(canvas);
+    let room = canvas.height() / 2 / (LINE * scale);
+    let (lines, colors): (Vec<String>, Vec<u32>) =
+        lines(&layout, status, accounts, selected, room).into_iter().unzip();
+    let panel = Panel { lines, scale };
+    let top = canvas.height().saturating_sub(panel.height() + MARGIN * scale);
+    panel.draw_in(canvas, MARGIN * scale, top, |index| colors.get(index).copied().unwrap_or(SOFT));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accounting::{FrameAccount, Parts, WorkerAccount};
+    use std::time::Duration;
+
+    fn status(count: u64) -> FarmStatus {
+        let worker = |id| WorkerStatus {
+            id,
+            name: format!("machine-{id}"),
+            address: ([127, 0, 0, 1], 9).into(),
+            threads: 2,
+            segments_done: 7,
+            speed: 12_345.6,
+            state: if id == 2 { WorkerState::Paused } else { WorkerState::Working },
+            trouble: None,
+        };
+        FarmStatus { workers: (1..=count).map(worker).collect(), ..FarmStatus::default() }
+    }
+
+    fn accounts() -> Fading {
+        let parts = Parts { trace: 900, wait: 75, send: 25, ..Parts::default() };
+        let worker = WorkerAccount { id: 1, parts, bytes: 250_000, ..WorkerAccount::default() };
+        let mut fading = Fading::default();
+        fading.add(Duration::ZERO, &FrameAccount { workers: vec![worker], segments: Vec::new() });
+        fading
+    }
+
+    fn texts(count: u64, selected: Option<u64>, columns: usize, room: usize) -> Vec<String> {
+        let lines = lines(&Layout::of(columns), &status(count), &accounts(), selected, room);
+        lines.into_iter().map(|(text, _)| text).collect()
+    }
+
+    #[test]
+    fn a_line_tells_name_shares_speed_and_bytes() {
+        let texts = texts(2, Some(2), 120, 20);
+        let words = |index: usize| texts[index].split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(words(0), "worker trace wait encode send decode tail scene rows/s KB/fr");
+        assert_eq!(words(1), "1 machine-1 90.0 7.5 0.0 2.5 0.0 0.0 0.0 12,346 250");
+        assert_eq!(words(2), "> 2 paused: machine-2 - - - - - - - 12,346 0");
+        assert_eq!(words(3), "all 90.0 7.5 0.0 2.5 0.0 0.0 0.0 24,691 250");
+    }
+
+    #[test]
+    fn columns_stand_below_their_words_however_narrow_the_window_is() {
+        for columns in [38, 39, 58, 61, 64, 80, 88, 200] {
+            let texts = texts(3, None, columns, 20);
+            assert!(texts.iter().all(|line| line.chars().count() <= columns), "{columns}: {texts:#?}");
+            assert_eq!(texts[0].len(), texts[1].len(), "{texts:#?}");
+        }
+    }
+
+    #[test]
+    fn the_usual_window_has_large_text_with_speeds() {
+        let layout = |width, height| {
+            let mut canvas = Canvas::default();
+            canvas.resize(width, height);
+            let (layout, scale) = Layout::fit(&canvas);
+            (layout.figures.is_some(), scale)
+        };
+        assert_eq!(
+            [layout(1024, 768), layout(640, 480), layout(320, 240)],
+            [(true, 2), (true, 1), (false, 1)]
+        );
+    }
+
+    #[test]
+    fn the_selected_worker_is_always_in_sight() {
+        for selected in 1..=50 {
+            let texts = texts(50, Some(selected), 120, 12);
+            assert!(texts.len() <= 12 && texts.iter().any(|line| line.starts_with('>')), "{texts:#?}");
+        }
+    }
+}
