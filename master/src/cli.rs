@@ -16,7 +16,10 @@ use crate::control::Place;
 use crate::farm::{FarmOptions, SegmentPolicy};
 use values::{Size, degrees, frame_count, listen_address, sample_count, size, thread_count, worker_count};
 
+mod simulate;
 mod values;
+
+pub(crate) use simulate::{Profile, SimulateArgs};
 
 /// The word that turns the master into a worker.
 pub(crate) const LOCAL_WORKER: &str = "local-worker";
@@ -88,6 +91,8 @@ pub(crate) enum Command {
     Compile(CompileArgs),
     /// Measure the tracer alone, in this one process, without the farm.
     Bench(BenchArgs),
+    /// Run the scheduler with simulated workers, in virtual time: how well it uses them, or what it survives.
+    Simulate(SimulateArgs),
 }
 
 /// `view`.
@@ -198,6 +203,9 @@ pub(crate) struct FarmArgs {
     /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
     #[arg(long, value_name = "POLICY", default_value = "adaptive")]
     segment: SegmentPolicy,
+    /// Frames that workers may begin before the one on the way is complete: 1, or 0 for the newest camera.
+    #[arg(long, value_name = "0|1", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=1))]
+    pipeline: u8,
 }
 
 impl FarmArgs {
@@ -213,6 +221,7 @@ impl FarmArgs {
             local_workers: self.local_workers(),
             threads: self.threads,
             policy: self.segment,
+            sequential: self.pipeline == 0,
         }
     }
 }

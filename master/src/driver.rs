@@ -76,9 +76,10 @@ pub(crate) enum AnswerError {
 }
 
 impl Driver {
-    pub(crate) fn new(policy: SegmentPolicy, assets: Assets) -> Self {
+    /// `sequential`: one frame in flight at a time.
+    pub(crate) fn new(policy: SegmentPolicy, sequential: bool, assets: Assets) -> Self {
         let inner = Inner {
-            scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64, TILE_SIZE),
+            scheduler: Scheduler::new(policy, MAX_PIXELS_BYTES as u64, TILE_SIZE).with_pipeline(!sequential),
             accounts: Accounts::default(),
             trace: None,
             roster: Roster::default(),
@@ -373,6 +374,12 @@ impl Driver {
             Action::FrameDropped { frame } => {
                 inner.views.remove(&frame);
                 self.framebuffers.discard(frame);
+            }
+            Action::FrameFailed { frame } => {
+                inner.views.remove(&frame);
+                self.framebuffers.discard(frame);
+                let reasons = inner.roster.troubles();
+                self.hand_out(inner, Err(FarmError::Refused { frame, reasons }));
             }
             Action::Announce { worker, frame } => {
                 let announce = inner.views.get(&frame).map(|requested| requested.announce.clone())?;

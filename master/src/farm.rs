@@ -7,10 +7,10 @@
 //! farm.shut_down().await;
 //! ```
 //!
-//! A frame begins when no earlier one stands in its way, and a frame that has begun is always finished: callers
-//! that keep at most two requests open (the one being rendered and the one after it) get every frame they asked
-//! for, in order. A third open request replaces the second as long as that one has not begun, so a moving camera
-//! never queues up. A request of another picture size gives up all earlier ones, begun or not: nobody can show them
+//! A frame begins when no earlier one stands in its way. Callers that keep at most two requests open (the one being
+//! rendered and the one after it) get every frame they asked for, in order. A third open request replaces the second
+//! unless half of that one is leased already, so a moving camera never queues up, and the oldest frame is always
+//! finished. A request of another picture size gives up all earlier ones, begun or not: nobody can show them
 //! any more.
 
 use std::io::ErrorKind;
@@ -55,6 +55,9 @@ pub struct FarmOptions {
     pub threads: Option<usize>,
     /// How frames are cut into segments.
     pub policy: SegmentPolicy,
+    /// Whether a frame begins only when the one before it is complete. Otherwise workers that have nothing left to do in
+    /// a frame begin the next one: more frames a second, each with an older camera.
+    pub sequential: bool,
 }
 
 /// What the farm draws.
@@ -166,6 +169,16 @@ pub enum FarmError {
     /// A frame was requested that cannot be rendered.
     #[error("this frame cannot be rendered: {0}")]
     View(#[source] ValidateError),
+    /// Every worker has refused a frame again and again.
+    #[error(
+        "no worker can render frame {frame} ({reasons}); look at what the workers say, or change the scene"
+    )]
+    Refused {
+        /// Which frame.
+        frame: FrameId,
+        /// What the workers say.
+        reasons: String,
+    },
     /// Nobody is left to render: the local workers keep dying, and no other is connected.
     #[error(
         "no worker is left: {reason}; look at its messages above, or start workers by hand: \
@@ -219,7 +232,7 @@ impl Farm {
     ) -> Result<Farm, FarmError> {
         let assets = Assets::new(&scene.scene, scene.meshes, scene.textures)?;
         let (listener, address) = listen(options.listen).await?;
-        let driver = Arc::new(Driver::new(options.policy, assets));
+        let driver = Arc::new(Driver::new(options.policy, options.sequential, assets));
         let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());
         let stop = CancellationToken::new();
 
@@ -258,7 +271,8 @@ impl Farm {
     /// `select!` does.
     ///
     /// # Errors
-    /// [`FarmError::View`] for a request that cannot be rendered; [`FarmError::NoWorkers`], once, when nobody is
+    /// [`FarmError::View`] for a request that cannot be rendered, [`FarmError::Refused`] for one that all workers say
+    /// they cannot; [`FarmError::NoWorkers`], once, when nobody is
     /// left to render: a worker that connects later goes on with the frame.
     pub async fn finished(&mut self) -> Result<FinishedFrame, FarmError> {
         self.driver.next_finished().await

@@ -26,6 +26,7 @@ mod report;
 mod roster;
 pub mod scheduler;
 mod server;
+pub mod simulator;
 
 #[cfg(test)]
 mod fake_worker;

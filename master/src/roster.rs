@@ -16,6 +16,8 @@ use crate::scheduler::{Return, WorkerId};
 const FAREWELL: Duration = Duration::from_secs(1);
 /// Kicked workers that are kept out; beyond that, the one kicked longest ago is forgotten.
 const MAX_KICKED: usize = 1024;
+/// Workers whose trouble is told at a time.
+const MAX_TOLD: usize = 4;
 
 /// The sessions that are wanted.
 #[derive(Default)]
@@ -87,6 +89,13 @@ impl Roster {
     /// Render threads of all workers.
     pub(crate) fn threads(&self) -> u32 {
         self.sessions.values().fold(0, |sum, session| sum.saturating_add(session.hello.threads))
+    }
+
+    /// Why workers could not render, the last time they could not: the first few of them, for people.
+    pub(crate) fn troubles(&self) -> String {
+        let troubles =
+            self.sessions.values().filter_map(|s| Some(format!("{}: {}", s.hello.name, s.trouble.as_ref()?)));
+        troubles.take(MAX_TOLD).collect::<Vec<_>>().join("; ")
     }
 
     /// Queues a message. A worker that does not read what it is sent is dismissed: it is as good as gone.

@@ -5,6 +5,7 @@ mod compile;
 mod interrupt;
 mod oversight;
 mod render;
+mod simulate;
 mod source;
 mod view;
 
@@ -21,6 +22,7 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Render(args) => render::run(args),
         Command::Compile(args) => compile::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
     }
 }
 

@@ -26,6 +26,11 @@ pub enum Action {
         /// Which.
         frame: FrameId,
     },
+    /// A frame is given up: every worker has refused it again and again.
+    FrameFailed {
+        /// Which.
+        frame: FrameId,
+    },
     /// Tell a worker what a frame shows. Comes before the worker's first lease of it.
     Announce {
         /// Whom.

@@ -1,6 +1,5 @@
 //! What holds after every event. Debug builds and tests check it each time.
 
-use super::assign::MAX_FRAMES;
 use super::frame::Frame;
 use super::policy::{MAX_WINDOW, SEED_WINDOW};
 use super::{Scheduler, SegmentPolicy};
@@ -10,7 +9,8 @@ use super::{Scheduler, SegmentPolicy};
 /// - every row of a frame in flight is queued, leased to a live worker, or done, and exactly one of these;
 /// - every lease of a worker is known to its frame, and the other way round;
 /// - leases never exceed the window;
-/// - nobody is idle while rows wait;
+/// - rows do not wait for anybody while all who could render them are idle;
+/// - under the seed's policies, nobody is idle while rows wait;
 /// - at most two frames are in flight, in order, and none of them is complete;
 /// - without workers nothing is leased.
 pub fn violated(scheduler: &Scheduler) -> Option<String> {
@@ -23,7 +23,7 @@ pub fn violated(scheduler: &Scheduler) -> Option<String> {
 
 fn frames_are_in_order(scheduler: &Scheduler) -> Option<String> {
     let frames = &scheduler.frames;
-    let most = if scheduler.policy == SegmentPolicy::Adaptive { MAX_FRAMES } else { 1 };
+    let most = scheduler.max_frames();
     let numbers: Vec<_> = frames.iter().map(|f| f.id).chain(scheduler.waiting.map(|w| w.frame)).collect();
     if frames.len() > most {
         return Some(format!("{} frames in flight, at most {most} expected", frames.len()));
@@ -91,11 +91,12 @@ fn leases_are_known(scheduler: &Scheduler) -> Option<String> {
     })
 }
 
+/// Under `adaptive` rows may wait for somebody who will have done them sooner than those who are idle.
 fn nobody_is_idle(scheduler: &Scheduler) -> Option<String> {
     let rows_wait = scheduler.frames.iter().any(|frame| !frame.queue.is_empty());
-    let idle = scheduler
-        .workers
-        .iter()
-        .find(|(_, worker)| worker.leases.is_empty() && worker.is_ready(scheduler.handled_at));
-    idle.filter(|_| rows_wait).map(|(id, _)| format!("{id} is idle while rows wait"))
+    let ready = || scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(scheduler.handled_at));
+    let idle = ready().find(|(_, worker)| worker.leases.is_empty()).filter(|_| rows_wait);
+    let busy = ready().any(|(_, worker)| !worker.leases.is_empty());
+    let forbidden = !busy || scheduler.policy != SegmentPolicy::Adaptive;
+    idle.filter(|_| forbidden).map(|(id, _)| format!("{id} is idle while rows wait"))
 }

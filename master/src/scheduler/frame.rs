@@ -49,6 +49,8 @@ pub(super) struct Frame {
     pub(super) rows_done: u32,
     /// What the done segments took.
     pub(super) cost: Cost,
+    /// How often each worker has said that it cannot render this frame, since somebody last could.
+    refusals: BTreeMap<WorkerId, u32>,
 }
 
 impl Frame {
@@ -63,7 +65,24 @@ impl Frame {
             next_segment: 0,
             rows_done: 0,
             cost: Cost::default(),
+            refusals: BTreeMap::new(),
         }
+    }
+
+    /// Rows that were leased at least once and are not queued again.
+    pub(super) fn rows_leased(&self) -> u32 {
+        self.height - self.queue.iter().map(|run| run.count).sum::<u32>()
+    }
+
+    /// A worker says that it cannot render this frame.
+    pub(super) fn refuse(&mut self, worker: WorkerId) {
+        let count = self.refusals.entry(worker).or_default();
+        *count = count.saturating_add(1);
+    }
+
+    /// How often a worker has said so since somebody last could.
+    pub(super) fn refusals(&self, worker: WorkerId) -> u32 {
+        self.refusals.get(&worker).copied().unwrap_or(0)
     }
 
     pub(super) fn is_complete(&self) -> bool {
@@ -113,16 +132,54 @@ impl Frame {
         Some(Lease { frame: self.id, segment: number, attempt, first_row, row_count })
     }
 
-    /// Marks a segment done; whether it was the first result. Every row's cost is counted once.
-    pub(super) fn finish(&mut self, number: u32, cost: Cost) -> bool {
-        let Some(segment) = self.segments.get_mut(&number).filter(|segment| !segment.done) else {
-            return false;
+    /// Marks the rows of a lease done; whether any of them were not. Every row's cost is counted once.
+    ///
+    /// The lease may have been taken back as overdue, and its rows be queued again or leased to others in pieces: each
+    /// of these pieces lies within it.
+    pub(super) fn finish(&mut self, lease: &Lease, cost: Cost) -> bool {
+        let rows = lease.first_row..lease.first_row.saturating_add(lease.row_count);
+        let within = |first: u32, count: u32| rows.start <= first && first + count <= rows.end;
+        for index in (0..self.queue.len()).rev() {
+            if self.queue.get(index).is_some_and(|run| within(run.first, run.count)) {
+                self.settle(index);
+            }
+        }
+        let mut fresh = 0;
+        for segment in self.segments.values_mut().filter(|s| !s.done && within(s.first, s.count)) {
+            segment.done = true;
+            segment.holders.clear();
+            fresh += segment.count;
+        }
+        self.rows_done += fresh;
+        self.refusals.clear();
+        self.pay(cost, fresh, lease.row_count);
+        fresh > 0
+    }
+
+    /// Makes a segment of a run in the queue.
+    fn settle(&mut self, index: usize) {
+        let Some(Run { first, count, came_back, halved }) = self.queue.remove(index) else { return };
+        let (number, next_attempt) = came_back.unwrap_or((self.next_segment, 0));
+        self.next_segment = self.next_segment.max(number + 1);
+        let holders = BTreeSet::new();
+        self.segments.insert(number, Segment { first, count, next_attempt, halved, holders, done: false });
+    }
+
+    /// Adds what `fresh` of `rows` rows have cost.
+    fn pay(&mut self, cost: Cost, fresh: u32, rows: u32) {
+        let part = |whole: u64| {
+            let part = u128::from(whole) * u128::from(fresh) / u128::from(rows.max(1));
+            u64::try_from(part).unwrap_or(u64::MAX)
         };
-        segment.done = true;
-        segment.holders.clear();
-        self.rows_done += segment.count;
-        self.cost += cost;
-        true
+        self.cost += Cost {
+            trace_ns: part(cost.trace_ns),
+            wait_ns: part(cost.wait_ns),
+            encode_ns: part(cost.encode_ns),
+            span_ns: part(cost.span_ns),
+            primary: part(cost.primary),
+            shadow: part(cost.shadow),
+            secondary: part(cost.secondary),
+        };
     }
 
     /// Takes a segment from a worker; rows that nobody else renders go back to the front of the queue.
@@ -199,9 +256,34 @@ mod tests {
         let lease = frame.take(A, 8).unwrap();
         frame.copy(lease.segment, B).unwrap();
         let cost = Cost { primary: 80, ..Cost::default() };
-        assert!(frame.finish(lease.segment, cost));
-        assert!(!frame.finish(lease.segment, cost));
+        assert!(frame.finish(&lease, cost));
+        assert!(!frame.finish(&lease, cost));
         assert_eq!((frame.rows_done, frame.cost.primary), (8, 80));
+    }
+
+    #[test]
+    fn a_late_result_settles_what_its_rows_have_become() {
+        let mut frame = frame(30);
+        let late = frame.take(A, 20).unwrap();
+        frame.give_up(late.segment, A);
+        let piece = frame.take(B, 8).unwrap();
+        let done = frame.take(B, 4).unwrap();
+        assert!(frame.finish(&done, Cost { primary: 40, ..Cost::default() }));
+        assert!(frame.finish(&late, Cost { primary: 200, ..Cost::default() }));
+        assert_eq!((frame.rows_done, frame.cost.primary), (20, 200));
+        assert!(!frame.finish(&piece, Cost::default()));
+        assert_eq!(frame.queue.iter().map(|run| (run.first, run.count)).collect::<Vec<_>>(), [(20, 10)]);
+    }
+
+    #[test]
+    fn refusals_count_until_somebody_can() {
+        let mut frame = frame(30);
+        let lease = frame.take(A, 20).unwrap();
+        frame.refuse(B);
+        frame.refuse(B);
+        assert_eq!((frame.refusals(A), frame.refusals(B)), (0, 2));
+        frame.finish(&lease, Cost::default());
+        assert_eq!(frame.refusals(B), 0);
     }
 
     #[test]

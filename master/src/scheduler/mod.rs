@@ -7,19 +7,21 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 mod action;
+mod adaptive;
 mod assign;
 pub mod check;
+mod copies;
 mod cost_map;
 mod event;
 mod frame;
+mod lapses;
 pub mod policy;
 mod record;
+mod speed;
 mod worker;
 
 #[cfg(test)]
 mod scenarios;
-#[cfg(test)]
-mod simulation;
 #[cfg(test)]
 mod sizes_tests;
 #[cfg(test)]
@@ -31,10 +33,21 @@ pub use policy::SegmentPolicy;
 pub use rayfarm_protocol::{Cost, FrameId, Lease};
 pub use record::{Progress, WorkerRecord, WorkerState};
 
+use assign::MAX_FRAMES;
 use cost_map::CostMap;
 use frame::Frame;
+use lapses::FIRST_PATIENCE;
 use worker::{PING_EVERY, Service, Worker};
 
+/// What a band of tiles costs however few of its rows are traced, as a share of the whole: measured, see
+/// [`CostProfile`](crate::simulator::CostProfile).
+const TILE_SHARE: f64 = 0.38;
+/// What each finished lease leaves of an earlier surprise...
+const SURPRISE_MEMORY: f64 = 0.98;
+/// ...and how large one may be.
+const MAX_SURPRISE: f64 = 10.0;
+/// What is known of a worker's speed halves its weight in the time of a frame, and at least in this.
+const SHORTEST_HALF_LIFE: Duration = Duration::from_millis(100);
 /// A scheduler that has workers and has not been woken for this long was asleep itself: the silence was its own.
 const AWAY: Duration = PING_EVERY.saturating_mul(2);
 
@@ -54,6 +67,8 @@ pub struct Scheduler {
     policy: SegmentPolicy,
     max_segment_bytes: u64,
     tile_rows: u32,
+    tile_share: f64,
+    pipeline: bool,
     workers: BTreeMap<WorkerId, Worker>,
     /// Frames that have begun, oldest first.
     frames: VecDeque<Frame>,
@@ -62,6 +77,12 @@ pub struct Scheduler {
     costs: CostMap,
     actions: VecDeque<Action>,
     next_nonce: u64,
+    /// How long a worker may owe something without giving anything.
+    patience: Duration,
+    /// By what factor leases take longer than predicted, at worst and lately.
+    surprise: f64,
+    /// What the last frame took.
+    last_frame: Duration,
     /// When an idle worker may find a lease of somebody else worth repeating.
     recheck_at: Option<Duration>,
     handled_at: Duration,
@@ -83,15 +104,40 @@ impl Scheduler {
             policy,
             max_segment_bytes,
             tile_rows,
+            tile_share: TILE_SHARE,
+            pipeline: true,
             workers: BTreeMap::new(),
             frames: VecDeque::new(),
             waiting: None,
-            costs: CostMap::default(),
+            costs: CostMap::new(tile_rows, TILE_SHARE),
             actions: VecDeque::new(),
             next_nonce: 0,
+            patience: FIRST_PATIENCE,
+            surprise: 1.0,
+            last_frame: Duration::ZERO,
             recheck_at: None,
             handled_at: Duration::ZERO,
         }
+    }
+
+    /// Whether idle workers begin the next frame under `adaptive`; they do unless this says otherwise.
+    #[must_use]
+    pub fn with_pipeline(mut self, pipeline: bool) -> Self {
+        self.pipeline = pipeline;
+        self
+    }
+
+    /// What a band of tiles costs however few of its rows are traced, as a share of the whole.
+    #[must_use]
+    pub fn with_tile_share(mut self, share: f64) -> Self {
+        self.tile_share = share;
+        self.costs = CostMap::new(self.tile_rows, share);
+        self
+    }
+
+    /// Frames in flight at most. The seed knows one.
+    fn max_frames(&self) -> usize {
+        if self.pipeline && self.policy == SegmentPolicy::Adaptive { MAX_FRAMES } else { 1 }
     }
 
     /// Takes note of an event and decides what follows from it.
@@ -111,9 +157,14 @@ impl Scheduler {
             Event::SegmentDone { worker, lease, cost } => self.segment_done(now, worker, lease, cost),
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
             Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
-            Event::Heard { worker } => self.heard(now, worker),
-            Event::Woken => self.check_pulses(now),
+            Event::Heard { worker } => self.fed(now, worker),
+            Event::Woken => {
+                self.check_pulses(now);
+                self.dismiss_stuck(now);
+            }
         }
+        self.take_overdue(now);
+        self.fail_frames();
         self.complete_frames();
         self.assign(now);
         self.dismiss_drained();
@@ -129,7 +180,9 @@ impl Scheduler {
     pub fn poll_timeout(&self) -> Option<Duration> {
         let pulses = self.workers.values().flat_map(|worker| {
             let pulse = worker.ping_at().min(worker.lost_at());
-            [Some(pulse), worker.rested_at(self.handled_at), worker.suspect_at(self.handled_at)]
+            let stuck = worker.waited_for_since().map(|since| since + self.patience);
+            let (rested, suspect) = (worker.rested_at(self.handled_at), worker.suspect_at(self.handled_at));
+            [Some(pulse), stuck, rested, suspect, worker.overdue_at()]
         });
         pulses.chain([self.recheck_at]).flatten().min()
     }
@@ -139,8 +192,39 @@ impl Scheduler {
         if self.newest().is_some_and(|(width, height)| (width, height) != (request.width, request.height)) {
             self.drop_frames(request.frame);
         }
+        self.supersede_newest();
         if let Some(replaced) = self.waiting.replace(request) {
             self.actions.push_back(Action::FrameDropped { frame: replaced.frame });
+        }
+        if self.frames.is_empty() {
+            self.begin_waiting();
+        }
+    }
+
+    /// The latest camera wins: the frame that idle workers have begun ahead of time gives way to a newer one while
+    /// less than half of it is leased. The oldest frame never does, so that frames complete however fast the camera
+    /// moves.
+    fn supersede_newest(&mut self) {
+        let newest = self.frames.back().filter(|frame| {
+            self.frames.len() > 1 && u64::from(frame.rows_leased()) * 2 < u64::from(frame.height)
+        });
+        if let Some(frame) = newest.map(|frame| frame.id) {
+            self.actions.push_back(Action::FrameDropped { frame });
+            self.forget_frame(frame);
+        }
+    }
+
+    /// Takes a frame out of flight. Workers that hold nothing else are told at once, the others when they may be: a
+    /// cancellation names the first frame that is still wanted.
+    fn forget_frame(&mut self, frame: FrameId) {
+        self.frames.retain(|known| known.id != frame);
+        let before = FrameId(frame.0.saturating_add(1));
+        let is_oldest = self.frames.front().is_none_or(|oldest| oldest.id > frame);
+        for (&worker, known) in &mut self.workers {
+            if known.forget(frame) && (is_oldest || known.leases.is_empty() && known.owed.is_empty()) {
+                known.stale = false;
+                self.actions.push_back(Action::Cancel { worker, before });
+            }
         }
         if self.frames.is_empty() {
             self.begin_waiting();
@@ -178,23 +262,17 @@ impl Scheduler {
     }
 
     fn segment_done(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) {
-        let Some((held, work)) = self.workers.get_mut(&id).and_then(|worker| worker.finish(now, lease, cost))
-        else {
-            return;
-        };
+        let half_life = self.last_frame.max(SHORTEST_HALF_LIFE);
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let last_done_at = worker.last_done_at();
+        let Some((held, work)) = worker.finish(now, lease, cost, half_life) else { return };
+        let surprise = held.surprise(now, last_done_at).unwrap_or(1.0).clamp(1.0, MAX_SURPRISE);
+        self.surprise = surprise.max(1.0 + (self.surprise - 1.0) * SURPRISE_MEMORY);
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
-        frame.finish(held.lease.segment, cost);
-        if let Some(work) = work {
+        let is_news = frame.finish(&lease, cost);
+        if let Some(work) = work.filter(|_| is_news) {
             self.costs.learn(lease.first_row..lease.first_row + lease.row_count, work);
         }
-    }
-
-    /// A worker cannot render: its leases go to others, and it rests before it is tried again.
-    fn worker_failed(&mut self, now: Duration, id: WorkerId, frame: FrameId) {
-        let in_flight = self.frames.iter().any(|known| known.id == frame);
-        let Some(worker) = self.workers.get_mut(&id).filter(|_| in_flight) else { return };
-        worker.fail(now);
-        self.take_leases(id);
     }
 
     /// Changes whether a worker gets leases. One that drains goes on draining: it has been told already.
@@ -229,29 +307,16 @@ impl Scheduler {
         }
     }
 
-    fn heard(&mut self, now: Duration, id: WorkerId) {
+    fn fed(&mut self, now: Duration, id: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&id) {
-            worker.heard(now);
-        }
-    }
-
-    /// Pings those who are due and dismisses those who have been silent for too long.
-    fn check_pulses(&mut self, now: Duration) {
-        for id in self.ids_of(|worker| worker.lost_at() <= now) {
-            let limit_s = worker::SILENCE_LIMIT.as_secs();
-            self.dismiss(id, format!("it has given no sign of life for {limit_s} s"), Return::Welcome);
-        }
-        for (&worker, known) in self.workers.iter_mut().filter(|(_, known)| known.ping_at() <= now) {
-            known.pinged(now, self.next_nonce);
-            self.actions.push_back(Action::Ping { worker, nonce: self.next_nonce });
-            self.next_nonce += 1;
+            worker.fed(now);
         }
     }
 
     /// After a pause of its own (a suspended machine, a debugger) it has nobody's silence to complain about.
     fn excuse_own_absence(&mut self, now: Duration) {
         if now.saturating_sub(self.handled_at) > AWAY {
-            self.workers.values_mut().for_each(|worker| worker.heard(now));
+            self.workers.values_mut().for_each(|worker| worker.excuse(now));
         }
         self.handled_at = now;
     }
@@ -268,20 +333,18 @@ impl Scheduler {
 
     /// Takes all leases from a worker; its rows go to the front of the queue, in order.
     fn take_leases(&mut self, id: WorkerId) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        for (frame, segment) in std::mem::take(&mut worker.leases).into_keys().rev() {
-            if let Some(frame) = self.frames.iter_mut().find(|known| known.id == frame) {
-                frame.give_up(segment, id);
-            }
-        }
+        let taken = self.workers.get_mut(&id).map(Worker::take_all).unwrap_or_default();
+        self.requeue(id, taken.into_keys().collect());
     }
 
     /// Reports complete frames, oldest first, and lets the next one begin.
     fn complete_frames(&mut self) {
         while let Some(frame) = self.frames.pop_front_if(|frame| frame.is_complete()) {
-            self.costs.normalise();
-            self.cancel_leases(FrameId(frame.id.0.saturating_add(1)));
+            self.costs.fold();
+            let next = FrameId(frame.id.0.saturating_add(1));
+            self.cancel_leases(self.frames.front().map_or(next, |frame| frame.id));
             let elapsed = self.handled_at.saturating_sub(frame.started_at.unwrap_or(self.handled_at));
+            self.last_frame = elapsed;
             self.actions.push_back(Action::FrameDone { frame: frame.id, cost: frame.cost, elapsed });
             if self.frames.is_empty() {
                 self.begin_waiting();
@@ -292,9 +355,7 @@ impl Scheduler {
     /// Frees everybody who still renders for a frame before `before`.
     fn cancel_leases(&mut self, before: FrameId) {
         for (&worker, known) in &mut self.workers {
-            let held = known.leases.len();
-            known.leases.retain(|&(frame, _), _| frame >= before);
-            if known.leases.len() < held {
+            if known.cancel(before) {
                 self.actions.push_back(Action::Cancel { worker, before });
             }
         }

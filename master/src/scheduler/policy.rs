@@ -8,7 +8,7 @@ use super::frame::Run;
 /// Leases that a worker holds under the seed's policies: one to render and one to go on with.
 pub(super) const SEED_WINDOW: usize = 2;
 /// Leases that a worker ever holds.
-pub(super) const MAX_WINDOW: usize = 8;
+pub(super) const MAX_WINDOW: usize = 64;
 
 /// How a frame is cut into segments. Written `static:ROWS`, `smart:ROWS` or `adaptive` on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -38,19 +38,6 @@ impl SegmentPolicy {
         };
         (0..height).step_by(rows as usize).map(move |first| Run::new(first, rows.min(height - first)))
     }
-}
-
-/// Leases under `adaptive`: enough to render while the next one is on its way, at least two.
-pub(super) fn adaptive_window(round_trip_s: f64, segment_s: f64) -> usize {
-    let on_the_way = (round_trip_s / segment_s).ceil();
-    // A float converts saturating, and a NaN to 0.
-    (1 + on_the_way as usize).clamp(2, MAX_WINDOW)
-}
-
-/// Rows of which a segment under `adaptive` is a multiple: a tile's, or fewer when the frame is too small for
-/// everybody to get one.
-pub(super) fn adaptive_step(height: u32, workers: u32, tile_rows: u32) -> u32 {
-    (height / workers.saturating_mul(2).max(1)).clamp(1, tile_rows.max(1))
 }
 
 impl FromStr for SegmentPolicy {
@@ -92,18 +79,6 @@ mod tests {
         assert_eq!(counts(SegmentPolicy::Static(10), 25, 9), [9, 9, 7]);
         assert_eq!(counts(SegmentPolicy::Adaptive, 25, 9), [25]);
         assert_eq!(counts(SegmentPolicy::Adaptive, 0, 9), [] as [u32; 0]);
-    }
-
-    #[test]
-    fn the_window_follows_the_round_trip() {
-        assert_eq!([0.0, 0.004, 0.01, 1.0, f64::NAN].map(|rtt| adaptive_window(rtt, 0.002)), [2, 3, 6, 8, 2]);
-    }
-
-    #[test]
-    fn small_frames_are_cut_finer_than_tiles() {
-        let step =
-            |tile_rows| [(768, 7), (100, 10), (3, 4), (100, 0)].map(|(h, n)| adaptive_step(h, n, tile_rows));
-        assert_eq!([step(8), step(16), step(0)], [[8, 5, 1, 8], [16, 5, 1, 16], [1; 4]]);
     }
 
     #[test]

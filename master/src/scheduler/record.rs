@@ -76,7 +76,7 @@ impl Scheduler {
         self.workers.iter().map(|(&worker, known)| WorkerRecord {
             worker,
             segments_done: known.segments_done,
-            speed: known.speed.delivered().unwrap_or(0.0),
+            speed: known.speed.value().unwrap_or(0.0),
             state: known.state(self.handled_at),
         })
     }

@@ -64,6 +64,7 @@ fn spoken(action: &Action) -> String {
             format!("finished {} after {} ms, {} rays", frame.0, elapsed.as_millis(), cost.primary)
         }
         Action::FrameDropped { frame } => format!("forget {}", frame.0),
+        Action::FrameFailed { frame } => format!("give up {}", frame.0),
         Action::Announce { worker, frame } => format!("{}: frame {}", worker.0, frame.0),
         Action::Grant { worker, lease } => {
             let Lease { frame, segment, attempt, first_row, row_count } = lease;

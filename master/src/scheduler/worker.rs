@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use super::speed::{Observation, Speed};
 use super::{Cost, FrameId, Lease};
 
 /// A worker is asked for a sign of life this often.
@@ -15,8 +16,14 @@ const SUSPICION: Duration = Duration::from_secs(1);
 const FIRST_REST: Duration = Duration::from_secs(1);
 /// The longest rest.
 const LONGEST_REST: Duration = Duration::from_secs(30);
-/// What one more observation leaves of the ones before it.
-const SPEED_MEMORY: f64 = 0.75;
+/// The first rest of a worker that was late; doubled with each time in a row.
+const FIRST_LATE_REST: Duration = Duration::from_millis(250);
+/// A lease is overdue when it takes longer than predicted by what it was predicted to take, and at least by this.
+const LEAST_SLACK: Duration = Duration::from_millis(5);
+/// And by so many frames...
+const SLACK_FRAMES: f64 = 0.75;
+/// ...and round trips.
+const SLACK_ROUND_TRIPS: f64 = 4.0;
 
 /// A promise of rows, as kept by the scheduler.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +34,17 @@ pub(super) struct Held {
     pub(super) work: f64,
     /// When the pixels should be here; `None` while nothing is known of the worker's speed.
     pub(super) expected_at: Option<Duration>,
+    /// When they are so late that others are given the rows.
+    pub(super) deadline: Option<Duration>,
+}
+
+impl Held {
+    /// By what factor it took longer than predicted, done at `now` by a worker that was busy until `busy_until`.
+    pub(super) fn surprise(&self, now: Duration, busy_until: Duration) -> Option<f64> {
+        let begun = self.granted_at.max(busy_until);
+        let predicted = self.expected_at?.checked_sub(begun)?.as_secs_f64();
+        (predicted > 0.0).then(|| now.saturating_sub(begun).as_secs_f64() / predicted)
+    }
 }
 
 /// What somebody wants of a worker.
@@ -45,6 +63,10 @@ pub(super) enum Service {
 pub(super) struct Worker {
     pub(super) threads: u32,
     pub(super) leases: BTreeMap<(FrameId, u32), Held>,
+    /// Leases that were taken from it because they were overdue: its answer is still welcome.
+    pub(super) owed: BTreeMap<(FrameId, u32), Held>,
+    /// Whether it renders rows of a frame that was given up meanwhile, and has yet to be told.
+    pub(super) stale: bool,
     /// The newest frames it has been told of; two are in flight at most.
     announced: [Option<FrameId>; 2],
     pub(super) service: Service,
@@ -60,35 +82,10 @@ pub(super) struct Worker {
     last_done_at: Duration,
     resting_until: Option<Duration>,
     failures: u32,
-}
-
-/// Work per second, as a ratio of two fading sums: segments that arrive in bunches do not make a worker look
-/// infinitely fast.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Speed {
-    work: f64,
-    /// Seconds during which the worker had something to do, on the master's clock.
-    busy: f64,
-    /// Seconds of tracing summed over its threads, as the worker says.
-    traced: f64,
-}
-
-impl Speed {
-    fn observe(&mut self, work: f64, busy: f64, traced: f64) {
-        for (sum, value) in [(&mut self.work, work), (&mut self.busy, busy), (&mut self.traced, traced)] {
-            *sum = *sum * SPEED_MEMORY + value;
-        }
-    }
-
-    /// Work per second including transfer and waiting; `None` before the first observation.
-    pub(super) fn delivered(&self) -> Option<f64> {
-        (self.work > 0.0 && self.busy > 0.0).then(|| self.work / self.busy)
-    }
-
-    /// Work per second of tracing alone.
-    fn traced(&self) -> Option<f64> {
-        (self.work > 0.0 && self.traced > 0.0).then(|| self.work / self.traced)
-    }
+    /// Times in a row that it was late.
+    lapses: u32,
+    /// Since when it owes something without having given anything.
+    waited_for_since: Option<Duration>,
 }
 
 impl Worker {
@@ -96,9 +93,11 @@ impl Worker {
         Self {
             threads: threads.max(1),
             leases: BTreeMap::new(),
+            owed: BTreeMap::new(),
+            stale: false,
             announced: [None; 2],
             service: Service::Active,
-            speed: Speed::default(),
+            speed: Speed::new(threads),
             segments_done: 0,
             round_trip: None,
             last_heard: now,
@@ -108,6 +107,8 @@ impl Worker {
             last_done_at: now,
             resting_until: None,
             failures: 0,
+            lapses: 0,
+            waited_for_since: None,
         }
     }
 
@@ -135,37 +136,133 @@ impl Worker {
         true
     }
 
-    /// When the leases it holds should all be here.
-    pub(super) fn expected_free_at(&self, now: Duration) -> Duration {
-        self.leases.values().filter_map(|held| held.expected_at).max().map_or(now, |at| at.max(now))
+    /// Writes a lease down.
+    pub(super) fn hold(&mut self, now: Duration, held: Held) {
+        self.leases.insert((held.lease.frame, held.lease.segment), held);
+        self.waited_for_since.get_or_insert(now);
     }
 
-    /// Takes a finished lease off its list. Returns it with the work it turned out to be, if that can be told.
-    pub(super) fn finish(&mut self, now: Duration, lease: Lease, cost: Cost) -> Option<(Held, Option<f64>)> {
+    /// Takes a finished lease off its list, or off the list of what it owes. Returns it with the work it turned out to
+    /// be, if that can be told.
+    pub(super) fn finish(
+        &mut self,
+        now: Duration,
+        lease: Lease,
+        cost: Cost,
+        half_life: Duration,
+    ) -> Option<(Held, Option<f64>)> {
         let key = (lease.frame, lease.segment);
-        let held = *self.leases.get(&key).filter(|held| held.lease == lease)?;
-        self.leases.remove(&key);
+        let is_held = self.leases.get(&key).is_some_and(|held| held.lease == lease);
+        let list = if is_held { &mut self.leases } else { &mut self.owed };
+        let held = *list.get(&key).filter(|held| held.lease == lease)?;
+        list.remove(&key);
         self.heard(now);
-        (self.failures, self.resting_until) = (0, None);
-        let measured = self.measure(now, &held, cost);
+        (self.failures, self.lapses, self.resting_until) = (0, 0, None);
+        let measured = self.measure(now, &held, cost, half_life);
         self.segments_done += 1;
         self.last_done_at = now;
+        self.waited_for_since = (!self.leases.is_empty() || !self.owed.is_empty()).then_some(now);
         Some((held, measured))
     }
 
-    /// The work a segment turned out to be. A worker's first segment says nothing: it waited for the scene.
-    fn measure(&mut self, now: Duration, held: &Held, cost: Cost) -> Option<f64> {
-        if self.segments_done == 0 {
-            return None;
-        }
+    /// The work that a segment turned out to be, on the scale of this worker's earlier ones.
+    fn measure(&mut self, now: Duration, held: &Held, cost: Cost, half_life: Duration) -> Option<f64> {
         let held_for = now.saturating_sub(held.granted_at).as_secs_f64();
-        let busy = now.saturating_sub(held.granted_at.max(self.last_done_at)).as_secs_f64();
         // No thread has traced for longer than the lease was held.
         let traced =
             Duration::from_nanos(cost.trace_ns).as_secs_f64().min(held_for * f64::from(self.threads));
-        let work = self.speed.traced().map(|rate| rate * traced).filter(|&work| work > 0.0);
-        self.speed.observe(held.work, busy, traced);
+        let work = self.speed.of_thread().map(|rate| rate * traced).filter(|&work| work > 0.0);
+        // Its first segment waited for the scene, and one that it was given while it was idle for the network.
+        let had_work = self.segments_done > 0 && held.granted_at < self.last_done_at;
+        let busy = had_work.then(|| now.saturating_sub(self.last_done_at).as_secs_f64());
+        self.speed.observe(Observation { work: held.work, traced, busy }, half_life);
         work
+    }
+
+    /// How late it may be with a lease that takes so long, where predictions have lately been wrong by a factor of
+    /// `surprise` and a frame is complete every so often. Three quarters of a frame late is soon enough to act, whatever was
+    /// predicted.
+    pub(super) fn slack(&self, takes: Duration, surprise: f64, every: Duration) -> Duration {
+        let network = SLACK_ROUND_TRIPS * self.round_trip.unwrap_or(0.0);
+        let slack = Duration::try_from_secs_f64(network.max(takes.as_secs_f64() * surprise));
+        slack.unwrap_or(Duration::MAX).max(every.mul_f64(SLACK_FRAMES)).max(LEAST_SLACK)
+    }
+
+    /// When it gave its last answer, or joined.
+    pub(super) fn last_done_at(&self) -> Duration {
+        self.last_done_at
+    }
+
+    /// When its first lease is overdue.
+    pub(super) fn overdue_at(&self) -> Option<Duration> {
+        self.leases.values().filter_map(|held| held.deadline).min()
+    }
+
+    /// It is late: what it holds is taken from it, and it rests, unless it answers. Returns what it held.
+    pub(super) fn lapse(&mut self, now: Duration) -> Vec<(FrameId, u32)> {
+        if let Some(first) = self.leases.values().min_by_key(|held| held.deadline.unwrap_or(Duration::MAX)) {
+            let since = first.granted_at.max(self.last_done_at);
+            self.speed.miss(first.work, now.saturating_sub(since).as_secs_f64());
+        }
+        let rest = FIRST_LATE_REST.saturating_mul(1 << self.lapses.min(7)).min(LONGEST_REST);
+        self.lapses = self.lapses.saturating_add(1);
+        self.resting_until = self.resting_until.max(Some(now + rest));
+        let taken = std::mem::take(&mut self.leases);
+        let keys = taken.keys().copied().collect();
+        self.owed.extend(taken);
+        keys
+    }
+
+    /// Since when it owes something without having given anything.
+    pub(super) fn waited_for_since(&self) -> Option<Duration> {
+        self.waited_for_since
+    }
+
+    /// Leases of frames before `before` are of no use any more. Whether it has to be told.
+    pub(super) fn cancel(&mut self, before: FrameId) -> bool {
+        let count = |worker: &Self| worker.leases.len() + worker.owed.len();
+        let held = count(self);
+        self.leases.retain(|&(frame, _), _| frame >= before);
+        self.owed.retain(|&(frame, _), _| frame >= before);
+        let left = count(self);
+        if left == 0 {
+            self.waited_for_since = None;
+        }
+        std::mem::take(&mut self.stale) || left < held
+    }
+
+    /// A frame is out of flight; whether it held some of it. It still renders that, until it is told.
+    pub(super) fn forget(&mut self, frame: FrameId) -> bool {
+        let held = self.leases.len() + self.owed.len();
+        self.leases.retain(|&(known, _), _| known != frame);
+        self.owed.retain(|&(known, _), _| known != frame);
+        let left = self.leases.len() + self.owed.len();
+        if left == 0 {
+            self.waited_for_since = None;
+        }
+        self.stale |= left < held;
+        left < held
+    }
+
+    /// Nobody listened for a while: what it has not said does not count against it.
+    pub(super) fn excuse(&mut self, now: Duration) {
+        self.fed(now);
+        for held in self.leases.values_mut() {
+            (held.expected_at, held.deadline) = (None, None);
+        }
+    }
+
+    /// Everything that it holds is taken from it for good.
+    pub(super) fn take_all(&mut self) -> BTreeMap<(FrameId, u32), Held> {
+        self.owed.clear();
+        self.waited_for_since = None;
+        std::mem::take(&mut self.leases)
+    }
+
+    /// Its master sends it what it has asked for.
+    pub(super) fn fed(&mut self, now: Duration) {
+        self.heard(now);
+        self.waited_for_since = self.waited_for_since.map(|_| now);
     }
 
     pub(super) fn heard(&mut self, now: Duration) {
@@ -196,16 +293,18 @@ impl Worker {
         self.last_heard + SILENCE_LIMIT
     }
 
-    /// It cannot render: it rests, longer each time, and is told of its frames anew afterwards.
-    pub(super) fn fail(&mut self, now: Duration) {
+    /// It cannot render: it rests, longer each time, and is told of its frames anew afterwards. Whether this is news: it
+    /// is not while it rests.
+    pub(super) fn fail(&mut self, now: Duration) -> bool {
         self.heard(now);
         if self.resting_until.is_some_and(|until| until > now) {
-            return;
+            return false;
         }
         let rest = FIRST_REST.saturating_mul(1 << self.failures.min(5)).min(LONGEST_REST);
         self.failures = self.failures.saturating_add(1);
         self.resting_until = Some(now + rest);
         self.announced = [None; 2];
+        true
     }
 
     /// When its rest ends, if it rests.
@@ -222,30 +321,42 @@ mod tests {
 
     fn hold(worker: &mut Worker, segment: u32, at: Duration) -> Lease {
         let lease = Lease { frame: FrameId(1), segment, attempt: 0, first_row: segment * 8, row_count: 8 };
-        let held = Held { lease, granted_at: at, work: 8.0, expected_at: None };
-        worker.leases.insert((lease.frame, segment), held);
+        let held = Held { lease, granted_at: at, work: 8.0, expected_at: None, deadline: Some(at + SECOND) };
+        worker.hold(at, held);
         lease
     }
 
     #[test]
-    fn speed_is_work_over_busy_time_without_the_first_segment() {
+    fn what_arrives_slower_than_it_is_traced_counts_as_it_arrives() {
         let mut worker = Worker::new(1, Duration::ZERO);
         let leases = [0, 1, 2].map(|segment| hold(&mut worker, segment, Duration::ZERO));
         let cost = Cost { trace_ns: 1_000_000_000, ..Cost::default() };
-        assert!(worker.finish(SECOND * 20, leases[0], cost).is_some());
-        assert_eq!(worker.speed.delivered(), None);
-        worker.finish(SECOND * 22, leases[1], cost);
-        worker.finish(SECOND * 24, leases[2], cost);
-        assert_eq!(worker.speed.delivered(), Some(4.0));
+        worker.finish(SECOND * 20, leases[0], cost, SECOND);
+        assert_eq!(worker.speed.value(), Some(8.0), "its first segment waited for the scene");
+        worker.finish(SECOND * 22, leases[1], cost, SECOND);
+        worker.finish(SECOND * 24, leases[2], cost, SECOND);
+        assert!((worker.speed.value().unwrap() - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn who_is_late_rests_until_it_answers() {
+        let mut worker = Worker::new(1, Duration::ZERO);
+        let lease = hold(&mut worker, 0, Duration::ZERO);
+        assert_eq!(worker.overdue_at(), Some(SECOND));
+        assert_eq!(worker.lapse(SECOND), [(FrameId(1), 0)]);
+        assert!(!worker.is_ready(SECOND) && worker.overdue_at().is_none());
+        assert_eq!(worker.waited_for_since(), Some(Duration::ZERO));
+        assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
+        assert!(worker.is_ready(SECOND) && worker.waited_for_since().is_none());
     }
 
     #[test]
     fn a_lease_is_finished_once_and_only_as_granted() {
         let mut worker = Worker::new(1, Duration::ZERO);
         let lease = hold(&mut worker, 0, Duration::ZERO);
-        assert!(worker.finish(SECOND, Lease { attempt: 1, ..lease }, Cost::default()).is_none());
-        assert!(worker.finish(SECOND, lease, Cost::default()).is_some());
-        assert!(worker.finish(SECOND, lease, Cost::default()).is_none());
+        assert!(worker.finish(SECOND, Lease { attempt: 1, ..lease }, Cost::default(), SECOND).is_none());
+        assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
+        assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_none());
     }
 
     #[test]
@@ -261,7 +372,7 @@ mod tests {
         }
         assert_eq!(rests, [1, 2, 4, 8, 16, 30, 30]);
         let lease = hold(&mut worker, 0, now);
-        worker.finish(now, lease, Cost::default());
+        worker.finish(now, lease, Cost::default(), SECOND);
         worker.fail(now);
         assert_eq!(worker.rested_at(now), Some(now + SECOND));
     }

@@ -1,0 +1,88 @@
+//! Rendering a segment twice: when that is predicted to finish a frame earlier, and nothing else is to be done.
+
+use std::time::Duration;
+
+use super::adaptive::{Crew, seconds};
+use super::{FrameId, Lease, Scheduler, WorkerId};
+
+/// Workers that render the same segment at most.
+const MAX_COPIES: usize = 3;
+
+/// A segment that others render.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    frame: FrameId,
+    segment: u32,
+    copies: usize,
+}
+
+impl Scheduler {
+    /// The seed's rule: the oldest segment that the fewest render, at once.
+    pub(super) fn any_copy(&mut self, id: WorkerId) -> Option<Lease> {
+        let best = self.copyable(id).min_by_key(|known| (known.frame, known.copies, known.segment))?;
+        self.frames.iter_mut().find(|known| known.id == best.frame)?.copy(best.segment, id)
+    }
+
+    /// The policy adaptive's: idle workers, the fastest first, repeat what they are predicted to finish earlier.
+    pub(super) fn copy_for_the_idle(&mut self, now: Duration, crew: &mut Crew) {
+        while let Some((id, speed, round_trip)) = crew.fastest_idle() {
+            let mut best: Option<(Duration, Candidate)> = None;
+            let mut recheck: Option<Duration> = None;
+            for known in self.copyable(id) {
+                match self.worth_copying_at(now, known, speed, round_trip) {
+                    (at, gain) if at <= now => {
+                        if best.is_none_or(|(most, _)| gain > most) {
+                            best = Some((gain, known));
+                        }
+                    }
+                    (at, _) => recheck = recheck.min(Some(at)).or(Some(at)),
+                }
+            }
+            self.recheck_at = recheck;
+            let Some((_, Candidate { frame, segment, .. })) = best else { return };
+            let frame = self.frames.iter_mut().find(|known| known.id == frame);
+            let Some(lease) = frame.and_then(|frame| frame.copy(segment, id)) else { return };
+            self.grant(now, id, lease, Some(&mut *crew));
+        }
+    }
+
+    /// Unfinished segments that a worker does not render yet.
+    fn copyable(&self, id: WorkerId) -> impl Iterator<Item = Candidate> {
+        let segments =
+            self.frames.iter().flat_map(|frame| frame.segments.iter().map(|(n, s)| (frame.id, *n, s)));
+        let open = segments.filter(move |(_, _, segment)| {
+            !segment.done && segment.holders.len() < MAX_COPIES && !segment.holders.contains(&id)
+        });
+        open.map(|(frame, segment, s)| Candidate { frame, segment, copies: s.holders.len() })
+    }
+
+    /// From when on it pays to render a segment once more, and how much earlier it would be done: at once, if that is
+    /// predicted to finish it earlier (or if nothing can be predicted); otherwise when its holder is late by as much as
+    /// it takes.
+    fn worth_copying_at(
+        &self,
+        now: Duration,
+        known: Candidate,
+        speed: Option<f64>,
+        round_trip: f64,
+    ) -> (Duration, Duration) {
+        let key = (known.frame, known.segment);
+        let frame = self.frames.iter().find(|frame| frame.id == known.frame);
+        let holders = frame.and_then(|frame| frame.segments.get(&known.segment)).map(|s| &s.holders);
+        // Those who may have died without a word do not count.
+        let holders = holders.into_iter().flatten().filter_map(|holder| self.workers.get(holder));
+        let held = holders.filter(|worker| !worker.is_suspect(now)).filter_map(|w| w.leases.get(&key));
+        let expected =
+            held.map(|held| (held.expected_at, held.work)).min_by_key(|(at, _)| at.unwrap_or(Duration::MAX));
+        let (Some((Some(expected_at), work)), Some(speed)) = (expected, speed) else {
+            return (now, Duration::MAX);
+        };
+        let takes = seconds(round_trip + work / speed);
+        let done_at = now.saturating_add(takes);
+        if done_at < expected_at {
+            (now, expected_at - done_at)
+        } else {
+            (expected_at.saturating_add(takes), takes)
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! A simulated worker: its queue of leases, its threads, and what may be wrong with it.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use super::clock::Down;
+use super::link::{Lane, Order};
+use crate::scheduler::{FrameId, Lease};
+
+/// Rows that one thread takes at a time end on multiples of this: the tracer's tile.
+pub(crate) const BAND_ROWS: u32 = 16;
+
+/// A machine.
+#[derive(Debug)]
+pub(crate) struct Machine {
+    /// Work a second of all threads together.
+    pub(crate) speed: f64,
+    pub(crate) latency: u64,
+    pub(crate) threads: Vec<Option<Band>>,
+    queue: VecDeque<Job>,
+    pub(crate) ailment: Ailment,
+    /// What it was sent while it stood still.
+    pub(crate) unread: Vec<Down>,
+    /// Threads that finished while it stood still.
+    pub(crate) unfinished: Vec<usize>,
+    pub(crate) up: Lane,
+    pub(crate) up_order: Order,
+    pub(crate) down_order: Order,
+}
+
+/// What is wrong with a machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Ailment {
+    Healthy,
+    /// So many times slower than it should be.
+    Slow(f64),
+    /// It stands still, as a stopped process, or as one beyond a network that is cut: it goes on later.
+    Stopped,
+    /// It answers pings and never a lease.
+    Stuck,
+    /// It is gone, and nobody was told: the connection is half open.
+    Vanished,
+}
+
+/// A lease that it was given.
+#[derive(Debug)]
+struct Job {
+    lease: Lease,
+    next_row: u32,
+    rows_done: u32,
+    traced: u64,
+}
+
+/// Rows that a thread traces.
+#[derive(Clone, Debug)]
+pub(crate) struct Band {
+    pub(crate) lease: Lease,
+    pub(crate) rows: Range<u32>,
+    pub(crate) nanoseconds: u64,
+    /// The speed at which they are traced.
+    pub(crate) speed: f64,
+    /// Whether the lease was cancelled meanwhile.
+    pub(crate) stale: bool,
+}
+
+impl Machine {
+    pub(crate) fn new(speed: f64, threads: u32, latency: u64) -> Self {
+        Self {
+            speed,
+            latency,
+            threads: vec![None; threads.max(1) as usize],
+            queue: VecDeque::new(),
+            ailment: Ailment::Healthy,
+            unread: Vec::new(),
+            unfinished: Vec::new(),
+            up: Lane::default(),
+            up_order: Order::default(),
+            down_order: Order::default(),
+        }
+    }
+
+    /// Work a second of one thread, now.
+    pub(crate) fn thread_speed(&self) -> f64 {
+        let full = self.speed / self.threads.len() as f64;
+        if let Ailment::Slow(times) = self.ailment { full / times } else { full }
+    }
+
+    pub(crate) fn lease(&mut self, lease: Lease) {
+        self.queue.push_back(Job { lease, next_row: lease.first_row, rows_done: 0, traced: 0 });
+    }
+
+    /// Forgets leases of frames before `before`; threads finish the bands they are at.
+    pub(crate) fn cancel(&mut self, before: FrameId) {
+        self.queue.retain(|job| job.lease.frame >= before);
+        for band in self.threads.iter_mut().flatten() {
+            band.stale |= band.lease.frame < before;
+        }
+    }
+
+    pub(crate) fn idle_thread(&self) -> Option<usize> {
+        self.threads.iter().position(Option::is_none)
+    }
+
+    /// The next rows that no thread has, of the earliest lease.
+    pub(crate) fn next_band(&mut self) -> Option<(Lease, Range<u32>)> {
+        let job =
+            self.queue.iter_mut().find(|job| job.next_row < job.lease.first_row + job.lease.row_count)?;
+        let end = job.lease.first_row + job.lease.row_count;
+        let stop = (job.next_row + 1).next_multiple_of(BAND_ROWS).min(end);
+        let rows = job.next_row..stop;
+        job.next_row = stop;
+        Some((job.lease, rows))
+    }
+
+    /// Takes a finished band; the whole lease and the nanoseconds it took, if it was the last one.
+    pub(crate) fn finish(&mut self, band: &Band) -> Option<(Lease, u64)> {
+        let job = self.queue.iter_mut().find(|job| job.lease == band.lease)?;
+        job.rows_done += band.rows.end - band.rows.start;
+        job.traced += band.nanoseconds;
+        let done = (job.lease, job.traced);
+        if job.rows_done < job.lease.row_count {
+            return None;
+        }
+        self.queue.retain(|job| job.lease != band.lease);
+        Some(done)
+    }
+}
