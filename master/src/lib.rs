@@ -18,6 +18,7 @@ mod local_workers;
 mod logging;
 mod orbit;
 mod output;
+mod plot;
 mod progress;
 mod report;
 mod roster;

@@ -3,6 +3,7 @@
 mod bench;
 mod compile;
 mod interrupt;
+mod plot;
 mod render;
 mod source;
 mod view;
@@ -20,6 +21,7 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Render(args) => render::run(args),
         Command::Compile(args) => compile::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Plot(args) => plot::run(&args),
     }
 }
 
