@@ -27,7 +27,7 @@ impl Scale {
     /// # Errors
     /// No value; one that is not finite; one that is not positive on a logarithmic axis.
     pub(super) fn of(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Result<Self, PlotError> {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let (mut low, mut high, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
         for value in values {
             if !value.is_finite() || (axis.logarithmic && value <= 0.0) {
                 let kind = if axis.logarithmic { "logarithmic axis" } else { "axis" };
@@ -36,30 +36,35 @@ impl Scale {
                     axis.label
                 )));
             }
-            (low, high) = (low.min(value), high.max(value));
+            (low, high, whole) = (low.min(value), high.max(value), whole && value.fract() == 0.0);
         }
         if low > high {
             return Err(PlotError::Chart("there is nothing to plot: no row has both values".to_owned()));
         }
-        Ok(if axis.logarithmic {
-            Self::logarithmic(low, high)
-        } else {
-            Self::linear(axis.from_zero, low, high)
+        let least_step = if whole { 1.0 } else { 0.0 };
+        Ok(match (axis.logarithmic, axis.from_zero) {
+            (true, _) => Self::logarithmic(low, high),
+            (false, true) => Self::from_zero(low.min(0.0), high.max(0.0), least_step),
+            (false, false) => Self::linear(low, high, least_step),
         })
     }
 
     /// Ends on the numbers just outside the values.
-    fn linear(from_zero: bool, low: f64, high: f64) -> Self {
-        let (mut low, mut high) = if from_zero { (low.min(0.0), high.max(0.0)) } else { (low, high) };
-        if low == high {
-            let around = if low == 0.0 { 1.0 } else { low.abs() / 2.0 };
-            (low, high) = (low - around, high + around);
-        }
-        let step = round_step((high - low) / TICKS);
+    fn from_zero(low: f64, high: f64, least_step: f64) -> Self {
+        let high = if low == high { 1.0 } else { high };
+        let step = round_step((high - low) / TICKS).max(least_step);
         let (first, last) = ((low / step).floor(), (high / step).ceil());
-        let count = (last - first) as usize;
-        let ticks: Vec<f64> = (0..=count).map(|index| (first + index as f64) * step).collect();
+        let ticks = multiples(step, first, last);
         Self { logarithmic: false, low: first * step, high: last * step, ticks }
+    }
+
+    /// Ends a little outside the values.
+    fn linear(low: f64, high: f64, least_step: f64) -> Self {
+        let around = if low == high { low.abs().max(1.0) / 2.0 } else { (high - low) * 0.03 };
+        let (low, high) = (low - around, high + around);
+        let step = round_step((high - low) / TICKS).max(least_step);
+        let ticks = multiples(step, (low / step).ceil(), (high / step).floor());
+        Self { logarithmic: false, low, high, ticks }
     }
 
     /// Ends a little outside the values.
@@ -108,6 +113,12 @@ impl ValueFormatter<f64> for Scale {
     fn format_ext(&self, value: &f64) -> String {
         self.tick_text(*value)
     }
+}
+
+/// From `first` to `last` times `step`.
+fn multiples(step: f64, first: f64, last: f64) -> Vec<f64> {
+    let count = (last - first).max(0.0) as usize;
+    (0..=count).map(|index| (first + index as f64) * step).collect()
 }
 
 /// 1, 2 or 5 times a power of ten, at least `step`.

@@ -202,14 +202,18 @@ proptest! {
 #[test]
 fn numbers_along_an_axis_are_round() {
     let texts = |logarithmic, values: &[f64]| {
-        let axis = Axis { label: String::new(), logarithmic, from_zero: true };
+        // From zero where the first value is a fraction.
+        let axis = Axis { label: String::new(), logarithmic, from_zero: values[0].fract() != 0.0 };
         let scale = Scale::of(&axis, values.iter().copied()).unwrap();
         scale.ticks.iter().map(|tick| scale.tick_text(*tick)).collect::<Vec<_>>()
     };
-    assert_eq!(texts(false, &[3.0, 97.0]), ["0", "20", "40", "60", "80", "100"]);
+    assert_eq!(texts(false, &[1.0, 2.0]), ["1", "2"], "there are no fractions of a worker");
+    assert_eq!(texts(false, &[0.0, 499.0]), ["0", "100", "200", "300", "400", "500"]);
+    assert_eq!(texts(false, &[7.0]), ["4", "5", "6", "7", "8", "9", "10"]);
+    assert_eq!(texts(false, &[3.5, 97.0]), ["0", "20", "40", "60", "80", "100"]);
     assert_eq!(texts(false, &[0.7]), ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7"]);
     assert_eq!(texts(true, &[1.0, 256.0]), ["1", "2", "4", "8", "16", "32", "64", "128", "256"]);
     assert_eq!(texts(true, &[1.0, 1024.0]).last().unwrap(), "1,024");
     assert_eq!(texts(true, &[0.001, 100.0]), ["0.001", "0.01", "0.1", "1", "10", "100"]);
-    assert_eq!(texts(false, &[1_500_000.0])[1], "500,000");
+    assert_eq!(texts(false, &[1_500_000.5])[1], "500,000");
 }
