@@ -21,6 +21,7 @@ mod local_workers;
 mod logging;
 mod orbit;
 mod output;
+mod plot;
 mod progress;
 mod report;
 mod roster;

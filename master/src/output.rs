@@ -15,9 +15,14 @@ const MAX_PENDING: usize = 2;
 /// Digits in a number; more would only be zeroes.
 const MAX_DIGITS: usize = 18;
 
+/// The word in place of a file's name that has no picture written.
+const NONE: &str = "none";
+
 /// Where the frames of a run go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum OutputPattern {
+    /// Nowhere: they are rendered to be measured.
+    None,
     /// One file.
     Single(PathBuf),
     /// A file per frame, named `prefix`, the frame's number with at least `digits` digits, `suffix`.
@@ -34,11 +39,14 @@ pub(crate) enum OutputPattern {
 }
 
 impl OutputPattern {
-    /// Reads `picture.png` or `frame-%04d.png`, for a run of `frames` frames.
+    /// Reads `picture.png`, `frame-%04d.png` or `none`, for a run of `frames` frames.
     ///
     /// # Errors
     /// A name without a known extension, an unreadable `%`, or one name for many frames.
     pub(crate) fn parse(output: &Path, frames: u32) -> Result<Self, CommandError> {
+        if output == Path::new(NONE) {
+            return Ok(Self::None);
+        }
         let refuse =
             |problem: String| Err(CommandError::WrongInput(format!("{}: {problem}", output.display())));
         let known = output
@@ -65,12 +73,13 @@ impl OutputPattern {
         }
     }
 
-    /// The file of frame `index`, from 0.
-    pub(crate) fn path(&self, index: u64) -> PathBuf {
+    /// The file of frame `index`, from 0, if there shall be one.
+    pub(crate) fn path(&self, index: u64) -> Option<PathBuf> {
         match self {
-            Self::Single(path) => path.clone(),
+            Self::None => None,
+            Self::Single(path) => Some(path.clone()),
             Self::Sequence { folder, prefix, digits, suffix } => {
-                folder.join(format!("{prefix}{index:0digits$}{suffix}"))
+                Some(folder.join(format!("{prefix}{index:0digits$}{suffix}")))
             }
         }
     }
@@ -171,7 +180,7 @@ impl FrameWriter {
 
     /// Takes frame `index`; at most one for each time that the writer was ready.
     pub(crate) fn write(&mut self, index: u64, picture: RgbImage) {
-        let path = self.pattern.path(index);
+        let Some(path) = self.pattern.path(index) else { return };
         self.pending.push_back(tokio::task::spawn_blocking(move || image::save(&path, &picture)));
     }
 
@@ -219,10 +228,18 @@ mod tests {
     }
 
     #[test]
+    fn none_is_no_file() {
+        for frames in [1, 7] {
+            assert_eq!(parse("none", frames).unwrap().path(0), None);
+        }
+        assert_eq!(parse("none.png", 1), Ok(OutputPattern::Single("none.png".into())));
+    }
+
+    #[test]
     fn a_sequence_is_numbered_from_zero() {
         let names = |name: &str| {
             let pattern = parse(name, 2000).unwrap();
-            [0, 7, 12_345].map(|index| pattern.path(index).to_str().unwrap().to_owned())
+            [0, 7, 12_345].map(|index| pattern.path(index).unwrap().to_str().unwrap().to_owned())
         };
         assert_eq!(names("o/f-%04d.png"), ["o/f-0000.png", "o/f-0007.png", "o/f-12345.png"]);
         assert_eq!(names("%d.ppm"), ["0.ppm", "7.ppm", "12345.ppm"]);
@@ -231,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_numbered_name_is_numbered_for_one_frame_too() {
-        assert_eq!(parse("f%03d.png", 1).unwrap().path(0), Path::new("f000.png"));
+        assert_eq!(parse("f%03d.png", 1).unwrap().path(0).as_deref(), Some(Path::new("f000.png")));
     }
 
     #[test]

@@ -69,6 +69,12 @@ pub(super) fn listen_address(text: &str) -> Result<SocketAddr, String> {
     })
 }
 
+/// `workers=4`.
+pub(super) fn equation(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=').ok_or("expected COLUMN=TEXT, such as workers=4")?;
+    Ok((parts.0.to_owned(), parts.1.to_owned()))
+}
+
 fn whole_number<T>(text: &str, least: T, most: T) -> Result<T, String>
 where
     T: std::str::FromStr + PartialOrd + std::fmt::Display,

@@ -4,6 +4,7 @@ mod bench;
 mod compile;
 mod interrupt;
 mod oversight;
+mod plot;
 mod render;
 mod simulate;
 mod source;
@@ -23,6 +24,7 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Compile(args) => compile::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Plot(args) => plot::run(&args),
     }
 }
 

@@ -41,7 +41,7 @@ const MUSTER_LOOK: Duration = Duration::from_millis(2);
 /// interruption.
 pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let pattern = OutputPattern::parse(&args.output, args.frames)?;
-    check_writable(&pattern.path(0))?;
+    pattern.path(0).as_deref().map(check_writable).transpose()?;
     let source = Source::load(&args.scene)?;
     let view = source.view(&args.picture)?;
     let triangles = source.compiled()?.triangle_count();

@@ -1,0 +1,188 @@
+//! Series from CSV files with a first line of names.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use csv::StringRecord;
+
+use super::{Line, PlotError, Point, Series};
+
+/// More could not be told apart.
+const MAX_SERIES: usize = 24;
+/// Far more than a picture has pixels to show.
+const MAX_POINTS: usize = 1_000_000;
+
+/// Which columns say what.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Columns {
+    /// A number; an empty one makes the row's y a level.
+    pub(crate) x: String,
+    /// A number; rows where it is empty are left out.
+    pub(crate) y: String,
+    /// Rows that agree in all of these are one series.
+    pub(crate) series: Vec<String>,
+    /// Written beside points.
+    pub(crate) label: Option<String>,
+    /// Only rows where each of these columns has that text.
+    pub(crate) only: Vec<(String, String)>,
+    /// Points are not joined, and points of equal x are not put together.
+    pub(crate) scatter: bool,
+    /// Names of series that are dashed.
+    pub(crate) dashed: Vec<String>,
+}
+
+/// Reads all rows of all tables. The series are in the order in which the rows first name them; a column that has the same text
+/// in every row is not part of their names. Points of one series with the same x are repeats of one measurement: their median
+/// counts, and their spread is kept.
+///
+/// # Errors
+/// Unreadable files, missing columns, text in place of numbers, too many series or points.
+pub(crate) fn read_series(tables: &[PathBuf], columns: &Columns) -> Result<Vec<Series>, PlotError> {
+    let mut rows = Vec::new();
+    for path in tables {
+        read_table(path, columns, &mut rows)
+            .map_err(|problem| PlotError::Table { path: path.clone(), problem })?;
+    }
+    let mut groups: Vec<(Vec<String>, Vec<Row>)> = Vec::new();
+    for row in rows {
+        match groups.iter().position(|(key, _)| *key == row.key) {
+            Some(index) => groups[index].1.push(row),
+            None => groups.push((row.key.clone(), vec![row])),
+        }
+        if groups.len() > MAX_SERIES {
+            return Err(PlotError::Chart(format!(
+                "more than {MAX_SERIES} series: leave some out with --where, or name other columns"
+            )));
+        }
+    }
+    let telling = telling_columns(&groups);
+    Ok(groups.into_iter().map(|(key, rows)| series(&key, &telling, rows, columns)).collect())
+}
+
+struct Row {
+    key: Vec<String>,
+    x: Option<f64>,
+    y: f64,
+    label: Option<String>,
+}
+
+/// Columns by their places in a row.
+struct Places {
+    x: usize,
+    y: usize,
+    series: Vec<usize>,
+    label: Option<usize>,
+    only: Vec<(usize, String)>,
+}
+
+impl Places {
+    fn find(columns: &Columns, header: &StringRecord) -> Result<Self, String> {
+        let place = |name: &String| {
+            header.iter().position(|column| column == name).ok_or_else(|| {
+                let known: Vec<&str> = header.iter().collect();
+                format!("has no column \"{name}\", but {}", known.join(", "))
+            })
+        };
+        let only = columns.only.iter().map(|(name, text)| Ok((place(name)?, text.clone())));
+        Ok(Self {
+            x: place(&columns.x)?,
+            y: place(&columns.y)?,
+            series: columns.series.iter().map(place).collect::<Result<_, _>>()?,
+            label: columns.label.as_ref().map(place).transpose()?,
+            only: only.collect::<Result<_, String>>()?,
+        })
+    }
+}
+
+fn read_table(path: &Path, columns: &Columns, rows: &mut Vec<Row>) -> Result<(), String> {
+    let mut reader = csv::Reader::from_path(path).map_err(|error| error.to_string())?;
+    let places = Places::find(columns, reader.headers().map_err(|error| error.to_string())?)?;
+    for record in reader.records() {
+        let record = record.map_err(|error| error.to_string())?;
+        let text = |place: usize| record.get(place).unwrap_or_default().trim();
+        if places.only.iter().any(|(place, wanted)| text(*place) != wanted) {
+            continue;
+        }
+        let Some(y) = number(&record, places.y, &columns.y)? else { continue };
+        if rows.len() == MAX_POINTS {
+            return Err(format!("more than {MAX_POINTS} rows"));
+        }
+        rows.push(Row {
+            key: places.series.iter().map(|place| text(*place).to_owned()).collect(),
+            x: number(&record, places.x, &columns.x)?,
+            y,
+            label: places.label.map(|place| text(place).to_owned()).filter(|label| !label.is_empty()),
+        });
+    }
+    Ok(())
+}
+
+/// A finite number, or nothing where there is no text.
+fn number(record: &StringRecord, place: usize, column: &str) -> Result<Option<f64>, String> {
+    let text = record.get(place).unwrap_or_default().trim();
+    if text.is_empty() {
+        return Ok(None);
+    }
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(Some(number)),
+        _ => {
+            let line = record.position().map_or(0, csv::Position::line);
+            Err(format!("line {line}: \"{text}\" in column {column} is no number"))
+        }
+    }
+}
+
+/// For each column of a series' name, whether any two series differ in it.
+fn telling_columns(groups: &[(Vec<String>, Vec<Row>)]) -> Vec<bool> {
+    let Some((first, _)) = groups.first() else { return Vec::new() };
+    (0..first.len()).map(|column| groups.iter().any(|(key, _)| key[column] != first[column])).collect()
+}
+
+fn series(key: &[String], telling: &[bool], rows: Vec<Row>, columns: &Columns) -> Series {
+    let words: Vec<&str> =
+        key.iter().zip(telling).filter(|(_, tells)| **tells).map(|(word, _)| &**word).collect();
+    let name = if words.is_empty() { key.join(" ") } else { words.join(" ") };
+    let line = match columns.scatter {
+        true => Line::None,
+        false if columns.dashed.contains(&name) => Line::Dashed,
+        false => Line::Solid,
+    };
+    let levels: Vec<f64> = rows.iter().filter(|row| row.x.is_none()).map(|row| row.y).collect();
+    let points = if columns.scatter { each(rows) } else { medians(rows) };
+    Series { name, line, points, level: median(levels) }
+}
+
+fn each(rows: Vec<Row>) -> Vec<Point> {
+    let point = |row: Row| Some(Point { x: row.x?, y: row.y, spread: None, label: row.label });
+    rows.into_iter().filter_map(point).collect()
+}
+
+/// A point for each x, from the least to the greatest.
+fn medians(rows: Vec<Row>) -> Vec<Point> {
+    let mut by_x: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
+    for row in rows {
+        if let Some(x) = row.x {
+            by_x.entry((x + 0.0).to_bits()).or_default().push(row); // one zero
+        }
+    }
+    let mut points: Vec<Point> = by_x.into_values().filter_map(median_point).collect();
+    points.sort_by(|a, b| a.x.total_cmp(&b.x));
+    points
+}
+
+fn median_point(rows: Vec<Row>) -> Option<Point> {
+    let label = rows.iter().find_map(|row| row.label.clone());
+    let x = rows.first()?.x?;
+    let values: Vec<f64> = rows.into_iter().map(|row| row.y).collect();
+    let (least, greatest) = values.iter().fold((f64::MAX, f64::MIN), |(l, g), y| (l.min(*y), g.max(*y)));
+    let spread = (least < greatest).then_some((least, greatest));
+    Some(Point { x, y: median(values)?, spread, label })
+}
+
+/// The middle one, or the mean of the two in the middle.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let above = *values.get(values.len() / 2)?;
+    let below = *values.get((values.len() - 1) / 2)?;
+    Some(f64::midpoint(below, above))
+}
