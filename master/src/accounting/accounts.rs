@@ -172,7 +172,7 @@ impl Accounts {
         match *action {
             Action::BeginFrame { frame } => self.begin(now, frame),
             Action::FrameDone { frame, elapsed, .. } => self.finish(now, frame, elapsed),
-            Action::FrameDropped { frame } => {
+            Action::FrameDropped { frame } | Action::FrameFailed { frame } => {
                 self.advance_all(now);
                 self.frames.remove(&frame);
             }
