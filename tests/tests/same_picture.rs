@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use rayfarm_tests::{Running, Scenes, master, shared};
+use rayfarm_tests::{Running, Scenes, free_port, master, shared, worker};
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::{FrameView, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
@@ -69,6 +69,28 @@ fn every_policy_and_segment_size_renders_the_same_bytes() {
         render(&scene, &output, &["--segment", segment, "--local-workers", "2", "--threads", "2"]);
         assert!(rayfarm_tracer::image::load(&output).unwrap() == expected, "{segment}");
     }
+}
+
+#[test]
+fn packed_pixels_are_the_same_pixels_in_fewer_bytes() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    let expected = blake3::hash(&traced(&scene).pixels).to_string();
+    let received = ["raw", "lz4"].map(|pixels| {
+        let address = format!("127.0.0.1:{}", free_port());
+        let mut command = worker();
+        command.args(["--master", &address, "--threads", "2", "--pixels", pixels]);
+        let _worker = Running::start(&mut command);
+        let mut command = master();
+        command.arg("render").arg(&scene).arg("-o").arg(scenes.path(&format!("{pixels}.png")));
+        command.args(["--json", "--no-local-workers", "--listen", &address]);
+        let outcome = Running::start(&mut command).finish().expect_success();
+        let report: serde_json::Value = serde_json::from_str(outcome.stdout.trim()).unwrap();
+        assert_eq!(report["blake3"], expected, "{pixels}");
+        report["bytes_per_frame"]["received"].as_u64().unwrap()
+    });
+    let [raw, packed] = received;
+    assert!(packed < raw, "{packed} bytes instead of {raw}");
 }
 
 #[test]
