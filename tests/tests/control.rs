@@ -3,6 +3,7 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
+use std::time::Duration;
 
 use rayfarm_tests::{Running, Scenes, Screen, free_port, master, wait_until, worker};
 use serde_json::Value;
@@ -139,13 +140,11 @@ fn keys_pause_all_workers_and_the_one_selected() {
     command.args(["--control", &format!("127.0.0.1:{control}")]).current_dir(scenes.path(""));
     let window = Running::start(screen.show(&mut command));
     let mut line = Line::to(control);
-    let mut paused = |count: usize| {
-        wait_until(&format!("{count} workers pause"), || {
-            let states = line.states();
-            states.len() == 2 && states.iter().filter(|state| state.ends_with("paused")).count() == count
-        });
+    let mut paused = || {
+        let states = line.states();
+        (states.len() == 2).then(|| states.iter().filter(|state| state.ends_with("paused")).count())
     };
-    paused(0);
+    wait_until("two workers are at work", || paused() == Some(0));
     let mut id = String::new();
     wait_until("the window is there", || {
         let found = screen.xdotool(&["search", "--onlyvisible", "--name", "rayfarm"]).unwrap_or_default();
@@ -154,14 +153,25 @@ fn keys_pause_all_workers_and_the_one_selected() {
     });
     screen.xdotool(&["mousemove", "--window", &id, "30", "30"]).unwrap();
     let press = |keys: &[&str]| screen.xdotool(&[&["key"], keys].concat()).unwrap();
-    press(&["p"]);
-    paused(2);
-    press(&["p"]);
-    paused(0);
-    press(&["f", "Tab", "Tab"]);
-    press(&["p"]);
-    paused(1);
-    press(&["c", "c"]);
-    press(&["Escape"]);
+    // A key that is up again before a busy window has looked is lost: these are pressed until they show.
+    let mut press_until = |keys: &[&str], count: usize| {
+        wait_until(&format!("{count} workers pause"), || {
+            press(keys);
+            (0..30).any(|_| {
+                std::thread::sleep(Duration::from_millis(100));
+                paused() == Some(count)
+            })
+        });
+    };
+    press_until(&["p"], 2);
+    press_until(&["p"], 0);
+    press_until(&["Tab", "p"], 1);
+    press(&["f", "c", "c"]);
+    wait_until("the window has gone", || {
+        screen.xdotool(&["key", "Escape"]);
+        !screen
+            .xdotool(&["search", "--onlyvisible", "--name", "rayfarm"])
+            .is_some_and(|found| !found.is_empty())
+    });
     window.finish().expect_success();
 }
