@@ -35,7 +35,8 @@ impl Scheduler {
                     continue;
                 }
                 let fresh = self.seed_lease(id);
-                if let Some(lease) = fresh.or_else(|| if depth == 0 { self.any_copy(id) } else { None }) {
+                if let Some(lease) = fresh.or_else(|| if depth == 0 { self.any_copy(now, id) } else { None })
+                {
                     self.grant(now, id, lease, None);
                 }
             }

@@ -5,8 +5,10 @@ use std::time::Duration;
 use super::adaptive::{Crew, seconds};
 use super::{FrameId, Lease, Scheduler, WorkerId};
 
-/// Workers that render the same segment at most.
+/// Workers that render the same segment at most...
 const MAX_COPIES: usize = 3;
+/// ...not counting those that have had it for longer than this: they may answer pings and nothing else for ever.
+const TRUSTED_FOR: Duration = Duration::from_secs(10);
 
 /// A segment that others render.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +20,8 @@ struct Candidate {
 
 impl Scheduler {
     /// The seed's rule: the oldest segment that the fewest render, at once.
-    pub(super) fn any_copy(&mut self, id: WorkerId) -> Option<Lease> {
-        let best = self.copyable(id).min_by_key(|known| (known.frame, known.copies, known.segment))?;
+    pub(super) fn any_copy(&mut self, now: Duration, id: WorkerId) -> Option<Lease> {
+        let best = self.copyable(now, id).min_by_key(|known| (known.frame, known.copies, known.segment))?;
         self.frames.iter_mut().find(|known| known.id == best.frame)?.copy(best.segment, id)
     }
 
@@ -28,7 +30,7 @@ impl Scheduler {
         while let Some((id, speed, round_trip)) = crew.fastest_idle() {
             let mut best: Option<(Duration, Candidate)> = None;
             let mut recheck: Option<Duration> = None;
-            for known in self.copyable(id) {
+            for known in self.copyable(now, id) {
                 match self.worth_copying_at(now, known, speed, round_trip) {
                     (at, gain) if at <= now => {
                         if best.is_none_or(|(most, _)| gain > most) {
@@ -46,14 +48,18 @@ impl Scheduler {
         }
     }
 
-    /// Unfinished segments that a worker does not render yet.
-    fn copyable(&self, id: WorkerId) -> impl Iterator<Item = Candidate> {
-        let segments =
-            self.frames.iter().flat_map(|frame| frame.segments.iter().map(|(n, s)| (frame.id, *n, s)));
-        let open = segments.filter(move |(_, _, segment)| {
-            !segment.done && segment.holders.len() < MAX_COPIES && !segment.holders.contains(&id)
+    /// Unfinished segments that a worker does not render yet, and that few others do.
+    fn copyable(&self, now: Duration, id: WorkerId) -> impl Iterator<Item = Candidate> {
+        let segments = self.frames.iter().flat_map(|f| f.segments.iter().map(|(n, s)| (f.id, *n, s)));
+        let open = segments.filter(move |(_, _, segment)| !segment.done && !segment.holders.contains(&id));
+        let counted = open.map(move |(frame, segment, known)| {
+            let trusted = |holder: &&WorkerId| {
+                let held = self.workers.get(holder).and_then(|worker| worker.leases.get(&(frame, segment)));
+                held.is_some_and(|held| held.granted_at.saturating_add(TRUSTED_FOR) > now)
+            };
+            Candidate { frame, segment, copies: known.holders.iter().filter(trusted).count() }
         });
-        open.map(|(frame, segment, s)| Candidate { frame, segment, copies: s.holders.len() })
+        counted.filter(|known| known.copies < MAX_COPIES)
     }
 
     /// From when on it pays to render a segment once more, and how much earlier it would be done: at once, if that is
