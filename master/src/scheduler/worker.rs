@@ -18,11 +18,14 @@ const FIRST_REST: Duration = Duration::from_secs(1);
 const LONGEST_REST: Duration = Duration::from_secs(30);
 /// The first rest of a worker that was late; doubled with each time in a row.
 const FIRST_LATE_REST: Duration = Duration::from_millis(250);
-/// A lease is overdue when it takes longer than predicted by what it was predicted to take, and at least by this.
+/// A lease is overdue when it takes longer, by this factor, than any lately did beyond their predictions, and at least
+/// by this time...
+const SLACK_FACTOR: f64 = 1.25;
 const LEAST_SLACK: Duration = Duration::from_millis(5);
-/// And by so many frames...
-const SLACK_FRAMES: f64 = 0.75;
-/// ...and round trips.
+/// ...and by this part of a frame, times the factor by which predictions have lately been wrong, up to a limit...
+const SLACK_FRAMES: f64 = 0.3;
+const SLACK_SURPRISE: f64 = 4.0;
+/// ...and by so many round trips.
 const SLACK_ROUND_TRIPS: f64 = 4.0;
 
 /// A promise of rows, as kept by the scheduler.
@@ -180,12 +183,14 @@ impl Worker {
     }
 
     /// How late it may be with a lease that takes so long, where predictions have lately been wrong by a factor of
-    /// `surprise` and a frame is complete every so often. Three quarters of a frame late is soon enough to act, whatever was
-    /// predicted.
+    /// `surprise` and a frame is complete every so often: a third of a frame late is soon enough to act, where predictions
+    /// are right.
     pub(super) fn slack(&self, takes: Duration, surprise: f64, every: Duration) -> Duration {
         let network = SLACK_ROUND_TRIPS * self.round_trip.unwrap_or(0.0);
-        let slack = Duration::try_from_secs_f64(network.max(takes.as_secs_f64() * surprise));
-        slack.unwrap_or(Duration::MAX).max(every.mul_f64(SLACK_FRAMES)).max(LEAST_SLACK)
+        let slack =
+            Duration::try_from_secs_f64(network.max(takes.as_secs_f64() * (SLACK_FACTOR * surprise - 1.0)));
+        let frames = every.mul_f64(SLACK_FRAMES * surprise.clamp(1.0, SLACK_SURPRISE));
+        slack.unwrap_or(Duration::MAX).max(frames).max(LEAST_SLACK)
     }
 
     /// When it gave its last answer, or joined.
