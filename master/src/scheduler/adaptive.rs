@@ -169,9 +169,11 @@ impl Scheduler {
         let step = self.step(frame, crew, hand.free_in, speed, until_done);
         let rows = to_boundary(run.first, rows, step).min(limit).min(run.count);
         let work = self.costs.work(run.first..run.first + rows);
-        // Towards the end, somebody else may be free and done before this one is.
+        // Towards the end, somebody else may be free and done before this one is; but where all are idle, they might each
+        // leave it to another.
         let done_in = hand.free_in + work / speed;
-        let has_time = done_in <= until_done || done_in <= crew.soonest(work) * 1.0001;
+        let all_idle = crew.hands.iter().all(|hand| hand.leases == 0);
+        let has_time = all_idle || done_in <= until_done || done_in <= crew.soonest(work) * 1.0001;
         has_time.then_some(rows)
     }
 
