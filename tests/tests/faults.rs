@@ -1,5 +1,5 @@
 //! A frame is never lost: workers die, hang and come in the middle of a run, and every picture is the right one.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test fails by panicking")]
 
 use std::path::PathBuf;
 
