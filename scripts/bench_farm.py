@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Measures the farm on this machine: frames per second against segment size, workers, threads and tree quality.
+"""Measures the farm on this machine: frames per second against segment size, workers, threads and tree quality;
+and the scheduler with up to 1,024 simulated workers.
 
 Writes a CSV table and plots (SVG, PNG) for each experiment and a report.md with all of them. Workers are processes of this
 machine. Let nothing else run meanwhile. Needs Rust (unless --programs is given) and Python 3.8 or later, and nothing else.
@@ -50,6 +51,7 @@ def arguments():
     parser.add_argument("--repeats", type=int, help="of each run (3)")
     parser.add_argument("--workers", type=numbers, metavar="N,...", help="numbers of workers (1,2,3,4)")
     parser.add_argument("--threads", type=numbers, metavar="N,...", help="numbers of threads (1,2,3,4, and all cores)")
+    parser.add_argument("--simulated", type=numbers, metavar="N,...", help="numbers of simulated workers (1,2,4,...,1024)")
     return parser.parse_args()
 
 
@@ -88,6 +90,7 @@ def bench(asked):
         few_sizes=[16] if quick else [4, 16, 64],
         options=options,
         cores=cores,
+        simulated=asked.simulated or ([1, 8] if quick else [2**power for power in range(11)]),
     )
 
 

@@ -3,6 +3,7 @@
 A function takes a Bench and returns a Section, or None where it cannot be done.
 """
 
+import json
 import shutil
 import sys
 from dataclasses import dataclass, field
@@ -44,6 +45,7 @@ class Bench:
     few_sizes: list  # of segments, where not all of them are asked for
     options: tuple
     cores: int
+    simulated: list  # numbers of workers
     kept: list = None
 
     def farm(self):
@@ -71,6 +73,8 @@ class Bench:
         self.master.call("plot", table, *outputs, *options)
 
 
+# Of simulated workers; the report says the same in words.
+FARM = ["--speeds", "4", "--link", "1e9", "--rtt", "0.2", "--work", "1000"]
 FPS = ["--y", "fps", "--y-label", "frames per second", "--from-zero"]
 BY_ROWS = ["--x", "rows", "--x-label", "rows in a segment", "--log-x", *FPS]
 
@@ -214,10 +218,66 @@ def tree_quality(bench):
     )
 
 
+def simulated(bench):
+    """Far more workers than there are machines: the real scheduler, in virtual time."""
+    plots, lines, tables = [], [], []
+    for costs, what in [("bust", "a bust on a ground"), ("corner", "all cost in a corner that moves")]:
+        rows = simulate(bench, costs)
+        name = f"simulated-{costs}"
+        best = best_cuts(rows)
+        title = f"Simulated workers, {what}"
+        axes = ["--x", "workers", "--x-label", "workers", "--log-x", "--series", "series"]
+        fps = ["--y", "fps", "--y-label", "frames per second", "--log-y", "--dashed", "ideal"]
+        bench.save(name, best, *axes, *fps, "--title", title)
+        share = ["--y", "efficiency", "--y-label", "per cent of the ideal", "--from-zero"]
+        bench.save(f"{name}-efficiency", best, *axes, *share, "--title", title)
+        if rows:
+            write_csv(bench.folder / f"{name}-all.csv", rows)
+        found = {(row["series"], row["workers"]): row["efficiency"] for row in best if row["efficiency"] != ""}
+        names = list(dict.fromkeys(series for series, _ in found))
+        lines += [[costs, series, *(f"{found[series, count]:.0f} %" for count in bench.simulated)] for series in names]
+        plots += [name, f"{name}-efficiency"]
+        tables += [f"{name}-all", name, f"{name}-efficiency"]
+    text = (
+        "Not measured but simulated (`rayfarm-master simulate`): the scheduler itself with workers of one thread whose speeds "
+        "differ up to 4 to 1, on gigabit links with 0.2 ms of round trip, and frames that are one second of work for an average "
+        "worker. The ideal is the sum of speeds. Static and smart are shown with the best of "
+        f"{', '.join(str(size) for size in bench.few_sizes)} rows for each number of workers."
+    )
+    return Section("Simulated workers", text, plots, ["costs", "efficiency with workers:", *bench.simulated], lines, tables)
+
+
+def simulate(bench, costs):
+    """A row for each number of workers and each way to cut frames."""
+    sweep = ",".join(str(count) for count in bench.simulated)
+    cuts = [f"{policy}:{rows}" for policy in ("static", "smart") for rows in bench.few_sizes] + ["adaptive"]
+    rows = []
+    for cut in cuts:
+        said = bench.master.call("simulate", "--sweep", sweep, "--segment", cut, "--costs", costs, *FARM, "--json")
+        for line in map(json.loads, said.splitlines()):
+            efficiency = round(100 * line["fps"] / line["ideal_fps"], 2)
+            rows.append({"costs": costs, "policy": cut.split(":")[0], **line, "efficiency": efficiency})
+    return rows
+
+
+def best_cuts(rows):
+    """For each policy and number of workers the row with most frames per second, and the ideal."""
+    best = {}
+    for row in rows:
+        key = (row["policy"], row["workers"])
+        if key not in best or row["fps"] > best[key]["fps"]:
+            best[key] = {"series": row["policy"], **row}
+    ideal = {row["workers"]: row["ideal_fps"] for row in rows}
+    return list(best.values()) + [
+        {"series": "ideal", "workers": count, "fps": fps, "efficiency": ""} for count, fps in ideal.items()
+    ]
+
+
 ALL = {
     "segment-size": segment_size,
     "segment-size-by-workers": segment_size_by_workers,
     "workers": workers,
     "threads": threads,
     "tree-quality": tree_quality,
+    "simulated": simulated,
 }

@@ -62,6 +62,12 @@ fn tree_qualities() {
 }
 
 #[test]
+fn simulated_workers() {
+    let tables = ["simulated-bust", "simulated-corner-efficiency", "simulated-corner-all"];
+    expect_experiment("simulated", &tables, &["simulated-bust", "simulated-corner"]);
+}
+
+#[test]
 fn a_dry_run_calls_nothing_and_an_unknown_name_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let Some(outcome) = bench_farm(folder.path(), &["--dry-run"]) else { return };
