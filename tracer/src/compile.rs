@@ -66,7 +66,7 @@ pub(crate) enum Item {
 
 /// What the scene asks for: the rest is not computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Features {
+pub struct Features {
     /// Something wears a material with a specular colour: directions to the viewer are needed.
     pub specular: bool,
     /// Something wears a material with a texture.
@@ -174,6 +174,17 @@ impl CompiledScene {
     /// World bounds of everything finite.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.bounds
+    }
+
+    /// What the scene asks for, and so what is computed.
+    pub fn features(&self) -> Features {
+        Features::of(&self.scene)
+    }
+
+    /// Bytes of the tree over the scene's own items, which every frame copies with its own boxes.
+    pub fn tree_bytes(&self) -> usize {
+        let items = self.tree.blocks.iter().map(|block| size_of_val(&block[..])).sum::<usize>();
+        size_of_val(&self.tree.nodes[..]) + items
     }
 
     /// One mesh per model.

@@ -33,6 +33,7 @@ mod frame;
 pub mod image;
 mod light;
 pub mod mesh;
+pub mod numerics;
 mod plane;
 pub mod reference;
 mod render;
@@ -48,7 +49,7 @@ mod trace;
 mod triangle;
 
 pub use camera::Basis;
-pub use compile::{CompileError, CompiledScene};
+pub use compile::{CompileError, CompiledScene, Features};
 pub use frame::PreparedFrame;
 pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows, render_rows_watched};
 pub use simd::best_name as simd_level;

@@ -113,6 +113,11 @@ impl Oracle {
         srgb::encode(self.pixel(x, y).as_vec3())
     }
 
+    /// What one ray sees through a point of the picture, in pixels from its top left corner, as it is stored: 8-bit sRGB.
+    pub fn encoded_at(&self, x: f64, y: f64) -> [u8; 3] {
+        srgb::encode(self.radiance(self.direction(x, y)).as_vec3())
+    }
+
     /// The whole picture. The time grows with pixels times primitives: for small ones.
     pub fn render(&self) -> RgbImage {
         let (width, height) = (self.view.width, self.view.height);

@@ -293,11 +293,11 @@ impl CompiledMesh {
         self.section(self.sections.slots, self.lanes())
     }
 
-    fn indices(&self) -> &[[u32; 3]] {
+    pub(super) fn indices(&self) -> &[[u32; 3]] {
         self.section(self.sections.indices, if self.has_normals() { self.lanes() } else { 0 })
     }
 
-    fn normals(&self) -> &[Vec3] {
+    pub(super) fn normals(&self) -> &[Vec3] {
         self.section(self.sections.normals, self.header.normal_count as usize)
     }
 

@@ -7,6 +7,7 @@ mod blob;
 mod clean;
 mod compiled;
 mod materials;
+mod memory;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +20,7 @@ pub use crate::bvh::BuildQuality;
 use crate::scene::Material;
 pub(crate) use blob::TriangleBlock;
 pub use compiled::{CompileOptions, CompiledMesh, MeshReport};
+pub use memory::MeshMemory;
 
 /// First bytes of a compiled mesh, in memory and on disk.
 pub const MAGIC: [u8; 6] = *b"RFMESH";

@@ -106,6 +106,22 @@ fn normals_are_left_out_where_nobody_asks_for_them() {
 }
 
 #[test]
+fn the_parts_of_a_mesh_are_all_of_its_bytes() {
+    let (plain, rich) = (sheet(20), textured(20));
+    let flat = CompileOptions { normals: false, ..CompileOptions::default() };
+    let (plain, _) = CompiledMesh::compile_with(&plain, flat).unwrap();
+    let (rich, _) = CompiledMesh::compile(&rich).unwrap();
+    for mesh in [&plain, &rich] {
+        let memory = mesh.memory();
+        assert_eq!(memory.total_bytes(), mesh.bytes().len());
+        assert!(memory.lanes >= mesh.triangle_count() && memory.nodes > 0 && memory.rest_bytes >= 128);
+    }
+    assert_eq!((plain.memory().normal_bytes, plain.memory().uv_bytes), (0, 0));
+    assert_eq!(rich.memory().uv_bytes, rich.memory().full_uv_bytes());
+    assert!(rich.memory().normal_bytes > rich.memory().least_normal_bytes());
+}
+
+#[test]
 fn texture_coordinates_and_names_come_back() {
     let mut source = textured(9);
     // Cleaning drops one of them, and its coordinates with it.

@@ -187,9 +187,8 @@ fn name_of<S: Simd>(_: S) -> &'static str {
     }
 }
 
-/// All levels that this machine has, the lowest last: tests hold them against each other. With the feature `portable` the
+/// All levels that this machine has, the lowest last: they are held against each other. With the feature `portable` the
 /// last one does lanes one by one.
-#[cfg(test)]
 pub(crate) fn all() -> Vec<Level> {
     let mut levels = vec![best()];
     #[cfg(target_arch = "x86_64")]

@@ -187,7 +187,7 @@ impl PreparedFrame {
 
     /// `None` for what is no ray.
     #[inline(always)]
-    fn to_eye(&self, origin: DVec3, direction: DVec3) -> Option<Ray> {
+    pub(crate) fn to_eye(&self, origin: DVec3, direction: DVec3) -> Option<Ray> {
         let reach = direction.abs().max_element();
         let usable = origin.is_finite() && direction.is_finite() && (1e-100..=1e100).contains(&reach);
         // Units are powers of two: t stays what it is, to the bit.
@@ -297,7 +297,7 @@ impl Instance {
     }
 
     #[inline(always)]
-    fn to_mesh(&self, ray: &Ray) -> Ray {
+    pub(crate) fn to_mesh(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.inverse * (ray.origin - self.translation),
             direction: self.inverse * ray.direction,

@@ -303,3 +303,39 @@ fn brute_force(frame: &PreparedFrame, ray: &Ray) -> Option<(f64, PrimitiveId)> {
 fn brute_count(frame: &PreparedFrame, ray: &Ray, t_max: f64) -> usize {
     all_hits(frame, ray).iter().filter(|(t, _)| *t < t_max).count()
 }
+
+/// Rays that begin on the planes of boxes, inside them, and on surfaces, along the axes and their diagonals: where a slab's test
+/// meets zero times infinity.
+#[test]
+fn origins_on_planes_and_surfaces_hit_as_brute_force_does() {
+    let n = 6;
+    let at = |x: u32, y: u32| y * (n + 1) + x;
+    let height = |x: u32, y: u32| f64::from((x * 7 + y * 13) % 3);
+    let positions: Vec<DVec3> = (0..=n)
+        .flat_map(|y| (0..=n).map(move |x| DVec3::new(f64::from(x), height(x, y), f64::from(y))))
+        .collect();
+    let triangles = (0..n)
+        .flat_map(|y| (0..n).map(move |x| (x, y)))
+        .flat_map(|(x, y)| {
+            [[at(x, y), at(x + 1, y), at(x + 1, y + 1)], [at(x, y), at(x + 1, y + 1), at(x, y + 1)]]
+        })
+        .collect();
+    let frame = frame_of(&mesh_of(positions.clone(), triangles), DVec3::ZERO, |scene| {
+        scene.models.push(Model { translate: DVec3::new(3.0, 1.0, 0.0), ..scene.models[0].clone() });
+    });
+    let step = |i: u32| f64::from(i % 3) - 1.0;
+    let directions: Vec<DVec3> = (0..27)
+        .map(|i| DVec3::new(step(i), step(i / 3), step(i / 9)))
+        .filter(|&direction| direction != DVec3::ZERO)
+        .collect();
+    let mut hits = 0;
+    for origin in positions.iter().flat_map(|&p| [p, p + DVec3::Y, p + DVec3::new(0.5, 0.0, 0.5)]) {
+        for &direction in &directions {
+            let ray = Ray { origin: origin * frame.per_unit, direction: direction * frame.per_unit };
+            let found = frame.closest(&ray, f64::INFINITY);
+            assert_eq!(found, brute_force(&frame, &ray), "from {origin} along {direction}");
+            hits += usize::from(found.is_some());
+        }
+    }
+    assert!(hits > 300, "{hits} hits say little");
+}

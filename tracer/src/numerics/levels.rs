@@ -1,0 +1,26 @@
+//! The levels of SIMD that this machine has, against each other: not a byte may differ.
+
+use super::{Check, Effort, Outcome, Subject, differing_bytes, picture};
+use crate::compile::CompileError;
+use crate::simd;
+
+/// Counts bytes of the picture that another level renders than the best one does: an outcome for each other level.
+///
+/// # Errors
+/// A scene that cannot be traced.
+pub fn levels(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, CompileError> {
+    let mut frame = subject.prepared(effort.side)?;
+    let best = picture(&frame);
+    let mut outcomes: Vec<Outcome> = Vec::new();
+    for level in simd::all() {
+        let case = simd::name(level).to_owned();
+        if case == simd::best_name() || outcomes.iter().any(|outcome| outcome.case == case) {
+            continue;
+        }
+        frame.level = level;
+        let wrong = differing_bytes(&best, &picture(&frame));
+        let tested = best.len() as u64;
+        outcomes.push(Outcome { check: Check::Levels, case, unit: "bytes", tested, at_edges: 0, wrong });
+    }
+    Ok(outcomes)
+}

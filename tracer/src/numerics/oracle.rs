@@ -1,0 +1,71 @@
+//! Pixels of the fast path against the oracle's.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::Subject;
+use crate::reference::Oracle;
+use crate::scene::FrameView;
+
+/// A pixel stands at an edge when the oracle sees this far away, in pixels, what the fast path saw. The fast path shades points
+/// that are rounded to `f32`, to 2^-24 of their distance: in a picture of 16384 pixels that is 2^-10 of one.
+const NEXT_TO: f64 = 1.0 / 1024.0;
+
+/// What the oracle says of some pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Verdict {
+    pub(super) tested: u64,
+    pub(super) at_edges: u64,
+    pub(super) wrong: u64,
+}
+
+/// Asks the oracle of a scene about pixels of its picture. A channel may differ by a step of the encoding.
+pub(super) fn ask(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &[usize]) -> Verdict {
+    let oracle = Oracle::new(&subject.scene, &subject.meshes, &subject.textures, view);
+    let judge = |&pixel: &usize| {
+        let found = &picture[pixel * 3..pixel * 3 + 3];
+        let (x, y) = (pixel as u32 % view.width, pixel as u32 / view.width);
+        let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let agrees = |at: DVec2| is_near(found, oracle.encoded_at(at.x, at.y));
+        let right = agrees(center);
+        let at_edge = !right && around(center).any(agrees);
+        Verdict { tested: 1, at_edges: at_edge.into(), wrong: (!right && !at_edge).into() }
+    };
+    pixels.par_iter().map(judge).reduce(Verdict::default, |a, b| Verdict {
+        tested: a.tested + b.tested,
+        at_edges: a.at_edges + b.at_edges,
+        wrong: a.wrong + b.wrong,
+    })
+}
+
+/// How many pixels may be asked about for so much work.
+pub(super) fn affordable(subject: &Subject, work: u64) -> usize {
+    let scene = &subject.scene;
+    let triangles_of =
+        |id| subject.meshes.iter().find(|mesh| mesh.id() == id).map_or(0, |mesh| mesh.triangle_count());
+    let in_models: usize = scene.models.iter().map(|model| triangles_of(model.mesh)).sum();
+    let primitives = in_models + scene.spheres.len() + scene.planes.len() + scene.triangles.len();
+    let rays = 1 + scene.lights.len();
+    (work / (primitives.max(1) * rays) as u64).clamp(16, 4096) as usize
+}
+
+/// `count` pixels of so many: evenly spread, but half of them at most, and these too evenly, from among `first`.
+pub(super) fn chosen(first: &[usize], pixels: usize, count: usize) -> Vec<usize> {
+    let step = first.len().div_ceil(count.div_ceil(2)).max(1);
+    let mut chosen: Vec<usize> = first.iter().copied().step_by(step).collect();
+    let rest = count.saturating_sub(chosen.len()).max(1);
+    // From the middle of each share, so that the first is no corner.
+    chosen.extend((0..rest).map(|i| (2 * i + 1) * pixels / (2 * rest)));
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen
+}
+
+fn is_near(found: &[u8], expected: [u8; 3]) -> bool {
+    found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1)
+}
+
+fn around(center: DVec2) -> impl Iterator<Item = DVec2> {
+    let steps = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
+    steps.into_iter().map(move |(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * NEXT_TO)
+}

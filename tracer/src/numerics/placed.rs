@@ -1,0 +1,41 @@
+//! A scene somewhere else, at another size.
+
+use glam::DVec3;
+
+use crate::scene::{Attenuation, Light, LightKind, Scene};
+
+/// The scene `factor` times as large, then moved by `offset`: every length grows, and lights with it, so that the picture stays.
+/// With a power of two for a factor, and no offset, not a digit changes.
+pub(super) fn placed(scene: &Scene, factor: f64, offset: DVec3) -> Scene {
+    let place = |p: DVec3| p * factor + offset;
+    let mut scene = scene.clone();
+    scene.camera.position = place(scene.camera.position);
+    scene.camera.look_at = place(scene.camera.look_at);
+    scene.lights.iter_mut().for_each(|light| place_light(light, factor, place));
+    for model in &mut scene.models {
+        model.translate = place(model.translate);
+        model.scale *= factor;
+    }
+    for sphere in &mut scene.spheres {
+        sphere.center = place(sphere.center);
+        sphere.radius *= factor;
+    }
+    scene.planes.iter_mut().for_each(|plane| plane.point = place(plane.point));
+    scene.triangles.iter_mut().for_each(|triangle| triangle.vertices = triangle.vertices.map(place));
+    scene
+}
+
+fn place_light(light: &mut Light, factor: f64, place: impl Fn(DVec3) -> DVec3) {
+    match &mut light.kind {
+        LightKind::Point { position } | LightKind::Spot { position, .. } => *position = place(*position),
+        LightKind::Directional { .. } => return,
+    }
+    match &mut light.attenuation {
+        Attenuation::None => {}
+        Attenuation::InverseSquare => light.color *= (factor * factor) as f32,
+        Attenuation::Polynomial { linear, quadratic, .. } => {
+            *linear /= factor;
+            *quadratic /= factor * factor;
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The checks hold where they should, and see what is wrong where something is.
+
+use glam::DVec3;
+
+use super::leaks::{Tally, pieces, shoot};
+use super::oracle::{Verdict, ask, chosen};
+use super::scenes::torus;
+use super::seams::Seams;
+use super::*;
+
+const LITTLE: Effort = Effort { rays: 20_000, side: 64, oracle_work: 200_000 };
+
+fn tori() -> Subject {
+    built_in().unwrap().pop().unwrap()
+}
+
+#[test]
+fn the_built_in_scenes_hold() {
+    for subject in built_in().unwrap() {
+        let outcomes = run(&subject, &LITTLE).unwrap();
+        let broken: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.holds()).collect();
+        assert!(broken.is_empty(), "{}: {broken:#?}", subject.name);
+        let has_models = !subject.scene.models.is_empty();
+        for check in [Check::Leaks, Check::Acne, Check::Scale, Check::Offset] {
+            let tested: u64 =
+                outcomes.iter().filter(|outcome| outcome.check == check).map(|o| o.tested).sum();
+            assert_eq!(tested > 0, has_models || check != Check::Leaks, "{}: {check}", subject.name);
+        }
+    }
+}
+
+#[test]
+fn a_torus_has_the_seams_that_euler_counts() {
+    let (mesh, _) = CompiledMesh::compile(&torus(12, 8)).unwrap();
+    let seams = Seams::of(&mesh);
+    let (vertices, edges) = (seams.vertices.len(), seams.edges.len());
+    assert_eq!((vertices, edges, mesh.triangle_count()), (96, 288, 192));
+    assert!(seams.edges.iter().all(|edge| seams.opposite(edge).len() == 2));
+    for vertex in 0..vertices as u32 {
+        assert_eq!(seams.edges_at(vertex).len(), 6);
+        assert!(seams.edges_at(vertex).iter().all(|&edge| seams.edges[edge as usize].ends.contains(&vertex)));
+    }
+}
+
+/// One of 3072 triangles is missing: rays aimed at its edges slip through.
+#[test]
+fn a_missing_triangle_leaks() {
+    let whole = tori();
+    let mut mesh = torus(48, 32);
+    mesh.triangles.remove(700);
+    mesh.triangle_materials.pop();
+    let broken_mesh = Arc::new(CompiledMesh::compile(&mesh).unwrap().0);
+    let mut broken = whole.with(whole.scene.clone());
+    broken.scene.models.iter_mut().for_each(|model| model.mesh = broken_mesh.id());
+    broken.meshes = vec![broken_mesh];
+
+    let seams = [Seams::of(&whole.meshes[0])];
+    let count = |subject: &Subject| {
+        let frame = subject.prepared(8).unwrap();
+        shoot(&frame, &pieces(&whole, &frame, &seams), 100_000)
+    };
+    let Tally { at_edges, wrong } = count(&whole);
+    assert_eq!(wrong, 0);
+    assert!((1_000..50_000).contains(&at_edges), "{at_edges} of 100,000 at outlines");
+    let slipped = count(&broken).wrong;
+    assert!((5..1_000).contains(&slipped), "{slipped} of 100,000 slipped through one hole of 3,072");
+}
+
+#[test]
+fn the_oracle_sees_a_pixel_that_is_wrong() {
+    let subject = tori();
+    let mut picture = subject.rendered(64).unwrap();
+    let view = subject.view(64);
+    let pixels = chosen(&[], picture.len() / 3, 40);
+    let fine = ask(&subject, &view, &picture, &pixels);
+    assert_eq!((fine.tested, fine.wrong), (40, 0));
+    for &pixel in &pixels[..3] {
+        picture[pixel * 3 + 1] ^= 0x20;
+    }
+    assert_eq!(ask(&subject, &view, &picture, &pixels), Verdict { wrong: 3, ..fine });
+}
+
+#[test]
+fn specks_are_shadows_by_themselves() {
+    let (width, height) = (8, 6);
+    let lit = vec![200; width * height * 3];
+    let mut picture = lit.clone();
+    // A block of shadow, a speck at the border, two in a row.
+    for (x, y) in [(4, 2), (5, 2), (6, 2), (4, 3), (5, 3), (6, 3), (0, 0), (1, 4), (1, 5)] {
+        picture[(y * width + x) * 3] = 10;
+    }
+    assert_eq!(acne::specks(&picture, &lit, width), [0, 4 * width + 1, 5 * width + 1]);
+}
+
+#[test]
+fn pixels_are_chosen_from_all_over_and_from_those_that_matter() {
+    assert_eq!(chosen(&[], 100, 4), [12, 37, 62, 87]);
+    assert_eq!(chosen(&[5, 6], 100, 4), [5, 6, 25, 75]);
+    let many: Vec<usize> = (0..1000).collect();
+    let chosen = chosen(&many, 1000, 20);
+    assert!(chosen.len() <= 20 && chosen.iter().all(|&pixel| pixel < 1000), "{chosen:?}");
+}
+
+#[test]
+fn a_scene_is_placed_with_all_that_is_in_it() {
+    let subject = tori();
+    let moved = placed::placed(&subject.scene, 2.0, DVec3::new(10.0, 0.0, 0.0));
+    assert_eq!(moved.models[1].translate, DVec3::new(11.6, 1.2, 0.0));
+    assert_eq!(moved.models[1].scale, DVec3::splat(1.2));
+    assert_eq!(moved.camera.position, DVec3::new(10.6, 2.2, 7.0));
+    assert_ne!(moved.planes[0].point, subject.scene.planes[0].point);
+}
