@@ -115,6 +115,11 @@ impl Assets {
         self.scene
     }
 
+    /// Bytes of all of them together.
+    pub(crate) fn total_bytes(&self) -> usize {
+        self.blobs.values().map(Bytes::len).sum()
+    }
+
     /// An asset's bytes.
     pub(crate) fn get(&self, id: AssetId) -> Option<Bytes> {
         self.blobs.get(&id).cloned()

@@ -14,7 +14,10 @@ use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcom
 
 use crate::control::Place;
 use crate::farm::{FarmOptions, SegmentPolicy};
-use values::{Size, degrees, frame_count, listen_address, sample_count, size, thread_count, worker_count};
+pub(crate) use values::Size;
+use values::{
+    degrees, frame_count, listen_address, ray_count, sample_count, size, thread_count, worker_count,
+};
 
 mod simulate;
 mod values;
@@ -95,6 +98,10 @@ pub(crate) enum Command {
     Simulate(SimulateArgs),
     /// Draw CSV tables as a plot, as SVG or PNG.
     Plot(PlotArgs),
+    /// Tell what a scene asks for, what it does without, and what that means in work, memory and bytes.
+    Explain(ExplainArgs),
+    /// Check a scene's numbers: leaks, acne, scale, distance from the origin, levels of SIMD.
+    CheckNumerics(CheckNumericsArgs),
 }
 
 /// `view`.
@@ -236,6 +243,33 @@ pub(crate) struct PlotArgs {
     /// Upwards from zero, however far the values are from it.
     #[arg(long, conflicts_with = "log_y")]
     pub(crate) from_zero: bool,
+/// `explain`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ExplainArgs {
+    /// A scene (.toml), or a model (.obj or compiled).
+    pub(crate) scene: PathBuf,
+    /// Picture size in pixels.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<Size>,
+    /// Rays per pixel: a square number, 1, 4, 9, 16, ...
+    #[arg(long, value_name = "N", value_parser = sample_count)]
+    pub(crate) samples: Option<u32>,
+    /// Print one line of JSON on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `check-numerics`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct CheckNumericsArgs {
+    /// A scene (.toml), or a model (.obj or compiled); without it, built-in scenes of a plane, spheres and tori.
+    pub(crate) scene: Option<PathBuf>,
+    /// Rays to aim at edges and vertices of the models [default: 200000].
+    #[arg(long, value_name = "N", value_parser = ray_count)]
+    pub(crate) rays: Option<u64>,
+    /// Print a line of JSON for each scene on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Who renders.

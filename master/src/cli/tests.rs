@@ -86,6 +86,24 @@ fn the_other_commands_are_read() {
         }
         other => panic!("{other:?}"),
     }
+    match parse("rayfarm-master explain a.toml --size 64x48 --samples 4 --json") {
+        Ok(Invocation::Command(Command::Explain(args), _)) => {
+            assert_eq!((args.scene, args.json, args.samples), ("a.toml".into(), true, Some(4)));
+            assert_eq!(args.size, Some(Size { width: 64, height: 48 }));
+        }
+        other => panic!("{other:?}"),
+    }
+    for (line, scene, rays) in [
+        ("rayfarm-master check-numerics", None, None),
+        ("rayfarm-master check-numerics a.obj --rays 10000000", Some("a.obj".into()), Some(10_000_000)),
+    ] {
+        match parse(line) {
+            Ok(Invocation::Command(Command::CheckNumerics(args), _)) => {
+                assert_eq!((args.scene, args.rays, args.json), (scene, rays, false));
+            }
+            other => panic!("{other:?}"),
+        }
+    }
 }
 
 #[test]
@@ -136,6 +154,8 @@ fn wrong_use_is_status_2_and_says_what_was_expected() {
         ("rayfarm-master render -o b.png", "<SCENE>"),
         ("rayfarm-master compile a.obj", "--output"),
         ("rayfarm-master bench", "<SCENE>"),
+        ("rayfarm-master explain", "<SCENE>"),
+        ("rayfarm-master check-numerics --rays 0", "from 1"),
         ("rayfarm-master view --json", "--json"),
         ("rayfarm-master -v -q", "cannot be used with"),
         ("rayfarm-master --size 5x5 render a.toml -o b.png", "--size <WxH> stands before render"),

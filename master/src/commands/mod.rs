@@ -1,7 +1,9 @@
 //! The commands: each turns its arguments into work and tells how it went.
 
 mod bench;
+mod check_numerics;
 mod compile;
+mod explain;
 mod interrupt;
 mod oversight;
 mod plot;
@@ -25,6 +27,8 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Bench(args) => bench::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Plot(args) => plot::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::CheckNumerics(args) => check_numerics::run(&args),
     }
 }
 

@@ -8,7 +8,7 @@ use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene};
 use rayfarm_tracer::texture::Texture;
 
-use crate::cli::PictureArgs;
+use crate::cli::{PictureArgs, Size};
 use crate::error::CommandError;
 use crate::orbit::Animation;
 
@@ -49,11 +49,23 @@ impl Source {
     /// # Errors
     /// A combination that cannot be rendered.
     pub(super) fn view(&self, picture: &PictureArgs) -> Result<FrameView, CommandError> {
+        self.view_of(picture.size, picture.samples)
+    }
+
+    /// Likewise, of a picture that does not move.
+    ///
+    /// # Errors
+    /// A combination that cannot be rendered.
+    pub(super) fn view_of(
+        &self,
+        size: Option<Size>,
+        samples: Option<u32>,
+    ) -> Result<FrameView, CommandError> {
         let mut view = FrameView::of(&self.scene);
-        if let Some(size) = picture.size {
+        if let Some(size) = size {
             (view.width, view.height) = (size.width, size.height);
         }
-        view.samples = picture.samples.unwrap_or(view.samples);
+        view.samples = samples.unwrap_or(view.samples);
         view.validate().map_err(CommandError::wrong_input)?;
         Ok(view)
     }

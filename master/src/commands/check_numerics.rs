@@ -1,0 +1,137 @@
+//! `check-numerics`: whether the numbers hold on a scene, as a table. See [`rayfarm_tracer::numerics`] for what is checked.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use rayfarm_tracer::numerics::{self, Effort, Outcome, Subject};
+use rayfarm_tracer::simd_level;
+use serde::Serialize;
+
+use super::source::Source;
+use crate::cli::CheckNumericsArgs;
+use crate::display::overlay::grouped;
+use crate::error::CommandError;
+use crate::report::print_json;
+
+/// What `--json` prints, as one line for each scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct Report {
+    scene: String,
+    /// The level that all others were held against.
+    simd_level: &'static str,
+    holds: bool,
+    checks: Vec<Row>,
+}
+
+/// A case of a check.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct Row {
+    check: String,
+    case: String,
+    /// What is counted: rays, pixels or bytes.
+    unit: &'static str,
+    tested: u64,
+    at_edges: u64,
+    wrong: u64,
+}
+
+/// Checks a scene, or the built-in ones, and tells on standard output.
+///
+/// # Errors
+/// A wrong scene, or one on which something does not hold.
+pub(super) fn run(args: &CheckNumericsArgs) -> Result<(), CommandError> {
+    let effort = Effort { rays: args.rays.unwrap_or(Effort::default().rays), ..Effort::default() };
+    let mut broken = Vec::new();
+    for subject in subjects(args.scene.as_deref())? {
+        let outcomes = numerics::run(&subject, &effort).map_err(CommandError::wrong_input)?;
+        let report = report(&subject, &outcomes);
+        if args.json {
+            print_json(&report)?;
+        } else {
+            print(&table(&report))?;
+        }
+        if !report.holds {
+            broken.push(report.scene);
+        }
+    }
+    if broken.is_empty() {
+        return Ok(());
+    }
+    Err(CommandError::Failed(format!("the numbers do not hold: {}", broken.join(", "))))
+}
+
+fn subjects(scene: Option<&Path>) -> Result<Vec<Subject>, CommandError> {
+    let Some(path) = scene else { return numerics::built_in().map_err(CommandError::failed) };
+    let Source { name, scene, meshes, textures } = Source::load(path)?;
+    Ok(vec![Subject { name, scene, meshes, textures }])
+}
+
+fn report(subject: &Subject, outcomes: &[Outcome]) -> Report {
+    let row = |outcome: &Outcome| Row {
+        check: outcome.check.to_string(),
+        case: outcome.case.clone(),
+        unit: outcome.unit,
+        tested: outcome.tested,
+        at_edges: outcome.at_edges,
+        wrong: outcome.wrong,
+    };
+    Report {
+        scene: subject.name.clone(),
+        simd_level: simd_level(),
+        holds: outcomes.iter().all(Outcome::holds),
+        checks: outcomes.iter().map(row).collect(),
+    }
+}
+
+/// A line for each case, under the scene's name.
+fn table(report: &Report) -> String {
+    let verdict = if report.holds { "holds" } else { "DOES NOT HOLD" };
+    let mut text = format!("{}, {}: {verdict}\n", report.scene, report.simd_level);
+    let line = |check: &str, case: &str, tested: &str, edges: &str, wrong: &str| {
+        format!("  {check:<7} {case:<34} {tested:>18} {edges:>12} {wrong:>10}\n")
+    };
+    text += &line("check", "case", "tested", "at edges", "wrong");
+    for row in &report.checks {
+        let tested = format!("{} {}", grouped(row.tested), row.unit);
+        text += &line(&row.check, &row.case, &tested, &grouped(row.at_edges), &grouped(row.wrong));
+    }
+    text
+}
+
+fn print(text: &str) -> Result<(), CommandError> {
+    io::stdout()
+        .lock()
+        .write_all(text.as_bytes())
+        .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfarm_tracer::numerics::Check;
+
+    use super::*;
+
+    fn outcome(check: Check, wrong: u64) -> Outcome {
+        Outcome { check, case: "a case".into(), unit: "rays", tested: 12_345, at_edges: 6, wrong }
+    }
+
+    #[test]
+    fn one_wrong_count_is_enough_and_stands_in_the_table() {
+        let subject = numerics::built_in().unwrap().remove(0);
+        let fine = report(&subject, &[outcome(Check::Leaks, 0), outcome(Check::Acne, 0)]);
+        assert!(fine.holds && table(&fine).starts_with("a plane, ") && table(&fine).contains(": holds\n"));
+        let broken = report(&subject, &[outcome(Check::Leaks, 0), outcome(Check::Acne, 7)]);
+        let text = table(&broken);
+        assert!(!broken.holds && text.contains("DOES NOT HOLD"), "{text}");
+        let line = text.lines().find(|line| line.contains("acne")).unwrap();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        assert_eq!(words, ["acne", "a", "case", "12,345", "rays", "6", "7"]);
+    }
+
+    #[test]
+    fn without_a_scene_the_built_in_ones_are_checked() {
+        assert!(subjects(None).unwrap().len() > 1);
+        let message = subjects(Some(Path::new("nowhere.toml"))).unwrap_err().to_string();
+        assert!(message.contains("nowhere.toml"), "{message}");
+    }
+}

@@ -1,0 +1,91 @@
+use std::path::Path;
+
+use super::*;
+
+fn explained(scene: &str) -> Explanation {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("quad.obj"), QUAD).unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, scene).unwrap();
+    of_file(&path)
+}
+
+fn of_file(path: &Path) -> Explanation {
+    let source = Source::load(path).unwrap();
+    explain(&source, &FrameView::of(&source.scene)).unwrap()
+}
+
+const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+
+/// Flat, diffuse, without shadows: as little as a scene can ask for.
+const BARE: &str = "
+    render = { width = 64, height = 48 }
+    camera = { position = [0, 0, 4], look_at = [0, 0, 0] }
+    material = { red = { diffuse = [0.8, 0.1, 0.1], specular = [0, 0, 0] } }
+    light = [{ kind = 'point', position = [1, 2, 3], shadows = false }]
+    model = [{ file = 'quad.obj', material = 'red', normals = 'flat' }, { file = 'quad.obj', material = 'red', normals = 'flat' }]
+";
+
+fn asked_for(explanation: &Explanation) -> Vec<&'static str> {
+    explanation.features.iter().filter(|feature| feature.asked_for).map(|feature| feature.name).collect()
+}
+
+#[test]
+fn a_bare_scene_asks_for_nothing_and_what_that_saves_is_told() {
+    let bare = explained(BARE);
+    assert_eq!(asked_for(&bare), Vec::<&str>::new());
+    assert_eq!((bare.things.models, bare.meshes.len(), bare.meshes[0].instances), (2, 1, 2));
+    assert_eq!((bare.triangles, bare.meshes[0].triangles), (4, 2));
+    assert_eq!(bare.rays_per_frame_at_most, Rays { primary: 64 * 48, shadow: 0, secondary: 0 });
+    let saved: usize = bare.features.iter().map(|feature| feature.bytes).sum();
+    assert!(saved > 0 && bare.meshes[0].normal_bytes == 0, "{bare:?}");
+    assert!(!bare.kernels.iter().any(|kernel| kernel.contains("shadows") || kernel.contains("texels")));
+}
+
+#[test]
+fn each_key_that_asks_for_more_is_told() {
+    let cases = [
+        ("shadows = false", "shadows = true", "shadows"),
+        ("specular = [0, 0, 0]", "specular = [0.1, 0, 0]", "specular term"),
+        ("normals = 'flat'", "normals = 'smooth'", "smooth normals"),
+        ("height = 48", "height = 48, samples = 4", "several samples a pixel"),
+    ];
+    for (key, more, name) in cases {
+        let explanation = explained(&BARE.replace(key, more));
+        assert_eq!(asked_for(&explanation), [name], "{more}");
+    }
+}
+
+#[test]
+fn textures_are_told_with_their_bytes() {
+    let textured = of_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/textured.toml"));
+    assert!(asked_for(&textured).contains(&"textures"));
+    let feature = textured.features.iter().find(|feature| feature.name == "textures").unwrap();
+    let pictures: usize = textured.textures.iter().map(|texture| texture.bytes).sum();
+    let uvs: usize = textured.meshes.iter().map(|mesh| mesh.uv_bytes).sum();
+    assert!(uvs > 0 && pictures > 0);
+    assert_eq!((feature.bytes, textured.memory.textures), (pictures + uvs, pictures));
+    assert!(textured.kernels.iter().any(|kernel| kernel.contains("texels")));
+}
+
+#[test]
+fn what_travels_is_what_is_sent() {
+    let bare = explained(BARE);
+    let assets = bare.meshes.iter().map(|mesh| mesh.bytes).sum::<usize>();
+    assert_eq!(bare.travel.once, bare.travel.scene_body + assets);
+    // The README says so.
+    assert!((48..200).contains(&bare.travel.per_frame), "{:?}", bare.travel);
+    assert_eq!(bare.travel.pixels_per_frame, 64 * 48 * 3);
+}
+
+#[test]
+fn the_text_has_every_feature_and_figure() {
+    let room = of_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/room.toml"));
+    let text = text::text(&room);
+    for feature in &room.features {
+        assert!(text.contains(feature.name), "{} is missing in:\n{text}", feature.name);
+    }
+    for words in ["209,972 triangles", "to a worker once", "786,432 primary", "and ", " more"] {
+        assert!(text.contains(words), "{words} is missing in:\n{text}");
+    }
+}
