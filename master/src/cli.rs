@@ -243,6 +243,8 @@ pub(crate) struct PlotArgs {
     /// Upwards from zero, however far the values are from it.
     #[arg(long, conflicts_with = "log_y")]
     pub(crate) from_zero: bool,
+}
+
 /// `explain`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ExplainArgs {

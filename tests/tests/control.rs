@@ -169,9 +169,7 @@ fn keys_pause_all_workers_and_the_one_selected() {
     press(&["f", "c", "c"]);
     wait_until("the window has gone", || {
         screen.xdotool(&["key", "Escape"]);
-        !screen
-            .xdotool(&["search", "--onlyvisible", "--name", "rayfarm"])
-            .is_some_and(|found| !found.is_empty())
+        screen.xdotool(&["search", "--onlyvisible", "--name", "rayfarm"]).is_none_or(|found| found.is_empty())
     });
     window.finish().expect_success();
 }

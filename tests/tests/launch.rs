@@ -82,7 +82,8 @@ impl Drop for Room {
 /// The line about a worker.
 fn line<'a>(outcome: &'a Outcome, name: &str) -> &'a str {
     let found = outcome.stdout.lines().find(|line| line.split_whitespace().next() == Some(name));
-    found.unwrap_or_else(|| panic!("no line about {name}: {outcome:#?}"))
+    assert!(found.is_some(), "no line about {name}: {outcome:#?}");
+    found.unwrap()
 }
 
 #[test]

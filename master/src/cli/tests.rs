@@ -86,8 +86,8 @@ fn the_other_commands_are_read() {
         }
         other => panic!("{other:?}"),
     }
-    match parse("rayfarm-master explain a.toml --size 64x48 --samples 4 --json") {
-        Ok(Invocation::Command(Command::Explain(args), _)) => {
+    match command("rayfarm-master explain a.toml --size 64x48 --samples 4 --json") {
+        Command::Explain(args) => {
             assert_eq!((args.scene, args.json, args.samples), ("a.toml".into(), true, Some(4)));
             assert_eq!(args.size, Some(Size { width: 64, height: 48 }));
         }
@@ -97,8 +97,8 @@ fn the_other_commands_are_read() {
         ("rayfarm-master check-numerics", None, None),
         ("rayfarm-master check-numerics a.obj --rays 10000000", Some("a.obj".into()), Some(10_000_000)),
     ] {
-        match parse(line) {
-            Ok(Invocation::Command(Command::CheckNumerics(args), _)) => {
+        match command(line) {
+            Command::CheckNumerics(args) => {
                 assert_eq!((args.scene, args.rays, args.json), (scene, rays, false));
             }
             other => panic!("{other:?}"),

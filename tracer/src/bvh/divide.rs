@@ -138,7 +138,7 @@ impl<'a> Division<'a> {
         bounds = EMPTY;
         for at in 1..count {
             bounds = self.with(bounds, sorted[at - 1]);
-            if at % unit == 0 || (count - at) % unit == 0 {
+            if at.is_multiple_of(unit) || (count - at).is_multiple_of(unit) {
                 let cost = price.of(bounds) * leaves(at) + self.behind[at] * leaves(count - at);
                 if cost < best.0 {
                     best = (cost, at);
