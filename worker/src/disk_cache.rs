@@ -26,8 +26,6 @@ const UNFINISHED: &str = "part";
 pub(crate) struct DiskCache {
     folder: PathBuf,
     limit_bytes: u64,
-    /// Numbers the unfinished files of this process.
-    begun: AtomicU64,
     has_complained: AtomicBool,
 }
 
@@ -43,7 +41,7 @@ struct Kept {
 impl DiskCache {
     /// A cache in this folder, which is made when there is something to keep.
     pub(crate) fn new(folder: PathBuf, limit_bytes: u64) -> Self {
-        Self { folder, limit_bytes, begun: AtomicU64::new(0), has_complained: AtomicBool::new(false) }
+        Self { folder, limit_bytes, has_complained: AtomicBool::new(false) }
     }
 
     /// How long an asset is, if it is here.
@@ -93,7 +91,9 @@ impl DiskCache {
         }
         make_folder(&self.folder)?;
         self.make_room(size);
-        let number = self.begun.fetch_add(1, Ordering::Relaxed);
+        // Of the process, not of this cache: others of this process may keep the same asset just now.
+        static BEGUN: AtomicU64 = AtomicU64::new(0);
+        let number = BEGUN.fetch_add(1, Ordering::Relaxed);
         let unfinished = self.folder.join(format!("{id}.{}-{number}.{UNFINISHED}", std::process::id()));
         let written = write_new(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, self.path(id)));
         if written.is_err() {
