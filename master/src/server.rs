@@ -7,7 +7,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
-use rayfarm_protocol::{AssetId, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake};
+use rayfarm_protocol::{AssetId, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, mpsc};
 use tokio_util::sync::CancellationToken;
@@ -86,7 +86,7 @@ struct Newcomer {
 
 /// The handshake. Whoever fails it is logged, and has disturbed nobody.
 async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> Option<Newcomer> {
-    if let Err(error) = stream.set_nodelay(true) {
+    if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
     let mut number = None;

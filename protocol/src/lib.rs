@@ -1,7 +1,8 @@
 //! The wire of rayfarm: what a master and its workers say to each other, over any byte stream.
 //!
 //! Nothing here renders or opens a socket: scenes, frames and pixels are bytes that pass through uninterpreted, and
-//! every function takes any `AsyncRead + AsyncWrite`, so a session over an in-memory pipe is a session.
+//! sessions run over any `AsyncRead + AsyncWrite`, so one over an in-memory pipe is a session. ([`tcp`] only sets up
+//! connections that somebody else has opened.)
 //!
 //! From the wire upwards:
 //!
@@ -22,6 +23,7 @@ pub mod limits;
 pub mod message;
 pub mod pixels;
 pub mod session;
+pub mod tcp;
 mod text;
 
 pub use error::{ProtocolError, Role};

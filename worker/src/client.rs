@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::{Encoding, Hello, Welcome, handshake};
+use rayfarm_protocol::{Encoding, Hello, Welcome, handshake, tcp};
 use tokio::net::TcpStream;
 
 use crate::disk_cache::DiskCache;
@@ -123,7 +123,7 @@ async fn attend<R: Renderer>(
         let error = match connected {
             Ok(stream) => {
                 let begun = Instant::now();
-                let terms = terms(options, is_within_machine(&stream));
+                let terms = terms(options, tcp::is_within_machine(&stream));
                 let end = serve(stream, terms, keep, ending).await;
                 // One that ends as soon as it has begun is no success.
                 if begun.elapsed() > LASTING_SESSION {
@@ -156,11 +156,6 @@ async fn attend<R: Renderer>(
     }
 }
 
-fn is_within_machine(stream: &TcpStream) -> bool {
-    let ends = stream.local_addr().and_then(|ours| Ok((ours.ip(), stream.peer_addr()?.ip())));
-    ends.is_ok_and(|(ours, theirs)| ours == theirs || theirs.is_loopback())
-}
-
 /// Memory is quicker than LZ4, and than most disks.
 fn terms(options: &WorkerOptions, within_machine: bool) -> Terms {
     let usual = if within_machine { Encoding::Raw } else { Encoding::Lz4 };
@@ -186,8 +181,7 @@ async fn connect(master: &str, hello: &Hello) -> Result<TcpStream, WorkerError> 
         Ok(result) => result.map_err(connect_error)?,
         Err(_) => return Err(connect_error(io::Error::new(io::ErrorKind::TimedOut, "no answer"))),
     };
-    // Leases and pings are small and must not wait for company.
-    stream.set_nodelay(true).map_err(connect_error)?;
+    tcp::configure(&stream).map_err(connect_error)?;
     let Welcome { worker } = handshake::as_worker(&mut stream, hello)
         .await
         .map_err(|source| WorkerError::Handshake { master: master.to_owned(), source })?;

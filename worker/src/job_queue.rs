@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use rayfarm_protocol::{Cost, Encoding, FrameId, Lease};
 
+use crate::buffers::Buffers;
 use crate::renderer::Counts;
 
 /// A lease to render, with its frame `F` and whatever answers it, `A`.
@@ -90,7 +91,12 @@ impl<F, A> Job<F, A> {
     }
 
     /// The next rows that nobody has; the buffer is made when the first ones are taken.
-    fn take_band(&self, band_rows: u32, row_bytes: usize) -> Option<(Range<u32>, BytesMut)> {
+    fn take_band(
+        &self,
+        band_rows: u32,
+        row_bytes: usize,
+        buffers: &Buffers,
+    ) -> Option<(Range<u32>, BytesMut)> {
         let mut progress = self.progress();
         let Range { start, end } = progress.rows.clone();
         if start >= end || self.is_cancelled() {
@@ -99,7 +105,7 @@ impl<F, A> Job<F, A> {
         progress.begun.get_or_insert_with(Instant::now);
         let stop = (start + 1).next_multiple_of(band_rows).min(end);
         let all_bytes = (end - start) as usize * row_bytes;
-        let room = progress.room.get_or_insert_with(|| BytesMut::zeroed(all_bytes));
+        let room = progress.room.get_or_insert_with(|| buffers.take(all_bytes));
         let bytes = room.split_to((stop - start) as usize * row_bytes);
         progress.rows = stop..end;
         Some((start..stop, bytes))
@@ -166,9 +172,14 @@ impl<F, A> JobQueue<F, A> {
     }
 
     /// Rows of the earliest job that still has some.
-    pub(crate) fn take_band(&self, band_rows: u32, row_bytes: impl Fn(&F) -> usize) -> Option<Band<F, A>> {
+    pub(crate) fn take_band(
+        &self,
+        band_rows: u32,
+        row_bytes: impl Fn(&F) -> usize,
+        buffers: &Buffers,
+    ) -> Option<Band<F, A>> {
         self.jobs.iter().find_map(|job| {
-            let (rows, bytes) = job.take_band(band_rows, row_bytes(&job.frame))?;
+            let (rows, bytes) = job.take_band(band_rows, row_bytes(&job.frame), buffers)?;
             Some(Band { job: Arc::clone(job), rows, bytes })
         })
     }
@@ -209,7 +220,7 @@ mod tests {
     }
 
     fn take(queue: &JobQueue<(), ()>) -> Option<(u32, Range<u32>, Band<(), ()>)> {
-        let band = queue.take_band(8, |()| WIDTH * 3)?;
+        let band = queue.take_band(8, |()| WIDTH * 3, &Buffers::default())?;
         Some((band.job.lease.segment, band.rows.clone(), band))
     }
 

@@ -12,6 +12,7 @@
 //! What is drawn, and how, is behind [`Renderer`]; the real one is [`TracerRenderer`].
 
 mod asset_store;
+mod buffers;
 pub mod cli;
 mod client;
 mod desk;

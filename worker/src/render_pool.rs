@@ -8,6 +8,7 @@ use rayfarm_protocol::pixels::Packer;
 use rayfarm_protocol::{Encoding, FrameId, PixelsHeader, ToMaster};
 use tokio::sync::mpsc;
 
+use crate::buffers::Buffers;
 use crate::guard::guarded;
 use crate::job_queue::{Band, BandCost, Job, JobQueue, Pixels, Rendered};
 use crate::renderer::{Cancelled, Renderer};
@@ -44,6 +45,7 @@ struct Shared<R: Renderer> {
     renderer: Arc<R>,
     state: Mutex<State<R>>,
     work: Condvar,
+    buffers: Buffers,
 }
 
 struct State<R: Renderer> {
@@ -55,7 +57,7 @@ impl<R: Renderer> RenderPool<R> {
     /// Starts the threads.
     pub(crate) fn new(renderer: Arc<R>, threads: usize) -> io::Result<Self> {
         let state = Mutex::new(State { queue: JobQueue::new(), stopping: false });
-        let shared = Arc::new(Shared { renderer, state, work: Condvar::new() });
+        let shared = Arc::new(Shared { renderer, state, work: Condvar::new(), buffers: Buffers::default() });
         let pool = Self { shared };
         for index in 0..threads {
             let shared = Arc::clone(&pool.shared);
@@ -104,12 +106,13 @@ impl<R: Renderer> Shared<R> {
 
     fn next_band(&self) -> Option<PoolBand<R>> {
         let band_rows = self.renderer.band_rows().max(1);
+        let row_bytes = |frame: &ReadyFrame<R::Frame>| frame.width as usize * 3;
         let mut state = self.state();
         loop {
             if state.stopping {
                 return None;
             }
-            if let Some(band) = state.queue.take_band(band_rows, |frame| frame.width as usize * 3) {
+            if let Some(band) = state.queue.take_band(band_rows, row_bytes, &self.buffers) {
                 return Some(band);
             }
             state = self.work.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -147,6 +150,9 @@ impl<R: Renderer> Shared<R> {
         };
         if let Some(rendered) = job.finish_band(rows, Pixels { raw, block }, cost) {
             self.state().queue.remove(&job);
+            if rendered.encoding == Encoding::Raw {
+                self.buffers.lend(&rendered.bytes);
+            }
             send(&job, rendered);
         }
     }

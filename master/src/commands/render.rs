@@ -75,7 +75,7 @@ struct Run {
     /// So many must be there before the run begins, however long that takes.
     wait_for_workers: Option<u32>,
     /// Pictures that the writer has no room for yet.
-    unwritten: VecDeque<(u64, RgbImage)>,
+    unwritten: VecDeque<(u64, FinishedFrame)>,
     writer: FrameWriter,
     totals: Totals,
     oversight: Oversight,
@@ -173,14 +173,15 @@ impl Run {
         if index + 1 == self.frames {
             self.totals.hash = blake3::hash(&frame.pixels);
         }
-        let FrameView { width, height, .. } = frame.view;
-        self.unwritten.push_back((index, RgbImage { width, height, pixels: frame.pixels.into_vec() }));
+        self.unwritten.push_back((index, frame));
         Ok(())
     }
 
     fn write_next(&mut self) {
-        if let Some((index, picture)) = self.unwritten.pop_front() {
-            self.writer.write(index, picture);
+        if let Some((index, frame)) = self.unwritten.pop_front() {
+            // A frame without a file keeps its memory, which serves a later frame.
+            let FrameView { width, height, .. } = frame.view;
+            self.writer.write(index, || RgbImage { width, height, pixels: frame.pixels.into_vec() });
         }
     }
 
