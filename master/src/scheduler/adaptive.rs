@@ -7,6 +7,7 @@
 
 use std::time::Duration;
 
+use super::forecast::Tiles;
 use super::frame::Frame;
 use super::policy::MAX_WINDOW;
 use super::worker::Worker;
@@ -160,15 +161,14 @@ impl Scheduler {
             let step = self.tile_rows.min(rows.max(1));
             return Some(to_boundary(run.first, rows.max(1), step).min(limit));
         };
-        let queued = self.frames.iter().take(index + 1).flat_map(|frame| &frame.queue);
-        let waits: f64 = queued.map(|run| self.costs.work(run.first..run.first + run.count)).sum();
+        let waits: f64 = self.frames.iter().take(index + 1).map(Frame::waiting_work).sum();
         let until_done = (waits + crew.under_way) / crew.total;
         let shortest = SHORTEST_SEGMENT.max(crew.hands.len() as f64 * MESSAGE_SECONDS / MESSAGES_SHARE);
         let takes = (SHARE * (until_done - hand.free_in)).clamp(shortest, LONGEST_SEGMENT);
-        let rows = self.costs.rows_for(run.first, run.count, takes * speed);
+        let rows = frame.forecast.rows_for(run.first, run.count, takes * speed);
         let step = self.step(frame, crew, hand.free_in, speed, until_done);
         let rows = to_boundary(run.first, rows, step).min(limit).min(run.count);
-        let work = self.costs.work(run.first..run.first + rows);
+        let work = frame.forecast.work(run.first..run.first + rows);
         // Towards the end, somebody else may be free and done before this one is; but where all are idle, they might each
         // leave it to another.
         let done_in = hand.free_in + work / speed;
@@ -181,10 +181,10 @@ impl Scheduler {
     /// complete earlier. Cutting the next band of tiles, and all that are as expensive, costs everybody (see `CostMap`);
     /// a band that is not cut may keep everybody waiting for this one worker.
     fn step(&self, frame: &Frame, crew: &Crew, free_in: f64, speed: f64, until_done: f64) -> u32 {
-        let tile = self.tile_rows.max(1);
+        let Tiles { rows: tile, share } = frame.forecast.tiles;
         let band = |row: u32| {
             let first = row - row % tile;
-            self.costs.work(first..(first + tile).min(frame.height))
+            frame.forecast.work(first..(first + tile).min(frame.height))
         };
         let Some(next) = frame.queue.front().map(|run| band(run.first)) else { return tile };
         let rows =
@@ -194,8 +194,8 @@ impl Scheduler {
         let weight = if self.max_frames() > 1 { OVERLAPPED } else { 1.0 };
         let seconds = |step: u32| {
             let part = f64::from(step) / f64::from(tile);
-            let added = self.tile_share * (1.0 / part - 1.0);
-            let piece = next * (self.tile_share + (1.0 - self.tile_share) * part) / speed;
+            let added = share * (1.0 / part - 1.0);
+            let piece = next * (share + (1.0 - share) * part) / speed;
             alike * added / crew.total + weight * (free_in + piece - until_done).max(0.0)
         };
         let halves = std::iter::successors(Some(tile), |&step| (step > 1).then_some(step / 2));

@@ -108,8 +108,10 @@ impl Scheduler {
     /// Writes a lease down and has it sent.
     pub(super) fn grant(&mut self, now: Duration, id: WorkerId, lease: Lease, crew: Option<&mut Crew>) {
         let rows = lease.first_row..lease.first_row + lease.row_count;
-        let work = self.costs.work(rows.clone());
-        let longest = self.costs.longest_band(rows);
+        let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
+        frame.started_at.get_or_insert(now);
+        let work = frame.forecast.work(rows.clone());
+        let longest = frame.forecast.longest_band(rows);
         // Frames in flight share the workers: one is complete every so often.
         let every = self.last_frame / self.max_frames() as u32;
         let Some(worker) = self.workers.get_mut(&id) else { return };
@@ -122,8 +124,5 @@ impl Scheduler {
             self.actions.push_back(Action::Announce { worker: id, frame: lease.frame });
         }
         self.actions.push_back(Action::Grant { worker: id, lease });
-        if let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) {
-            frame.started_at.get_or_insert(now);
-        }
     }
 }

@@ -1,132 +1,54 @@
-//! What each row of the picture cost last time: the prediction of the policy `adaptive`.
-//!
-//! Work is counted in rows of average cost, so a speed is average rows a second and means the same from frame to
-//! frame. Only ratios between rows matter.
+//! What rows cost in the last frames, and where that is going: the source of the forecasts of the policy `adaptive`.
 
-use std::ops::Range;
+use super::forecast::{Forecast, Tiles};
+use super::motion::{motion, moved};
 
 /// How much of a row's cost the newest frame decides.
 const NEWEST: f64 = 0.85;
-/// How much of a segment's cost is taken to lie evenly over its rows, and not as was known before.
-const EVEN: f64 = 0.5;
 /// No row is predicted to cost less than this share of the average: empty rows still travel.
 const CHEAPEST: f64 = 0.02;
 
-/// Predicted work per row; 1 on average. Cutting a band of tiles costs: its rays share what they look at.
-#[derive(Debug)]
+/// Work per row as of the last complete frame; 1 on average.
+#[derive(Debug, Default)]
 pub(super) struct CostMap {
     rows: Vec<f64>,
-    /// Sums of `rows`: work of the rows before each.
-    sums: Vec<f64>,
-    /// What the frames in flight have told so far.
-    seen: Vec<Option<f64>>,
-    tile_rows: u32,
-    /// What a band of a tile's height costs however few of its rows are traced, as a share of the whole.
-    tile_share: f64,
+    /// What the last complete frame was seen to cost.
+    last: Vec<f64>,
+    /// By how many rows costs move down from frame to frame.
+    velocity: isize,
 }
 
 impl CostMap {
-    pub(super) fn new(tile_rows: u32, tile_share: f64) -> Self {
-        Self { rows: Vec::new(), sums: vec![0.0], seen: Vec::new(), tile_rows: tile_rows.max(1), tile_share }
-    }
-
-    /// The predicted work of whole rows; 1 each where nothing is known.
-    fn plain(&self, rows: Range<u32>) -> f64 {
-        match (self.sums.get(rows.start as usize), self.sums.get(rows.end as usize)) {
-            (Some(before), Some(after)) => after - before,
-            _ => f64::from(rows.end.saturating_sub(rows.start)),
-        }
-    }
-
-    /// The predicted work of rows that are traced by themselves: cut bands included.
-    pub(super) fn work(&self, rows: Range<u32>) -> f64 {
-        let plain = self.plain(rows.clone());
-        if rows.is_empty() {
-            return plain;
-        }
-        let bands = [rows.start / self.tile_rows, (rows.end - 1) / self.tile_rows];
-        let last = if bands[0] == bands[1] { 1 } else { 2 };
-        plain + bands[..last].iter().map(|&band| self.cutting(band, &rows)).sum::<f64>()
-    }
-
-    /// What a band costs more because only these of its rows are traced together.
-    fn cutting(&self, band: u32, rows: &Range<u32>) -> f64 {
-        let height = self.rows.len().max(rows.end as usize) as u32;
-        let (first, end) = (band * self.tile_rows, ((band + 1) * self.tile_rows).min(height));
-        let traced = rows.end.min(end).saturating_sub(rows.start.max(first));
-        let left_out = 1.0 - f64::from(traced) / f64::from((end - first).max(1));
-        self.tile_share * left_out * self.plain(first..end)
-    }
-
-    /// The work of the most expensive band of tiles among rows: no number of threads is faster than one of them.
-    pub(super) fn longest_band(&self, rows: Range<u32>) -> f64 {
-        let mut first = rows.start;
-        let mut longest = 0.0_f64;
-        while first < rows.end {
-            let end = (first + 1).next_multiple_of(self.tile_rows).min(rows.end);
-            longest = longest.max(self.work(first..end));
-            first = end;
-        }
-        longest
-    }
-
-    /// How many rows from `first` on make up `work`; at least one, at most `limit`.
-    pub(super) fn rows_for(&self, first: u32, limit: u32, work: f64) -> u32 {
-        let (mut low, mut high) = (limit.min(1), limit);
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if self.plain(first..first + middle) < work { low = middle + 1 } else { high = middle }
-        }
-        low
+    /// What a frame of `height` rows is expected to cost that comes `ahead` frames after the last complete one.
+    pub(super) fn forecast(&mut self, height: u32, ahead: usize, tiles: Tiles) -> Forecast {
+        self.resize(height as usize);
+        Forecast::new(moved(&self.rows, self.velocity.saturating_mul(ahead as isize)), tiles)
     }
 
     /// Stretches what is known to a picture of `height` rows.
-    pub(super) fn resize(&mut self, height: u32) {
+    fn resize(&mut self, height: usize) {
         let known = self.rows.len();
-        if known == height as usize {
+        if known == height {
             return;
         }
-        let stretched = (0..height as usize).map(|row| self.rows.get(row * known / height as usize).copied());
+        let stretched = (0..height).map(|row| self.rows.get(row * known / height.max(1)).copied());
         self.rows = stretched.map(|cost| cost.unwrap_or(1.0)).collect();
-        self.seen = vec![None; height as usize];
-        self.sum_up();
-    }
-
-    /// Learns what a segment took: `work` on the scale on which it was predicted. It counts from the next frame on.
-    pub(super) fn learn(&mut self, rows: Range<u32>, work: f64) {
-        let ratio = work / self.work(rows.clone());
-        let even = ratio * self.plain(rows.clone()) / f64::from(rows.len().max(1) as u32);
-        if !ratio.is_finite() || !even.is_finite() {
-            return;
-        }
-        let costs = self.rows.iter().zip(&mut self.seen);
-        for (cost, seen) in costs.take(rows.end as usize).skip(rows.start as usize) {
-            *seen = Some(EVEN * even + (1.0 - EVEN) * ratio * *cost);
-        }
+        self.last.clear();
+        self.velocity = 0;
     }
 
     /// A frame is complete: what was seen counts now, scaled so that the average row costs 1.
-    pub(super) fn fold(&mut self) {
-        let mut now = self.rows.clone();
-        for (cost, seen) in now.iter_mut().zip(&mut self.seen) {
-            *cost = seen.take().unwrap_or(*cost);
+    pub(super) fn learn(&mut self, frame: &Forecast) {
+        let mut now = frame.observed();
+        if now.len() != self.rows.len() {
+            return;
         }
         scale(&mut now);
-        for (cost, now) in self.rows.iter_mut().zip(&now) {
-            *cost += NEWEST * (now - *cost);
-        }
+        self.velocity = motion(&self.last, &now);
+        let before = moved(&self.rows, self.velocity);
+        self.rows = before.iter().zip(&now).map(|(before, now)| before + NEWEST * (now - before)).collect();
         scale(&mut self.rows);
-        self.sum_up();
-    }
-
-    fn sum_up(&mut self) {
-        let mut sum = 0.0;
-        self.sums.clear();
-        self.sums.push(0.0);
-        self.sums.extend(self.rows.iter().map(|cost| {
-            sum += cost;
-            sum
-        }));
+        self.last = now;
     }
 }
 
@@ -143,68 +65,51 @@ fn scale(rows: &mut [f64]) {
 mod tests {
     use super::*;
 
-    fn map(height: u32) -> CostMap {
-        let mut map = CostMap::new(16, 0.0);
-        map.resize(height);
+    const TILES: Tiles = Tiles { rows: 16, share: 0.0 };
+
+    /// Lets frames complete that cost, per row, what `cost` says of the frame and the row.
+    fn taught(height: u32, frames: u32, cost: impl Fn(u32, u32) -> f64) -> CostMap {
+        let mut map = CostMap::default();
+        for frame in 0..frames {
+            let mut forecast = map.forecast(height, 1, TILES);
+            for row in 0..height {
+                forecast.learn(row..row + 1, cost(frame, row));
+            }
+            map.learn(&forecast);
+        }
         map
     }
 
     #[test]
-    fn unknown_rows_are_average() {
-        let map = CostMap::new(16, 0.0);
-        assert_eq!(map.work(3..11), 8.0);
-        assert_eq!(map.rows_for(3, 100, 7.5), 8);
+    fn expensive_rows_are_expected_again() {
+        let forecast = taught(100, 20, |_, row| if row < 50 { 3.0 } else { 1.0 }).forecast(100, 1, TILES);
+        assert!((forecast.work(0..50) / forecast.work(50..100) - 3.0).abs() < 0.01);
+        assert!(forecast.rows_for(0, 50, 15.0) * 2 < forecast.rows_for(50, 50, 15.0));
+        assert!((forecast.work(0..100) - 100.0).abs() < 1e-6);
     }
 
     #[test]
-    fn expensive_rows_make_short_segments() {
-        let mut map = map(100);
-        for _ in 0..20 {
-            map.learn(0..50, 150.0 * map.work(0..100) / 100.0);
-            map.learn(50..100, 50.0);
-            map.fold();
+    fn costs_that_move_are_expected_farther_on() {
+        let hill = |frame: u32, row: u32| {
+            let from_centre = f64::from(row) - 150.0 - 10.0 * f64::from(frame);
+            1.0 + 20.0 * (-0.5 * (from_centre / 46.0).powi(2)).exp()
+        };
+        let mut map = taught(768, 12, hill);
+        for ahead in 1..=2 {
+            let forecast = map.forecast(768, ahead, TILES);
+            let dearest =
+                (0..768).max_by(|&a, &b| forecast.work(a..a + 1).total_cmp(&forecast.work(b..b + 1)));
+            let expected = 150 + 10 * (11 + ahead as u32);
+            assert!(dearest.is_some_and(|row| row.abs_diff(expected) <= 3), "{dearest:?}, not {expected}");
         }
-        assert!((map.work(0..50) / map.work(50..100) - 3.0).abs() < 0.01);
-        assert!(map.rows_for(0, 50, 15.0) * 2 < map.rows_for(50, 50, 15.0));
-        assert!((map.work(0..100) - 100.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn what_a_frame_tells_counts_from_the_next_one_on() {
-        let mut map = map(4);
-        map.learn(0..2, 6.0);
-        assert_eq!(map.work(0..2), 2.0);
-        map.fold();
-        assert!(map.work(0..2) > 2.5);
     }
 
     #[test]
     fn a_new_height_keeps_the_shape() {
-        let mut map = map(2);
-        map.learn(0..1, 5.0);
-        map.fold();
-        let ratio = map.work(0..1) / map.work(1..2);
-        map.resize(8);
-        assert!((map.work(3..4) / map.work(4..5) - ratio).abs() < 1e-9);
-        map.resize(0);
-        assert_eq!(map.work(0..4), 4.0);
-    }
-
-    #[test]
-    fn cut_tiles_cost_more_than_whole_ones() {
-        let mut map = CostMap::new(16, 0.4);
-        map.resize(64);
-        assert_eq!(map.work(16..48), 32.0);
-        assert!((map.work(16..24) - (8.0 + 0.4 * 0.5 * 16.0)).abs() < 1e-9);
-        assert!((map.work(8..24) - (16.0 + 2.0 * 0.4 * 0.5 * 16.0)).abs() < 1e-9);
-        assert!((map.longest_band(8..40) - 16.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn at_least_one_row_and_never_beyond_the_limit() {
-        let map = CostMap::new(16, 0.0);
-        assert_eq!(map.rows_for(0, 5, 0.0), 1);
-        assert_eq!(map.rows_for(0, 5, f64::INFINITY), 5);
-        assert_eq!(map.rows_for(0, 0, 9.0), 0);
+        let mut map = taught(2, 1, |_, row| if row == 0 { 5.0 } else { 1.0 });
+        let ratio = |forecast: &Forecast, a: u32, b: u32| forecast.work(a..a + 1) / forecast.work(b..b + 1);
+        let before = ratio(&map.forecast(2, 1, TILES), 0, 1);
+        assert!((ratio(&map.forecast(8, 1, TILES), 3, 4) - before).abs() < 1e-9);
+        assert_eq!(map.forecast(0, 1, TILES).work(0..4), 4.0);
     }
 }

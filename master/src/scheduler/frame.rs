@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use super::forecast::Forecast;
 use super::{Cost, FrameId, Lease, WorkerId};
 
 /// Rows that wait for a worker.
@@ -41,6 +42,7 @@ pub(super) struct Frame {
     pub(super) id: FrameId,
     pub(super) width: u32,
     pub(super) height: u32,
+    pub(super) forecast: Forecast,
     /// When its first lease was granted.
     pub(super) started_at: Option<Duration>,
     pub(super) queue: VecDeque<Run>,
@@ -54,11 +56,17 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    pub(super) fn new(id: FrameId, width: u32, height: u32, runs: impl IntoIterator<Item = Run>) -> Self {
+    pub(super) fn new(
+        id: FrameId,
+        (width, height): (u32, u32),
+        forecast: Forecast,
+        runs: impl IntoIterator<Item = Run>,
+    ) -> Self {
         Self {
             id,
             width,
             height,
+            forecast,
             started_at: None,
             queue: runs.into_iter().collect(),
             segments: BTreeMap::new(),
@@ -72,6 +80,11 @@ impl Frame {
     /// Rows that were leased at least once and are not queued again.
     pub(super) fn rows_leased(&self) -> u32 {
         self.height - self.queue.iter().map(|run| run.count).sum::<u32>()
+    }
+
+    /// The predicted work of the rows that wait.
+    pub(super) fn waiting_work(&self) -> f64 {
+        self.queue.iter().map(|run| self.forecast.work(run.first..run.first + run.count)).sum()
     }
 
     /// A worker says that it cannot render this frame.
@@ -207,13 +220,15 @@ fn cut(run: Run, rows: u32) -> (Run, Option<Run>) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::forecast::Tiles;
     use super::*;
 
     const A: WorkerId = WorkerId(1);
     const B: WorkerId = WorkerId(2);
 
     fn frame(rows: u32) -> Frame {
-        Frame::new(FrameId(7), 10, rows, [Run::new(0, rows)])
+        let forecast = Forecast::new(vec![1.0; rows as usize], Tiles { rows: 16, share: 0.0 });
+        Frame::new(FrameId(7), (10, rows), forecast, [Run::new(0, rows)])
     }
 
     #[test]

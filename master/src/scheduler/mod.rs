@@ -13,8 +13,10 @@ pub mod check;
 mod copies;
 mod cost_map;
 mod event;
+mod forecast;
 mod frame;
 mod lapses;
+mod motion;
 pub mod policy;
 mod record;
 mod speed;
@@ -35,6 +37,7 @@ pub use record::{Progress, WorkerRecord, WorkerState};
 
 use assign::MAX_FRAMES;
 use cost_map::CostMap;
+use forecast::Tiles;
 use frame::Frame;
 use lapses::FIRST_PATIENCE;
 use worker::{PING_EVERY, Service, Worker};
@@ -109,7 +112,7 @@ impl Scheduler {
             workers: BTreeMap::new(),
             frames: VecDeque::new(),
             waiting: None,
-            costs: CostMap::new(tile_rows, TILE_SHARE),
+            costs: CostMap::default(),
             actions: VecDeque::new(),
             next_nonce: 0,
             patience: FIRST_PATIENCE,
@@ -131,7 +134,6 @@ impl Scheduler {
     #[must_use]
     pub fn with_tile_share(mut self, share: f64) -> Self {
         self.tile_share = share;
-        self.costs = CostMap::new(self.tile_rows, share);
         self
     }
 
@@ -250,8 +252,9 @@ impl Scheduler {
     fn begin_waiting(&mut self) {
         let Some(Request { frame, width, height }) = self.waiting.take() else { return };
         let runs = self.policy.runs(height, self.max_rows(width));
-        self.costs.resize(height);
-        self.frames.push_back(Frame::new(frame, width, height, runs));
+        let tiles = Tiles { rows: self.tile_rows, share: self.tile_share };
+        let forecast = self.costs.forecast(height, self.frames.len() + 1, tiles);
+        self.frames.push_back(Frame::new(frame, (width, height), forecast, runs));
         self.actions.push_back(Action::BeginFrame { frame });
     }
 
@@ -271,7 +274,7 @@ impl Scheduler {
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
         let is_news = frame.finish(&lease, cost);
         if let Some(work) = work.filter(|_| is_news) {
-            self.costs.learn(lease.first_row..lease.first_row + lease.row_count, work);
+            frame.forecast.learn(lease.first_row..lease.first_row + lease.row_count, work);
         }
     }
 
@@ -340,7 +343,7 @@ impl Scheduler {
     /// Reports complete frames, oldest first, and lets the next one begin.
     fn complete_frames(&mut self) {
         while let Some(frame) = self.frames.pop_front_if(|frame| frame.is_complete()) {
-            self.costs.fold();
+            self.costs.learn(&frame.forecast);
             let next = FrameId(frame.id.0.saturating_add(1));
             self.cancel_leases(self.frames.front().map_or(next, |frame| frame.id));
             let elapsed = self.handled_at.saturating_sub(frame.started_at.unwrap_or(self.handled_at));

@@ -34,13 +34,15 @@ fn the_same_seed_is_the_same_run() {
 }
 
 fn efficiency(workers: u32, costs: CostProfile, policy: SegmentPolicy) -> f64 {
-    measure(&Setup { workers, costs, policy, tile_share: 0.0, ..Setup::default() }).unwrap().useful
+    measure(&Setup { workers, costs, policy, tile_share: 0.0, frames: 60, ..Setup::default() })
+        .unwrap()
+        .useful
 }
 
 #[test]
 fn workers_are_used_nearly_to_the_full() {
     for costs in [CostProfile::Bust, CostProfile::Corner] {
-        for (workers, least) in [(1, 0.95), (8, 0.9), (32, 0.8)] {
+        for (workers, least) in [(1, 0.95), (8, 0.95), (32, 0.9), (128, 0.8)] {
             let reached = efficiency(workers, costs.clone(), SegmentPolicy::Adaptive);
             assert!(reached > least, "{costs:?} with {workers} workers: {reached}");
         }
