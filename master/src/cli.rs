@@ -5,7 +5,6 @@
 //! that word belongs to the worker's own command line.
 
 use std::ffi::OsString;
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::error::ErrorKind;
@@ -13,15 +12,18 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::control::Place;
-use crate::farm::{FarmOptions, SegmentPolicy};
 pub(crate) use values::Size;
-use values::{
-    degrees, frame_count, listen_address, ray_count, sample_count, size, thread_count, worker_count,
-};
+use values::{frame_count, ray_count, sample_count, size, thread_count, worker_count};
 
+mod farm;
+mod picture;
+mod plot;
 mod simulate;
 mod values;
 
+pub(crate) use farm::FarmArgs;
+pub(crate) use picture::{PictureArgs, QualityArgs};
+pub(crate) use plot::PlotArgs;
 pub(crate) use simulate::{Profile, SimulateArgs};
 
 /// The word that turns the master into a worker.
@@ -194,57 +196,6 @@ pub(crate) struct BenchArgs {
     pub(crate) json: bool,
 }
 
-/// `plot`.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct PlotArgs {
-    /// Tables (.csv) whose first line names the columns; their rows count as those of one table.
-    #[arg(required = true, value_name = "CSV")]
-    pub(crate) tables: Vec<PathBuf>,
-    /// The plot to write: .svg or .png; give it again for both.
-    #[arg(short, long, value_name = "FILE", required = true)]
-    pub(crate) output: Vec<PathBuf>,
-    /// The column that goes to the right. Rows where it is empty are drawn as a level across the whole plot.
-    #[arg(long, value_name = "COLUMN")]
-    pub(crate) x: String,
-    /// The column that goes upwards. Rows of one series with the same x are repeats: their median, least and greatest
-    /// are shown.
-    #[arg(long, value_name = "COLUMN")]
-    pub(crate) y: String,
-    /// Rows that agree in these columns are one series.
-    #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
-    pub(crate) series: Vec<String>,
-    /// The column whose text stands beside each point.
-    #[arg(long, value_name = "COLUMN")]
-    pub(crate) label: Option<String>,
-    /// Only rows where that column has that text.
-    #[arg(long = "where", value_name = "COLUMN=TEXT", value_parser = values::equation)]
-    pub(crate) only: Vec<(String, String)>,
-    /// Points without lines between them; each row is one.
-    #[arg(long)]
-    pub(crate) scatter: bool,
-    /// A series, by its name in the legend, that is only there to compare with.
-    #[arg(long, value_name = "SERIES")]
-    pub(crate) dashed: Vec<String>,
-    /// What stands above.
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    pub(crate) title: String,
-    /// What x is; without it, the column's name.
-    #[arg(long, value_name = "TEXT")]
-    pub(crate) x_label: Option<String>,
-    /// What y is; without it, the column's name.
-    #[arg(long, value_name = "TEXT")]
-    pub(crate) y_label: Option<String>,
-    /// Equal distances to the right are equal ratios.
-    #[arg(long)]
-    pub(crate) log_x: bool,
-    /// Equal distances upwards are equal ratios.
-    #[arg(long)]
-    pub(crate) log_y: bool,
-    /// Upwards from zero, however far the values are from it.
-    #[arg(long, conflicts_with = "log_y")]
-    pub(crate) from_zero: bool,
-}
-
 /// `explain`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ExplainArgs {
@@ -256,6 +207,8 @@ pub(crate) struct ExplainArgs {
     /// Rays per pixel: a square number, 1, 4, 9, 16, ...
     #[arg(long, value_name = "N", value_parser = sample_count)]
     pub(crate) samples: Option<u32>,
+    #[command(flatten)]
+    pub(crate) quality: QualityArgs,
     /// Print one line of JSON on standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -274,47 +227,6 @@ pub(crate) struct CheckNumericsArgs {
     pub(crate) json: bool,
 }
 
-/// Who renders.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct FarmArgs {
-    /// Where workers connect, for workers on other machines [default: 127.0.0.1:7117].
-    #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address)]
-    listen: Option<SocketAddr>,
-    /// Worker processes on this machine that the master starts and ends.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
-    local_workers: u32,
-    /// Start no worker: wait for others to connect.
-    #[arg(long, conflicts_with = "local_workers")]
-    no_local_workers: bool,
-    /// Render threads of each local worker; without it, they share all cores.
-    #[arg(long, value_name = "N", value_parser = thread_count)]
-    threads: Option<usize>,
-    /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
-    #[arg(long, value_name = "POLICY", default_value = "adaptive")]
-    segment: SegmentPolicy,
-    /// Frames that workers may begin before the one on the way is complete: 1, or 0 for the newest camera.
-    #[arg(long, value_name = "0|1", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=1))]
-    pipeline: u8,
-}
-
-impl FarmArgs {
-    /// Local workers to start.
-    pub(crate) fn local_workers(&self) -> u32 {
-        if self.no_local_workers { 0 } else { self.local_workers }
-    }
-
-    /// As the farm wants it.
-    pub(crate) fn options(&self) -> FarmOptions {
-        FarmOptions {
-            listen: self.listen,
-            local_workers: self.local_workers(),
-            threads: self.threads,
-            policy: self.segment,
-            sequential: self.pipeline == 0,
-        }
-    }
-}
-
 /// What watches and steers a run.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct OversightArgs {
@@ -325,23 +237,6 @@ pub(crate) struct OversightArgs {
     /// socket (a path with a slash in it). The command help lists them.
     #[arg(long, value_name = "PLACE", value_parser = Place::parse, allow_hyphen_values = true)]
     pub(crate) control: Option<Place>,
-}
-
-/// What the picture is like; each wins over the scene file.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct PictureArgs {
-    /// Picture size in pixels.
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub(crate) size: Option<Size>,
-    /// Rays per pixel: a square number, 1, 4, 9, 16, ...
-    #[arg(long, value_name = "N", value_parser = sample_count)]
-    pub(crate) samples: Option<u32>,
-    /// The camera goes round its look-at point by this angle over the frames.
-    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = degrees)]
-    pub(crate) orbit: f64,
-    /// The models turn about y by this angle each frame.
-    #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = degrees)]
-    pub(crate) spin: f64,
 }
 
 /// How much is told on standard error; RUST_LOG wins over both.

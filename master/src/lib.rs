@@ -28,6 +28,7 @@ mod roster;
 pub mod scheduler;
 mod server;
 pub mod simulator;
+mod wanted;
 
 #[cfg(test)]
 mod fake_worker;

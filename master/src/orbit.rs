@@ -67,6 +67,7 @@ fn rotated(v: DVec3, axis: DVec3, degrees: f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
+    use rayfarm_tracer::scene::Quality;
 
     use super::*;
 
@@ -76,7 +77,7 @@ mod tests {
 
     fn base() -> FrameView {
         let camera = camera(DVec3::new(0.0, 1.0, 4.0), DVec3::new(0.0, 1.0, 0.0), DVec3::Y);
-        FrameView { camera, width: 64, height: 48, samples: 1, spin: 0.0 }
+        FrameView { camera, width: 64, height: 48, samples: 1, spin: 0.0, quality: Quality::default() }
     }
 
     #[test]

@@ -87,6 +87,7 @@ impl Basis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Quality;
     use crate::tile::lens::Lens;
 
     fn view(width: u32, height: u32, samples: u32) -> FrameView {
@@ -97,7 +98,7 @@ mod tests {
             fov: 90.0,
             zoom: 1.0,
         };
-        FrameView { camera, width, height, samples, spin: 0.0 }
+        FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use common::{light, point};
 use glam::DVec3;
 use rayfarm_tracer::reference::Oracle;
-use rayfarm_tracer::scene::{Attenuation, Camera, FrameView, Light, LightKind, LoadedScene, load};
+use rayfarm_tracer::scene::{Attenuation, Camera, FrameView, Light, LightKind, LoadedScene, Quality, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 const WIDTH: u32 = 122;
@@ -24,7 +24,8 @@ fn loaded(name: &str) -> LoadedScene {
 /// Pixels that differ from the oracle's by more than one step of a channel; every `step`th is looked at.
 fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
     let scene = &loaded.scene;
-    let view = FrameView { width: WIDTH, height: HEIGHT, samples: 1, camera: *camera, spin: 0.0 };
+    let (width, height, quality) = (WIDTH, HEIGHT, Quality::default());
+    let view = FrameView { width, height, samples: 1, camera: *camera, spin: 0.0, quality };
     let (meshes, textures) = (loaded.meshes.iter().cloned(), loaded.textures.iter().cloned());
     let compiled = Arc::new(CompiledScene::new(scene.clone(), meshes, textures).unwrap());
     let frame = PreparedFrame::new(compiled, &view).unwrap();

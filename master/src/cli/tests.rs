@@ -1,4 +1,7 @@
+use std::net::SocketAddr;
+
 use super::*;
+use crate::farm::SegmentPolicy;
 
 fn parse(line: &str) -> Result<Invocation, clap::Error> {
     Invocation::parse(line.split_whitespace().map(OsString::from))
@@ -197,4 +200,36 @@ fn a_run_is_watched_and_steered() {
     assert_eq!(oversight.control, Some(Place::StandardInput));
     assert!(view("rayfarm-master --control 127.0.0.1:7118").oversight.control.is_some());
     assert!(refused("rayfarm-master --control 0.0.0.0:7118").contains("other machines"));
+}
+
+#[test]
+fn knobs_are_read_and_win_over_the_scene() {
+    use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
+
+    let all = "--shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4";
+    let full = Quality::default();
+    let reduced = Quality {
+        shadows: false,
+        shading: Shading::Diffuse,
+        filter: Some(Filter::Nearest),
+        exponent: ExponentPrecision::Fast,
+        colors: ColorDepth::Reduced,
+    };
+    let args = render(&format!("rayfarm-master render a.toml -o b.png {all}")).picture.quality;
+    assert_eq!((args.over(full), args.scale_over(RenderScale::Half)), (reduced, RenderScale::ThreeQuarters));
+    let none = view("rayfarm-master a.toml").picture.quality;
+    assert_eq!((none.over(reduced), none.scale_over(RenderScale::Half)), (reduced, RenderScale::Half));
+    let back = "--shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1";
+    let back = view(&format!("rayfarm-master {back} a.toml")).picture.quality;
+    assert_eq!(back.over(reduced), Quality { filter: Some(Filter::Bilinear), ..full });
+    assert_eq!(back.scale_over(RenderScale::Half), RenderScale::Full);
+    for command in ["bench", "explain"] {
+        parse(&format!("rayfarm-master {command} a.toml {all}")).unwrap();
+    }
+    for (wrong, known) in
+        [("--shadows yes", "on, off"), ("--scale 0.6", "1, 3/4"), ("--colors 565", "reduced")]
+    {
+        let message = refused(&format!("rayfarm-master bench a.toml {wrong}"));
+        assert!(message.contains(known), "{message}");
+    }
 }

@@ -13,6 +13,7 @@ use crate::cli::BenchArgs;
 use crate::display::overlay::{counted, grouped};
 use crate::error::CommandError;
 use crate::report::{BenchReport, MsPerFrame, RaysPerFrame, print_json, round_to_us};
+use crate::wanted::WantedPicture;
 
 /// Measures the frames of a scene and tells the figures on standard output.
 ///
@@ -21,7 +22,8 @@ use crate::report::{BenchReport, MsPerFrame, RaysPerFrame, print_json, round_to_
 pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
     let started = Instant::now();
     let source = Source::load(&args.scene)?;
-    let view = source.view(&args.picture)?;
+    let wanted = source.wanted(&args.picture)?;
+    let view = wanted.rendered();
     let scene = Arc::new(source.compiled()?);
     let load = started.elapsed();
     let threads = args.threads.unwrap_or_else(all_cores);
@@ -33,7 +35,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
     for index in 0..u64::from(args.frames) {
         bench.frame(&animation.view(&view, index))?;
     }
-    let report = bench.report(&view, load);
+    let report = bench.report(&wanted, load);
     if args.json { print_json(&report) } else { print_table(&report) }
 }
 
@@ -72,7 +74,8 @@ impl Bench {
         self.rays = RayCounts::default();
     }
 
-    fn report(&self, view: &FrameView, load: Duration) -> BenchReport {
+    fn report(&self, wanted: &WantedPicture, load: Duration) -> BenchReport {
+        let view = &wanted.view;
         let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
         let RayCounts { primary, shadow, secondary, .. } = self.rays;
         let rays = RaysPerFrame { primary, shadow, secondary };
@@ -82,6 +85,7 @@ impl Bench {
             width: view.width,
             height: view.height,
             samples: view.samples,
+            quality: wanted.knobs(),
             threads: self.threads,
             triangles: self.scene.triangle_count(),
             load_ms: round_to_us(load),

@@ -20,6 +20,7 @@ use crate::assets::Assets;
 use crate::cli::ExplainArgs;
 use crate::error::CommandError;
 use crate::report::print_json;
+use crate::wanted::{Knobs, WantedPicture};
 
 /// What is told of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,6 +29,11 @@ struct Explanation {
     width: u32,
     height: u32,
     samples: u32,
+    /// Where the knobs stand.
+    quality: Knobs,
+    /// Those that are not at full quality.
+    #[serde(skip)]
+    reductions: Vec<String>,
     /// The widest vectors of this machine.
     simd_level: &'static str,
     /// Over all instances.
@@ -118,8 +124,8 @@ struct Rays {
 /// A wrong scene.
 pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
     let source = Source::load(&args.scene)?;
-    let view = source.view_of(args.size, args.samples)?;
-    let explanation = explain(&source, &view)?;
+    let wanted = source.wanted_still(args.size, args.samples, &args.quality)?;
+    let explanation = explain(&source, &wanted)?;
     if args.json {
         return print_json(&explanation);
     }
@@ -129,7 +135,8 @@ pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
 }
 
-fn explain(source: &Source, view: &FrameView) -> Result<Explanation, CommandError> {
+fn explain(source: &Source, wanted: &WantedPicture) -> Result<Explanation, CommandError> {
+    let view = &wanted.rendered();
     let compiled = source.compiled()?;
     let things = things(source);
     let meshes = mesh_facts(source);
@@ -137,9 +144,11 @@ fn explain(source: &Source, view: &FrameView) -> Result<Explanation, CommandErro
     let memory = memory(&compiled, &meshes, &textures);
     Ok(Explanation {
         scene: source.name.clone(),
-        width: view.width,
-        height: view.height,
+        width: wanted.view.width,
+        height: wanted.view.height,
         samples: view.samples,
+        quality: wanted.knobs(),
+        reductions: wanted.reductions(),
         simd_level: simd_level(),
         triangles: compiled.triangle_count(),
         things,

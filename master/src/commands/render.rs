@@ -23,6 +23,7 @@ use crate::progress::Progress;
 use crate::report::{
     BytesPerFrame, FpsLog, FrameLine, MsPerFrame, RaysPerFrame, RenderReport, mean, print_json,
 };
+use crate::wanted::WantedPicture;
 
 /// The frame being rendered and the one after it, so that workers never run dry between two frames.
 const OPEN_REQUESTS: u64 = 2;
@@ -43,12 +44,12 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let pattern = OutputPattern::parse(&args.output, args.frames)?;
     pattern.path(0).as_deref().map(check_writable).transpose()?;
     let source = Source::load(&args.scene)?;
-    let view = source.view(&args.picture)?;
+    let wanted = source.wanted(&args.picture)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
     let oversight = Oversight::new(&args.oversight)?;
     let run = Run {
-        view,
+        wanted,
         animation: animation(&args.picture, args.frames),
         frames: u64::from(args.frames),
         requested: 0,
@@ -68,7 +69,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
 
 /// One run of `render`.
 struct Run {
-    view: FrameView,
+    wanted: WantedPicture,
     animation: Animation,
     frames: u64,
     requested: u64,
@@ -109,7 +110,7 @@ impl Run {
                 self.writer.written(),
                 self.frames
             ))),
-            result => result.map(|()| self.totals.report(&self.view)),
+            result => result.map(|()| self.totals.report(&self.wanted)),
         }
     }
 
@@ -187,7 +188,7 @@ impl Run {
 
     fn request_up_to(&mut self, count: u64, farm: &Farm) {
         while self.requested < count.min(self.frames) {
-            farm.request(self.animation.view(&self.view, self.requested));
+            farm.request(self.animation.view(&self.wanted.rendered(), self.requested));
             self.requested += 1;
         }
     }
@@ -258,13 +259,15 @@ impl Totals {
         self.rate.fps(self.started.elapsed())
     }
 
-    fn report(&self, view: &FrameView) -> RenderReport {
+    fn report(&self, wanted: &WantedPicture) -> RenderReport {
+        let view = &wanted.view;
         let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
         RenderReport {
             frames,
             width: view.width,
             height: view.height,
             samples: view.samples,
+            quality: wanted.knobs(),
             workers: self.workers,
             threads: self.threads,
             triangles: self.triangles,

@@ -8,9 +8,10 @@ use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene};
 use rayfarm_tracer::texture::Texture;
 
-use crate::cli::{PictureArgs, Size};
+use crate::cli::{PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
 use crate::orbit::Animation;
+use crate::wanted::WantedPicture;
 
 /// The scene shown when none is named, inside a folder of models.
 const DEFAULT_SCENE: &str = "room.toml";
@@ -48,26 +49,28 @@ impl Source {
     ///
     /// # Errors
     /// A combination that cannot be rendered.
-    pub(super) fn view(&self, picture: &PictureArgs) -> Result<FrameView, CommandError> {
-        self.view_of(picture.size, picture.samples)
+    pub(super) fn wanted(&self, picture: &PictureArgs) -> Result<WantedPicture, CommandError> {
+        self.wanted_still(picture.size, picture.samples, &picture.quality)
     }
 
     /// Likewise, of a picture that does not move.
     ///
     /// # Errors
     /// A combination that cannot be rendered.
-    pub(super) fn view_of(
+    pub(super) fn wanted_still(
         &self,
         size: Option<Size>,
         samples: Option<u32>,
-    ) -> Result<FrameView, CommandError> {
+        quality: &QualityArgs,
+    ) -> Result<WantedPicture, CommandError> {
         let mut view = FrameView::of(&self.scene);
         if let Some(size) = size {
             (view.width, view.height) = (size.width, size.height);
         }
         view.samples = samples.unwrap_or(view.samples);
+        view.quality = quality.over(view.quality);
         view.validate().map_err(CommandError::wrong_input)?;
-        Ok(view)
+        Ok(WantedPicture { view, scale: quality.scale_over(self.scene.render.scale) })
     }
 
     /// The scene as the tracer wants it: trees, bounds and counts.

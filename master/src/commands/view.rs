@@ -1,6 +1,5 @@
 //! `view`: a window on the main thread, the farm beside it.
 
-use rayfarm_tracer::scene::FrameView;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
@@ -15,6 +14,7 @@ use crate::display::window::{About, Display, Link};
 use crate::error::CommandError;
 use crate::farm::{Farm, FarmScene};
 use crate::report::FpsLog;
+use crate::wanted::WantedPicture;
 
 /// `--orbit` without `--frames` goes round over this many frames, and on.
 const FRAMES_PER_ORBIT: u32 = 360;
@@ -26,7 +26,8 @@ const FRAMES_PER_ORBIT: u32 = 360;
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
     let source = Source::load(&path)?;
-    let view = source.view(&args.picture)?;
+    let picture = source.wanted(&args.picture)?;
+    let view = picture.view;
     let compiled = source.compiled()?;
     let about = About {
         name: source.name.clone(),
@@ -45,7 +46,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     })?;
 
     let runtime = super::runtime()?;
-    let (wanted, wishes) = watch::channel(view);
+    let (wanted, wishes) = watch::channel(picture);
     let orders = Orders {
         wanted: wishes,
         animation: animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT)),
@@ -55,7 +56,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
     let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, &oversight, stop))?;
-    let shown = display.run(view, camera, &link).map_err(CommandError::Failed);
+    let shown = display.run(picture, camera, &link).map_err(CommandError::Failed);
     let ended = runtime.block_on(farm).map_err(CommandError::failed)?;
     ended.and(shown).and(oversight.end()).and_then(|()| all_shown(&args, &link, &interrupted))
 }
@@ -64,7 +65,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
 async fn start(
     args: &ViewArgs,
     source: Source,
-    wanted: watch::Sender<FrameView>,
+    wanted: watch::Sender<WantedPicture>,
     orders: Orders,
     oversight: &Oversight,
     stop: CancellationToken,

@@ -9,7 +9,6 @@ use std::io::BufWriter;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use rayfarm_tracer::scene::FrameView;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
@@ -20,6 +19,7 @@ use crate::error::CommandError;
 use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame, FrameId};
 use crate::orbit::Animation;
 use crate::report::{FpsLog, FrameLine};
+use crate::wanted::WantedPicture;
 
 /// How often the window learns of workers that come and go.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
@@ -29,7 +29,7 @@ const OPEN_REQUESTS: usize = 2;
 /// What is asked of the farm.
 pub(crate) struct Orders {
     /// What the window wants to see; the newest counts.
-    pub(crate) wanted: watch::Receiver<FrameView>,
+    pub(crate) wanted: watch::Receiver<WantedPicture>,
     /// What moves by itself.
     pub(crate) animation: Animation,
     /// End after so many frames.
@@ -231,7 +231,7 @@ impl Requests {
     }
 
     /// Asks until two are open.
-    fn fill(&mut self, farm: &Farm, base: &FrameView) {
+    fn fill(&mut self, farm: &Farm, base: &WantedPicture) {
         while self.open.len() < OPEN_REQUESTS && self.ask(farm, base) {}
     }
 
@@ -247,24 +247,24 @@ impl Requests {
 
     /// The next one is due. Asking even when two seem open costs nothing: one of them was replaced, or this replaces
     /// a request that has not begun by one for a newer camera.
-    fn after_finish(&mut self, farm: &Farm, base: &FrameView) {
+    fn after_finish(&mut self, farm: &Farm, base: &WantedPicture) {
         self.ask(farm, base);
         self.fill(farm, base);
     }
 
     /// The camera has moved: the last request shall show what it sees now.
-    fn replace(&mut self, farm: &Farm, base: &FrameView) {
+    fn replace(&mut self, farm: &Farm, base: &WantedPicture) {
         self.moved_at = Some(Instant::now());
         self.next = self.next.saturating_sub(1);
         self.ask(farm, base);
         self.fill(farm, base);
     }
 
-    fn ask(&mut self, farm: &Farm, base: &FrameView) -> bool {
+    fn ask(&mut self, farm: &Farm, base: &WantedPicture) -> bool {
         if self.limit.is_some_and(|limit| self.next >= limit) && !self.open.is_empty() {
             return false;
         }
-        let view = self.animation.view(base, self.next);
+        let view = self.animation.view(&base.rendered(), self.next);
         let size = (view.width, view.height);
         // The farm gives up all requests of another size.
         self.open.retain(|open| open.size == size);

@@ -46,6 +46,8 @@ pub(super) struct Figures {
     pub(super) size: (u32, u32),
     /// Rays per pixel.
     pub(super) samples: u32,
+    /// Each knob that is not at full quality.
+    pub(super) reductions: Vec<String>,
     /// Workers connected.
     pub(super) workers: usize,
     /// Their render threads together.
@@ -62,6 +64,7 @@ impl Figures {
         let mut lines = vec![self.speed()];
         let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
+        lines.extend(self.reductions.iter().cloned());
         lines.push(format!(
             "{}, {}",
             counted(self.workers as u64, "worker"),

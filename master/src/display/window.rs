@@ -18,6 +18,7 @@ use super::steering::{self, Steering};
 use super::tint::Coloring;
 use crate::camera_control::CameraControl;
 use crate::farm::{FarmControl, FarmStatus, FinishedFrame};
+use crate::wanted::WantedPicture;
 
 /// A window whose picture has not changed is drawn again this often: another window may have covered it, and the
 /// figures want to be new.
@@ -59,7 +60,7 @@ pub(crate) struct Display {
 /// The two ways between the window and the farm.
 pub(crate) struct Link {
     /// Where the newest view goes.
-    pub(crate) wanted: watch::Sender<FrameView>,
+    pub(crate) wanted: watch::Sender<WantedPicture>,
     /// Where the newest picture comes from.
     pub(crate) desk: NewsDesk,
     /// Where commands to workers go.
@@ -98,7 +99,7 @@ impl Display {
     /// A screen that takes no pictures any more.
     pub(crate) fn run(
         mut self,
-        view: FrameView,
+        wanted: WantedPicture,
         mut camera: CameraControl,
         link: &Link,
     ) -> Result<(), String> {
@@ -112,7 +113,8 @@ impl Display {
             }
             camera.step(&happened.camera, last_step.elapsed().as_secs_f64());
             last_step = Instant::now();
-            self.ask_for(FrameView { camera: camera.camera(), ..view }, link);
+            let view = FrameView { camera: camera.camera(), ..wanted.view };
+            self.ask_for(WantedPicture { view, ..wanted }, link);
 
             let fresh = self.take_news(&happened, link) | self.steer(&happened, link);
             if fresh || last_draw.is_none_or(|then: Instant| then.elapsed() > REDRAW_EVERY) {
@@ -130,11 +132,12 @@ impl Display {
     }
 
     /// Wants a picture of the window's size; only a change of view is worth a message.
-    fn ask_for(&self, view: FrameView, link: &Link) {
+    fn ask_for(&self, picture: WantedPicture, link: &Link) {
         let (width, height) = self.window.get_size();
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(MAX_SIDE).clamp(1, MAX_SIDE);
-        let view = FrameView { width: side(width), height: side(height), ..view };
-        link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, view) != view);
+        let view = FrameView { width: side(width), height: side(height), ..picture.view };
+        let picture = WantedPicture { view, ..picture };
+        link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, picture) != picture);
     }
 
     /// Whether there is something new to see.
@@ -217,7 +220,8 @@ impl Display {
 
     fn figures(&self, status: &FarmStatus, link: &Link) -> Figures {
         let (fps, frame_time) = link.desk.rate();
-        let view = *link.wanted.borrow();
+        let wanted = *link.wanted.borrow();
+        let view = wanted.view;
         let slow = frame_time.max(link.desk.since_last_frame()) > PATIENCE && !status.workers.is_empty();
         Figures {
             fps,
@@ -225,6 +229,7 @@ impl Display {
             latency: link.desk.latency(),
             size: (view.width, view.height),
             samples: view.samples,
+            reductions: wanted.reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),
             triangles: self.about.triangles,

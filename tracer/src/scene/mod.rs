@@ -10,6 +10,7 @@ mod framing;
 mod load;
 mod moved;
 mod obj;
+pub mod quality;
 mod read;
 pub mod rotation;
 mod textures;
@@ -24,6 +25,7 @@ use crate::texture::TextureId;
 
 pub use error::SceneError;
 pub use load::{LoadedScene, compile_model, load};
+pub use quality::{ColorDepth, ExponentPrecision, Quality, RenderScale, Shading};
 pub use validate::{
     MAX_COORDINATE, MAX_DEPTH, MAX_EXPONENT, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES,
     MAX_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, ValidateError,
@@ -69,11 +71,23 @@ pub struct RenderSettings {
     pub max_depth: u32,
     /// A bounce that can add less than this is not traced.
     pub min_contribution: f32,
+    /// What may be left out or done more roughly.
+    pub quality: Quality,
+    /// The part of width and height that is rendered.
+    pub scale: RenderScale,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { width: 1024, height: 768, samples: 1, max_depth: 5, min_contribution: 0.004 }
+        Self {
+            width: 1024,
+            height: 768,
+            samples: 1,
+            max_depth: 5,
+            min_contribution: 0.004,
+            quality: Quality::default(),
+            scale: RenderScale::Full,
+        }
     }
 }
 
@@ -277,12 +291,14 @@ pub struct FrameView {
     pub samples: u32,
     /// Degrees by which every model is turned about the +Y axis through its own origin, after its own rotation.
     pub spin: f64,
+    /// What may be left out or done more roughly.
+    pub quality: Quality,
 }
 
 impl FrameView {
-    /// The frame that the scene file itself asks for.
+    /// The frame that the scene file itself asks for, at full scale.
     pub fn of(scene: &Scene) -> Self {
-        let RenderSettings { width, height, samples, .. } = scene.render;
-        Self { camera: scene.camera, width, height, samples, spin: 0.0 }
+        let RenderSettings { width, height, samples, quality, .. } = scene.render;
+        Self { camera: scene.camera, width, height, samples, spin: 0.0, quality }
     }
 }

@@ -15,8 +15,8 @@ use crate::frame::PreparedFrame;
 use crate::light::JUST_BEFORE;
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::scene::{
-    Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
-    Triangle,
+    Background, Camera, FrameView, Material, Model, NormalMode, Plane, Quality, RenderSettings, Scene,
+    Sphere, Triangle,
 };
 use crate::simd::{self, Indices, LANES, Lanes, Simd, dispatch};
 use crate::trace::{Hit, PrimitiveId, Ray};
@@ -205,7 +205,14 @@ fn every_ray_sees_what_brute_force_sees() {
         let grid = 1 + random.below(4) as u32;
         let size = (1 + random.below(40) as u32, 1 + random.below(40) as u32, grid * grid);
         let (width, height, samples) = size;
-        let rays = PinholeRays::new(&FrameView { camera, width, height, samples, spin: 0.0 });
+        let rays = PinholeRays::new(&FrameView {
+            camera,
+            width,
+            height,
+            samples,
+            spin: 0.0,
+            quality: Quality::default(),
+        });
         let corner = (random.below(width as usize * 4) as u32, random.below(height as usize * 4) as u32);
         let side = SIDE as u32;
         let targets: Vec<DVec3> =

@@ -45,7 +45,11 @@ fn write_head(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     let parts =
         parts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| counted(*count as u64, what));
     let parts: Vec<String> = parts.collect();
-    writeln!(out, "{}; {} in all", parts.join(", "), counted(*triangles, "triangle"))
+    writeln!(out, "{}; {} in all", parts.join(", "), counted(*triangles, "triangle"))?;
+    match explanation.reductions.join(", ") {
+        reductions if reductions.is_empty() => Ok(()),
+        reductions => writeln!(out, "not at full quality: {reductions}"),
+    }
 }
 
 fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Result {

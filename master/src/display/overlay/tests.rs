@@ -14,6 +14,7 @@ fn figures() -> Figures {
         latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
         samples: 4,
+        reductions: Vec::new(),
         workers: 2,
         threads: 4,
         triangles: 1_234_567,
@@ -53,6 +54,14 @@ fn figures_can_be_read_off_the_canvas() {
     assert_eq!(line(3, 19), "1,234,567 triangles");
     assert_eq!(line(4, 15), "latency 64.2 ms");
     assert_eq!(line(5, 16), "next frame: 42 %");
+}
+
+#[test]
+fn every_knob_that_is_not_at_full_has_a_line() {
+    let reductions = vec!["scale 1/2".to_owned(), "no shadows".to_owned()];
+    let lines = Figures { reductions: reductions.clone(), ..figures() }.lines();
+    let expected = [&figures().lines()[..2], &reductions, &figures().lines()[2..]].concat();
+    assert_eq!(lines, expected);
 }
 
 #[test]

@@ -53,11 +53,10 @@ fn diffuse(value: Value<'_>) -> Read<(Vec3, Option<TextureText>)> {
     if file.text()?.is_empty() {
         return Err(file.must_be("the name of a picture file"));
     }
-    let filters = [("nearest", Filter::Nearest), ("bilinear", Filter::Bilinear)];
     let texture = TextureText {
         file: PathBuf::from(file.text()?),
         at: file.start(),
-        filter: table.read("filter", |value| value.word(&filters))?.unwrap_or(Filter::Bilinear),
+        filter: table.read("filter", |value| value.word(&Filter::WORDS))?.unwrap_or(Filter::Bilinear),
     };
     Ok((Vec3::ONE, Some(texture)))
 }

@@ -4,6 +4,7 @@
 //! may have. So nothing that the file says is ignored, and every complaint names line and column.
 
 mod fault;
+mod knobs;
 mod light;
 mod material;
 mod objects;

@@ -6,11 +6,24 @@ use super::super::validate::{is_sample_count, view_fault};
 use super::super::{Background, MAX_COORDINATE, MAX_DEPTH, RenderSettings, rotation};
 use super::Reading;
 use super::fault::{Fault, Read};
+use super::knobs::{quality, scale};
 use super::table::Table;
 use super::value::Value;
 use crate::image::MAX_SIDE;
 
-pub(super) const RENDER_KEYS: &[&str] = &["width", "height", "samples", "max_depth", "min_contribution"];
+pub(super) const RENDER_KEYS: &[&str] = &[
+    "width",
+    "height",
+    "samples",
+    "max_depth",
+    "min_contribution",
+    "shadows",
+    "shading",
+    "filter",
+    "exponent",
+    "pixels",
+    "scale",
+];
 pub(super) const CAMERA_KEYS: &[&str] =
     &["kind", "position", "look_at", "direction", "rotation", "up", "fov", "view_height", "zoom"];
 pub(super) const BACKGROUND_KEYS: &[&str] = &["color", "gradient", "cubemap", "panorama"];
@@ -53,6 +66,8 @@ pub(super) fn render(table: Table<'_>) -> Read<RenderSettings> {
         min_contribution: table
             .read("min_contribution", share)?
             .map_or(default.min_contribution, |share| share as f32),
+        quality: quality(table)?,
+        scale: table.read("scale", scale)?.unwrap_or_default(),
     })
 }
 

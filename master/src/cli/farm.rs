@@ -1,0 +1,49 @@
+//! The options that say who renders.
+
+use std::net::SocketAddr;
+
+use clap::Args;
+
+use super::values::{listen_address, thread_count, worker_count};
+use crate::farm::{FarmOptions, SegmentPolicy};
+
+/// Who renders.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct FarmArgs {
+    /// Where workers connect, for workers on other machines [default: 127.0.0.1:7117].
+    #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address)]
+    pub(super) listen: Option<SocketAddr>,
+    /// Worker processes on this machine that the master starts and ends.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
+    pub(super) local_workers: u32,
+    /// Start no worker: wait for others to connect.
+    #[arg(long, conflicts_with = "local_workers")]
+    pub(super) no_local_workers: bool,
+    /// Render threads of each local worker; without it, they share all cores.
+    #[arg(long, value_name = "N", value_parser = thread_count)]
+    pub(super) threads: Option<usize>,
+    /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
+    #[arg(long, value_name = "POLICY", default_value = "adaptive")]
+    pub(super) segment: SegmentPolicy,
+    /// Frames that workers may begin before the one on the way is complete: 1, or 0 for the newest camera.
+    #[arg(long, value_name = "0|1", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=1))]
+    pub(super) pipeline: u8,
+}
+
+impl FarmArgs {
+    /// Local workers to start.
+    pub(crate) fn local_workers(&self) -> u32 {
+        if self.no_local_workers { 0 } else { self.local_workers }
+    }
+
+    /// As the farm wants it.
+    pub(crate) fn options(&self) -> FarmOptions {
+        FarmOptions {
+            listen: self.listen,
+            local_workers: self.local_workers(),
+            threads: self.threads,
+            policy: self.segment,
+            sequential: self.pipeline == 0,
+        }
+    }
+}

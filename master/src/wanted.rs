@@ -1,0 +1,111 @@
+//! What is wanted to be seen, and how faithfully: the knobs as commands, window and reports know them.
+
+use rayfarm_tracer::scene::quality::word_of;
+use rayfarm_tracer::scene::{
+    ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
+};
+use serde::Serialize;
+
+/// A picture, and the scale at which the farm renders it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct WantedPicture {
+    /// What it shows, and the size in which it is wanted.
+    pub(crate) view: FrameView,
+    /// The part of width and height that is rendered.
+    pub(crate) scale: RenderScale,
+}
+
+impl WantedPicture {
+    /// What the farm is asked for.
+    pub(crate) fn rendered(&self) -> FrameView {
+        let (width, height) = (self.scale.of(self.view.width), self.scale.of(self.view.height));
+        FrameView { width, height, ..self.view }
+    }
+
+    /// The positions of all knobs, for reports.
+    pub(crate) fn knobs(&self) -> Knobs {
+        let Quality { shadows, shading, filter, exponent, colors } = self.view.quality;
+        Knobs {
+            shadows,
+            shading: word_of(&Shading::WORDS, &shading),
+            filter: filter.map(|filter| word_of(&Filter::WORDS, &filter)),
+            exponent: word_of(&ExponentPrecision::WORDS, &exponent),
+            colors: word_of(&ColorDepth::WORDS, &colors),
+            scale: self.scale.factor(),
+        }
+    }
+
+    /// Each knob that is not at full quality, in a few words.
+    pub(crate) fn reductions(&self) -> Vec<String> {
+        let Quality { shadows, shading, filter, exponent, colors } = self.view.quality;
+        let mut reductions = Vec::new();
+        let mut name = |reduced: bool, words: &str| {
+            if reduced {
+                reductions.push(words.to_owned());
+            }
+        };
+        name(self.scale != RenderScale::Full, &format!("scale {}", self.scale.word()));
+        name(!shadows, "no shadows");
+        name(shading == Shading::Diffuse, "diffuse only");
+        name(filter == Some(Filter::Nearest), "nearest texels");
+        name(filter == Some(Filter::Bilinear), "bilinear texels");
+        name(exponent == ExponentPrecision::Fast, "fast exponent");
+        name(colors == ColorDepth::Reduced, "16-bit colours");
+        reductions
+    }
+}
+
+/// Where each knob stands, in the words of the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct Knobs {
+    shadows: bool,
+    shading: &'static str,
+    /// `null` where each texture has its own.
+    filter: Option<&'static str>,
+    exponent: &'static str,
+    colors: &'static str,
+    /// Rendered pixels per pixel along a side.
+    scale: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scene;
+
+    fn full() -> WantedPicture {
+        WantedPicture { view: test_scene::view(), scale: RenderScale::Full }
+    }
+
+    #[test]
+    fn full_quality_has_nothing_to_name() {
+        assert_eq!(full().reductions(), Vec::<String>::new());
+        assert_eq!(full().rendered(), test_scene::view());
+        assert_eq!(
+            serde_json::to_string(&full().knobs()).unwrap(),
+            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0}"#
+        );
+    }
+
+    #[test]
+    fn every_reduction_is_named_and_reported() {
+        let mut wanted = WantedPicture { scale: RenderScale::Half, ..full() };
+        wanted.view.quality = Quality {
+            shadows: false,
+            shading: Shading::Diffuse,
+            filter: Some(Filter::Nearest),
+            exponent: ExponentPrecision::Fast,
+            colors: ColorDepth::Reduced,
+        };
+        let expected =
+            ["scale 1/2", "no shadows", "diffuse only", "nearest texels", "fast exponent", "16-bit colours"];
+        assert_eq!(wanted.reductions(), expected);
+        assert_eq!(
+            serde_json::to_string(&wanted.knobs()).unwrap(),
+            r#"{"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","scale":0.5}"#
+        );
+        let (rendered, view) = (wanted.rendered(), wanted.view);
+        assert_eq!((rendered.width, rendered.height), (view.width / 2, view.height / 2));
+        assert_eq!(FrameView { width: view.width, height: view.height, ..rendered }, view);
+    }
+}

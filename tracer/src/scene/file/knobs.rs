@@ -1,0 +1,81 @@
+//! The knobs of `[render]` that trade accuracy for speed.
+
+use super::super::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
+use super::fault::Read;
+use super::table::Table;
+use super::value::Value;
+
+/// The knobs that the tracer knows.
+pub(super) fn quality(table: Table<'_>) -> Read<Quality> {
+    let full = Quality::default();
+    Ok(Quality {
+        shadows: table.read("shadows", |value| value.boolean())?.unwrap_or(full.shadows),
+        shading: table.read("shading", |value| value.word(&Shading::WORDS))?.unwrap_or(full.shading),
+        filter: table.read("filter", |value| value.word(&Filter::WORDS))?,
+        exponent: table
+            .read("exponent", |value| value.word(&ExponentPrecision::WORDS))?
+            .unwrap_or(full.exponent),
+        colors: table.read("pixels", |value| value.word(&ColorDepth::WORDS))?.unwrap_or(full.colors),
+    })
+}
+
+/// The part of width and height that is rendered.
+pub(super) fn scale(value: Value<'_>) -> Read<RenderScale> {
+    let expected = "that is 1, 0.75 or 0.5";
+    let known = |number: f64| RenderScale::ALL.into_iter().find(|scale| scale.factor() == number);
+    let number = value.number(expected, |number| known(number).is_some())?;
+    known(number).ok_or_else(|| value.must_be(&format!("a number {expected}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::RenderSettings;
+    use super::super::{place, read};
+    use super::*;
+
+    fn render(keys: &str) -> Result<RenderSettings, String> {
+        let text = format!("[render]\n{keys}");
+        read(&text).map(|scene| scene.render).map_err(|fault| {
+            let (line, column) = place(&text, fault.at);
+            format!("{line}:{column} {}", fault.message)
+        })
+    }
+
+    #[test]
+    fn every_knob_is_read() {
+        let all = "shadows = false\nshading = \"diffuse\"\nfilter = \"nearest\"\nexponent = \"fast\"\n\
+                   pixels = \"reduced\"\nscale = 0.75";
+        let reduced = Quality {
+            shadows: false,
+            shading: Shading::Diffuse,
+            filter: Some(Filter::Nearest),
+            exponent: ExponentPrecision::Fast,
+            colors: ColorDepth::Reduced,
+        };
+        let render_all = render(all).unwrap();
+        assert_eq!((render_all.quality, render_all.scale), (reduced, RenderScale::ThreeQuarters));
+        let full = "shadows = true\nshading = \"full\"\nexponent = \"exact\"\npixels = \"exact\"\nscale = 1";
+        assert_eq!(render(full), render(""));
+        assert_eq!(render("").unwrap().quality, Quality::default());
+        assert_eq!(render("scale = 0.5").unwrap().scale, RenderScale::Half);
+        assert_eq!(render("scale = 1.0").unwrap().scale, RenderScale::Full);
+    }
+
+    #[test]
+    fn other_positions_are_refused_with_their_place() {
+        for (key, place, words) in [
+            ("shadows = \"off\"", "2:11 ", "true or false, but is \"off\""),
+            ("shading = \"difuse\"", "2:11 ", "did you mean `diffuse`?"),
+            ("filter = \"linear\"", "2:10 ", "did you mean `bilinear`?"),
+            ("exponent = \"exat\"", "2:12 ", "did you mean `exact`?"),
+            ("exponent = 3", "2:12 ", "one of \"exact\", \"fast\", but is 3"),
+            ("pixels = \"565\"", "2:10 ", "known here: `exact`, `reduced`"),
+            ("scale = 2", "2:9 ", "1, 0.75 or 0.5, but is 2"),
+            ("scale = nan", "2:9 ", "1, 0.75 or 0.5, but is nan"),
+            ("scael = 1", "2:1 ", "did you mean `scale`?"),
+        ] {
+            let message = render(key).unwrap_err();
+            assert!(message.starts_with(place) && message.contains(words), "{key}: {message}");
+        }
+    }
+}
