@@ -23,12 +23,7 @@ pub struct Difference {
 /// # Errors
 /// Pictures of different sizes, or whose buffers do not fit their sizes.
 pub fn compare(a: &RgbImage, b: &RgbImage) -> Result<Difference, ImageError> {
-    a.check()?;
-    b.check()?;
-    let (size_a, size_b) = ((a.width, a.height), (b.width, b.height));
-    if size_a != size_b {
-        return Err(ImageError::SizesDiffer { a: size_a, b: size_b });
-    }
+    a.check_against(b)?;
     let bytes = || a.pixels.iter().zip(&b.pixels).map(|(a, b)| a.abs_diff(*b));
     let squares: u64 = bytes().map(|d| u64::from(d) * u64::from(d)).sum();
     let rmse = (squares as f64 / a.pixels.len().max(1) as f64).sqrt();

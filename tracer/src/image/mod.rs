@@ -1,6 +1,7 @@
 //! Finished pictures: held as sRGB bytes, written to and read from files, compared.
 
 mod compare;
+mod flip;
 mod load;
 mod save;
 mod ssim;
@@ -8,6 +9,7 @@ mod ssim;
 use std::path::PathBuf;
 
 pub use compare::{Difference, compare};
+pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip};
 pub use load::{load, size};
 pub use save::{KNOWN_EXTENSIONS, save};
 
@@ -55,6 +57,14 @@ impl RgbImage {
             })
         }
     }
+
+    /// Refuses two pictures that cannot be compared pixel by pixel.
+    fn check_against(&self, other: &Self) -> Result<(), ImageError> {
+        self.check()?;
+        other.check()?;
+        let (a, b) = ((self.width, self.height), (other.width, other.height));
+        if a == b { Ok(()) } else { Err(ImageError::SizesDiffer { a, b }) }
+    }
 }
 
 fn byte_count(width: u32, height: u32) -> usize {
@@ -89,6 +99,12 @@ pub enum ImageError {
         a: (u32, u32),
         /// Width and height of the second.
         b: (u32, u32),
+    },
+    /// A distance from the monitor that nobody has.
+    #[error("pictures are compared as seen at 1 to 1000 pixels per degree, not {given}")]
+    PixelsPerDegree {
+        /// What was asked for.
+        given: f64,
     },
     /// The file cannot be written; nothing is left behind.
     #[error("cannot write {}: {source}; check that its folder exists and may be written to", path.display())]
