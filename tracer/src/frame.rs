@@ -14,6 +14,7 @@ use crate::compile::{CompileError, CompiledScene, Features, Item, Items, orienta
 use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
+use crate::render::TILE_SIZE;
 use crate::scene::{Camera, Filter, FrameView, Model, NormalMode, Scene};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
@@ -22,6 +23,12 @@ use crate::tile::Affine;
 
 /// Widening of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
+
+/// Rows of a band of tiles in frames with this view. Rows that begin and end on multiples of it waste nothing: a tile
+/// has as many rays however many samples a pixel has, so with more samples it is fewer rows high.
+pub fn tile_rows(view: &FrameView) -> u32 {
+    (TILE_SIZE / view.samples.isqrt().max(1)).max(1)
+}
 
 /// One frame of a scene. Share it between render threads.
 #[derive(Debug)]
@@ -116,6 +123,11 @@ impl PreparedFrame {
     /// What is rendered.
     pub fn view(&self) -> &FrameView {
         &self.view
+    }
+
+    /// Rows of a band of its tiles: see [`tile_rows`].
+    pub fn tile_rows(&self) -> u32 {
+        tile_rows(&self.view)
     }
 
     /// Pixels per row.

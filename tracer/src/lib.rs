@@ -50,7 +50,7 @@ mod triangle;
 
 pub use camera::Basis;
 pub use compile::{CompileError, CompiledScene, Features};
-pub use frame::PreparedFrame;
+pub use frame::{PreparedFrame, tile_rows};
 pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows, render_rows_watched};
 pub use simd::best_name as simd_level;
 pub use stage::{Stage, Watch};

@@ -44,6 +44,14 @@ pub(crate) struct Pixels {
     pub(crate) block: Option<Vec<u8>>,
 }
 
+/// How the frames of a job are cut into bands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BandShape {
+    /// Rows of a band; they begin on multiples of it.
+    pub(crate) rows: u32,
+    pub(crate) row_bytes: usize,
+}
+
 /// What a band took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BandCost {
@@ -91,22 +99,17 @@ impl<F, A> Job<F, A> {
     }
 
     /// The next rows that nobody has; the buffer is made when the first ones are taken.
-    fn take_band(
-        &self,
-        band_rows: u32,
-        row_bytes: usize,
-        buffers: &Buffers,
-    ) -> Option<(Range<u32>, BytesMut)> {
+    fn take_band(&self, shape: BandShape, buffers: &Buffers) -> Option<(Range<u32>, BytesMut)> {
         let mut progress = self.progress();
         let Range { start, end } = progress.rows.clone();
         if start >= end || self.is_cancelled() {
             return None;
         }
         progress.begun.get_or_insert_with(Instant::now);
-        let stop = (start + 1).next_multiple_of(band_rows).min(end);
-        let all_bytes = (end - start) as usize * row_bytes;
+        let stop = (start + 1).next_multiple_of(shape.rows).min(end);
+        let all_bytes = (end - start) as usize * shape.row_bytes;
         let room = progress.room.get_or_insert_with(|| buffers.take(all_bytes));
-        let bytes = room.split_to((stop - start) as usize * row_bytes);
+        let bytes = room.split_to((stop - start) as usize * shape.row_bytes);
         progress.rows = stop..end;
         Some((start..stop, bytes))
     }
@@ -172,14 +175,9 @@ impl<F, A> JobQueue<F, A> {
     }
 
     /// Rows of the earliest job that still has some.
-    pub(crate) fn take_band(
-        &self,
-        band_rows: u32,
-        row_bytes: impl Fn(&F) -> usize,
-        buffers: &Buffers,
-    ) -> Option<Band<F, A>> {
+    pub(crate) fn take_band(&self, shape: impl Fn(&F) -> BandShape, buffers: &Buffers) -> Option<Band<F, A>> {
         self.jobs.iter().find_map(|job| {
-            let (rows, bytes) = job.take_band(band_rows, row_bytes(&job.frame), buffers)?;
+            let (rows, bytes) = job.take_band(shape(&job.frame), buffers)?;
             Some(Band { job: Arc::clone(job), rows, bytes })
         })
     }
@@ -212,6 +210,7 @@ mod tests {
     use super::*;
 
     const WIDTH: usize = 4;
+    const SHAPE: BandShape = BandShape { rows: 8, row_bytes: WIDTH * 3 };
 
     fn job(segment: u32, rows: Range<u32>) -> Job<(), ()> {
         let (first_row, row_count) = (rows.start, rows.end - rows.start);
@@ -220,7 +219,7 @@ mod tests {
     }
 
     fn take(queue: &JobQueue<(), ()>) -> Option<(u32, Range<u32>, Band<(), ()>)> {
-        let band = queue.take_band(8, |()| WIDTH * 3, &Buffers::default())?;
+        let band = queue.take_band(|()| SHAPE, &Buffers::default())?;
         Some((band.job.lease.segment, band.rows.clone(), band))
     }
 

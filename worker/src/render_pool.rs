@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 
 use crate::buffers::Buffers;
 use crate::guard::guarded;
-use crate::job_queue::{Band, BandCost, Job, JobQueue, Pixels, Rendered};
+use crate::job_queue::{Band, BandCost, BandShape, Job, JobQueue, Pixels, Rendered};
 use crate::renderer::{Cancelled, Renderer};
 
 /// Where a session wants the results of its leases.
@@ -105,14 +105,16 @@ impl<R: Renderer> Shared<R> {
     }
 
     fn next_band(&self) -> Option<PoolBand<R>> {
-        let band_rows = self.renderer.band_rows().max(1);
-        let row_bytes = |frame: &ReadyFrame<R::Frame>| frame.width as usize * 3;
+        let shape = |ready: &ReadyFrame<R::Frame>| BandShape {
+            rows: self.renderer.band_rows(&ready.frame).max(1),
+            row_bytes: ready.width as usize * 3,
+        };
         let mut state = self.state();
         loop {
             if state.stopping {
                 return None;
             }
-            if let Some(band) = state.queue.take_band(band_rows, row_bytes, &self.buffers) {
+            if let Some(band) = state.queue.take_band(shape, &self.buffers) {
                 return Some(band);
             }
             state = self.work.wait(state).unwrap_or_else(PoisonError::into_inner);

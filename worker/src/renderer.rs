@@ -37,8 +37,8 @@ pub trait Renderer: Send + Sync + 'static {
     /// The SIMD level, for the master's log.
     fn simd(&self) -> String;
 
-    /// Most rows that should be rendered in one go.
-    fn band_rows(&self) -> u32;
+    /// Most rows of a frame that should be rendered in one go; bands begin on multiples of it.
+    fn band_rows(&self, frame: &Self::Frame) -> u32;
 
     /// Decodes a scene body, and names the parts it needs.
     ///

@@ -72,7 +72,7 @@ impl Renderer for Fake {
         "fake".to_owned()
     }
 
-    fn band_rows(&self) -> u32 {
+    fn band_rows(&self, _frame: &FakeFrame) -> u32 {
         8
     }
 

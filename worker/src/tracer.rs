@@ -8,7 +8,7 @@ use rayfarm_protocol::{AssetId, FrameAnnounce, codec};
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{FrameView, Scene};
 use rayfarm_tracer::texture::{self, Texture};
-use rayfarm_tracer::{CompiledScene, PreparedFrame, TILE_SIZE, render_rows};
+use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 use crate::renderer::{Cancelled, Counts, Renderer};
 
@@ -36,8 +36,8 @@ impl Renderer for TracerRenderer {
         rayfarm_tracer::simd_level().to_owned()
     }
 
-    fn band_rows(&self) -> u32 {
-        TILE_SIZE
+    fn band_rows(&self, frame: &PreparedFrame) -> u32 {
+        frame.tile_rows()
     }
 
     fn decode_scene(&self, body: &[u8]) -> Result<(Scene, Vec<AssetId>), String> {

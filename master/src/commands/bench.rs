@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use rayfarm_tracer::scene::FrameView;
-use rayfarm_tracer::{Cancelled, CompiledScene, PreparedFrame, RayCounts, TILE_SIZE, render_rows};
+use rayfarm_tracer::{Cancelled, CompiledScene, PreparedFrame, RayCounts, render_rows};
 
 use super::source::{Source, animation};
 use crate::cli::BenchArgs;
@@ -104,8 +104,9 @@ fn trace(
     pixels: &mut [u8],
     threads: usize,
 ) -> Result<RayCounts, Cancelled> {
-    let band_bytes = view.width as usize * 3 * TILE_SIZE as usize;
-    let bands = Mutex::new(pixels.chunks_mut(band_bytes).zip(bands(view.height)));
+    let band_rows = frame.tile_rows();
+    let band_bytes = view.width as usize * 3 * band_rows as usize;
+    let bands = Mutex::new(pixels.chunks_mut(band_bytes).zip(bands(view.height, band_rows)));
     let work = || {
         let mut rays = RayCounts::default();
         loop {
@@ -128,8 +129,8 @@ fn trace(
 }
 
 /// The rows of each band, top to bottom.
-fn bands(height: u32) -> impl Iterator<Item = Range<u32>> {
-    (0..height).step_by(TILE_SIZE as usize).map(move |first| first..(first + TILE_SIZE).min(height))
+fn bands(height: u32, rows: u32) -> impl Iterator<Item = Range<u32>> {
+    (0..height).step_by(rows as usize).map(move |first| first..(first + rows).min(height))
 }
 
 fn print_table(report: &BenchReport) -> Result<(), CommandError> {
@@ -168,7 +169,7 @@ mod tests {
     #[test]
     fn bands_cover_every_row_once() {
         for height in [1, 7, 8, 9, 768] {
-            let rows: Vec<u32> = bands(height).flatten().collect();
+            let rows: Vec<u32> = bands(height, 16).flatten().collect();
             assert_eq!(rows, (0..height).collect::<Vec<_>>());
         }
     }
