@@ -222,6 +222,10 @@ pub(crate) struct CheckNumericsArgs {
     /// Rays to aim at edges and vertices of the models [default: 200000].
     #[arg(long, value_name = "N", value_parser = ray_count)]
     pub(crate) rays: Option<u64>,
+    /// Pixels of each picture that the slow tracer in double precision is asked for: 27648 are all of a picture of 4 to 3
+    /// [default: as many as some seconds allow].
+    #[arg(long, value_name = "N", value_parser = frame_count)]
+    pub(crate) pixels: Option<u32>,
     /// Print a line of JSON for each scene on standard output.
     #[arg(long)]
     pub(crate) json: bool,

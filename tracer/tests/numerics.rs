@@ -9,7 +9,7 @@ use rayfarm_tracer::scene::load;
 
 fn check(name: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(name);
-    let effort = Effort { rays: 70_000, side: 96, oracle_work: 1_000_000 };
+    let effort = Effort { rays: 70_000, side: 96, oracle_work: 1_000_000, pixels: None };
     let outcomes = run(&Subject::new(name, load(&path).unwrap()), &effort).unwrap();
     let broken: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.holds()).collect();
     assert!(broken.is_empty(), "{name}: {broken:#?}");

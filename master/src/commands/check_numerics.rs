@@ -40,7 +40,8 @@ struct Row {
 /// # Errors
 /// A wrong scene, or one on which something does not hold.
 pub(super) fn run(args: &CheckNumericsArgs) -> Result<(), CommandError> {
-    let effort = Effort { rays: args.rays.unwrap_or(Effort::default().rays), ..Effort::default() };
+    let usual = Effort::default();
+    let effort = Effort { rays: args.rays.unwrap_or(usual.rays), pixels: args.pixels, ..usual };
     let mut broken = Vec::new();
     for subject in subjects(args.scene.as_deref())? {
         let outcomes = numerics::run(&subject, &effort).map_err(CommandError::wrong_input)?;

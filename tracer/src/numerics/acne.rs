@@ -33,7 +33,7 @@ fn under(case: String, subject: &Subject, effort: &Effort) -> Result<Outcome, Co
     let lit = unshadowed.rendered(effort.side)?;
     let view = subject.view(effort.side);
     let specks = specks(&picture, &lit, view.width as usize);
-    let pixels = chosen(&specks, picture.len() / 3, affordable(subject, effort.oracle_work));
+    let pixels = chosen(&specks, picture.len() / 3, affordable(subject, effort));
     let verdict = ask(subject, &view, &picture, &pixels);
     Ok(Outcome {
         check: Check::Acne,

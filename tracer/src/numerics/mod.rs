@@ -62,12 +62,14 @@ pub struct Effort {
     pub side: u32,
     /// Primitives that the oracle may be asked about for each picture: it asks all primitives for each ray of each pixel.
     pub oracle_work: u64,
+    /// Pixels of each picture that the oracle is asked for, whatever that takes; `None`: as many as `oracle_work` allows.
+    pub pixels: Option<u32>,
 }
 
 impl Default for Effort {
     /// Some seconds for a scene of 100,000 triangles.
     fn default() -> Self {
-        Self { rays: 200_000, side: 192, oracle_work: 20_000_000 }
+        Self { rays: 200_000, side: 192, oracle_work: 20_000_000, pixels: None }
     }
 }
 

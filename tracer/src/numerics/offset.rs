@@ -23,7 +23,7 @@ pub fn offset(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compil
         let far = subject.with(placed(&subject.scene, 1.0, offset));
         let picture = far.rendered(effort.side)?;
         let changed = changed(&near, &picture);
-        let pixels = chosen(&changed, near.len() / 3, affordable(subject, effort.oracle_work));
+        let pixels = chosen(&changed, near.len() / 3, affordable(subject, effort));
         let verdict = ask(&far, &far.view(effort.side), &picture, &pixels);
         Ok(Outcome {
             check: Check::Offset,

@@ -3,7 +3,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::Subject;
+use super::{Effort, Subject};
 use crate::reference::Oracle;
 use crate::scene::FrameView;
 
@@ -38,15 +38,18 @@ pub(super) fn ask(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &
     })
 }
 
-/// How many pixels may be asked about for so much work.
-pub(super) fn affordable(subject: &Subject, work: u64) -> usize {
+/// How many pixels the oracle may be asked for.
+pub(super) fn affordable(subject: &Subject, effort: &Effort) -> usize {
+    if let Some(pixels) = effort.pixels {
+        return pixels as usize;
+    }
     let scene = &subject.scene;
     let triangles_of =
         |id| subject.meshes.iter().find(|mesh| mesh.id() == id).map_or(0, |mesh| mesh.triangle_count());
     let in_models: usize = scene.models.iter().map(|model| triangles_of(model.mesh)).sum();
     let primitives = in_models + scene.spheres.len() + scene.planes.len() + scene.triangles.len();
     let rays = 1 + scene.lights.len();
-    (work / (primitives.max(1) * rays) as u64).clamp(16, 4096) as usize
+    (effort.oracle_work / (primitives.max(1) * rays) as u64).clamp(16, 4096) as usize
 }
 
 /// `count` pixels of so many: evenly spread, but half of them at most, and these too evenly, from among `first`.

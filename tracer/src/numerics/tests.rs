@@ -8,7 +8,7 @@ use super::scenes::torus;
 use super::seams::Seams;
 use super::*;
 
-const LITTLE: Effort = Effort { rays: 20_000, side: 64, oracle_work: 200_000 };
+const LITTLE: Effort = Effort { rays: 20_000, side: 64, oracle_work: 200_000, pixels: None };
 
 fn tori() -> Subject {
     built_in().unwrap().pop().unwrap()
