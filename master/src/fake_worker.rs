@@ -27,6 +27,8 @@ pub(crate) enum Script {
     Short,
     /// Answers every lease twice.
     Twice,
+    /// Flips a bit of the last pixel of every lease.
+    Lie,
     /// Cannot render its first lease.
     FailOnce,
     /// Sends bytes that are no envelope in answer to its first lease.
@@ -60,6 +62,14 @@ pub(crate) async fn connect(address: SocketAddr, threads: u32) -> TcpStream {
     let hello = Hello { name: "fake".into(), threads, simd: "none".into(), software: "test".into() };
     handshake::as_worker(&mut stream, &hello).await.unwrap();
     stream
+}
+
+/// A worker of that name; it is connected when this returns.
+pub(crate) async fn start_named(address: SocketAddr, name: &str, script: Script) -> JoinHandle<Outcome> {
+    let mut stream = TcpStream::connect(address).await.unwrap();
+    let hello = Hello { name: name.into(), threads: 1, simd: "none".into(), software: "test".into() };
+    handshake::as_worker(&mut stream, &hello).await.unwrap();
+    tokio::spawn(live(stream, script))
 }
 
 /// Starts a worker with one thread. It is connected when this returns.
@@ -106,6 +116,7 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
     // Every other misdeed is done once.
     let misdeed = match script {
         Script::VanishAt(_) => Script::Honest,
+        Script::Lie => Script::Lie,
         _ => std::mem::replace(script, Script::Honest),
     };
     let answers = match misdeed {
@@ -123,6 +134,10 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
             1
         }
         Script::Twice => 2,
+        Script::Lie => {
+            bytes.last_mut().into_iter().for_each(|byte| *byte ^= 1);
+            1
+        }
         Script::FailOnce => {
             let failed = ToMaster::Failed { frame: lease.frame, reason: "out of paint".into() };
             return sender.send(failed).await.unwrap();

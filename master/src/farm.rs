@@ -20,15 +20,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{FrameView, Scene, ValidateError};
+use rayfarm_tracer::scene::{FrameView, Scene};
 use rayfarm_tracer::texture::Texture;
 use tokio::net::TcpListener;
+use tokio::sync::mpsc;
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tokio_util::task::TaskTracker;
 
 use crate::accounting::TraceSink;
 use crate::assets::Assets;
 use crate::driver::Driver;
+use crate::judge::{self, Trace};
 use crate::local_workers::LocalWorkers;
 use crate::server;
 
@@ -36,9 +38,12 @@ pub use crate::accounting::{FrameAccount, Parts, SegmentNote, WorkerAccount};
 pub use crate::assets::AssetError;
 pub use crate::farm_control::FarmControl;
 pub use crate::framebuffer::FramePixels;
-pub use crate::scheduler::WorkerState;
 pub use crate::scheduler::policy::SegmentPolicy;
+pub use crate::scheduler::{Verification, WorkerState};
+pub use error::{FarmError, UnknownWorker};
 pub use rayfarm_protocol::{Cost as FrameCounts, FrameId};
+
+mod error;
 
 /// Where workers connect when nobody says otherwise.
 pub const DEFAULT_PORT: u16 = 7117;
@@ -58,9 +63,12 @@ pub struct FarmOptions {
     /// Whether a frame begins only when the one before it is complete. Otherwise workers that have nothing left to do in
     /// a frame begin the next one: more frames a second, each with an older camera.
     pub sequential: bool,
+    /// The share of the segments that a second worker renders as well, to find workers that send wrong pixels; 0 to 100.
+    pub verify_percent: u8,
 }
 
 /// What the farm draws.
+#[derive(Clone)]
 pub struct FarmScene {
     /// The scene as data.
     pub scene: Scene,
@@ -124,6 +132,8 @@ pub struct FarmStatus {
     pub rows_done: u32,
     /// Its rows.
     pub rows: u32,
+    /// How much was verified since the farm began, where it verifies at all.
+    pub verification: Option<Verification>,
 }
 
 /// A connected worker.
@@ -147,68 +157,6 @@ pub struct WorkerStatus {
     pub trouble: Option<String>,
 }
 
-/// A command names a worker that is not connected.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no worker {0} is connected; the status lists those that are")]
-pub struct UnknownWorker(pub u64);
-
-/// Why a farm cannot start or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum FarmError {
-    /// The address cannot be listened on.
-    #[error("cannot listen for workers on {address}: {source}; {}", remedy(source, address))]
-    Listen {
-        /// What was asked for.
-        address: SocketAddr,
-        /// What the operating system said.
-        source: std::io::Error,
-    },
-    /// The scene cannot be sent to workers.
-    #[error(transparent)]
-    Assets(#[from] AssetError),
-    /// A frame was requested that cannot be rendered.
-    #[error("this frame cannot be rendered: {0}")]
-    View(#[source] ValidateError),
-    /// Every worker has refused a frame again and again.
-    #[error(
-        "no worker can render frame {frame} ({reasons}); look at what the workers say, or change the scene"
-    )]
-    Refused {
-        /// Which frame.
-        frame: FrameId,
-        /// What the workers say.
-        reasons: String,
-    },
-    /// Nobody is left to render: the local workers keep dying, and no other is connected.
-    #[error(
-        "no worker is left: {reason}; look at its messages above, or start workers by hand: \
-         rayfarm-worker --master {address}"
-    )]
-    NoWorkers {
-        /// What became of the last local worker.
-        reason: String,
-        /// Where workers connect.
-        address: SocketAddr,
-    },
-}
-
-fn remedy(error: &std::io::Error, address: &SocketAddr) -> String {
-    let port = address.port();
-    match error.kind() {
-        ErrorKind::AddrInUse => format!(
-            "port {port} belongs to another program (another rayfarm-master?): end it, or choose another port with \
-             --listen {}:PORT",
-            address.ip()
-        ),
-        ErrorKind::AddrNotAvailable => format!(
-            "{} is no address of this machine; --listen 0.0.0.0:{port} listens on all it has",
-            address.ip()
-        ),
-        ErrorKind::PermissionDenied => "choose a port above 1023 with --listen ADDR:PORT".to_owned(),
-        _ => "choose another address or port with --listen ADDR:PORT".to_owned(),
-    }
-}
-
 impl Farm {
     /// Binds the listening address, starts the local workers and waits for requests.
     ///
@@ -230,15 +178,31 @@ impl Farm {
         scene: FarmScene,
         program: PathBuf,
     ) -> Result<Farm, FarmError> {
+        let stop = CancellationToken::new();
+        let trace = (options.verify_percent > 0).then(|| judge::tracer(scene.clone(), stop.clone()));
+        Self::start_with(options, scene, program, trace, stop).await
+    }
+
+    /// As [`Farm::start`], with whoever traces rows for the master itself.
+    pub(crate) async fn start_with(
+        options: FarmOptions,
+        scene: FarmScene,
+        program: PathBuf,
+        trace: Option<Arc<Trace>>,
+        stop: CancellationToken,
+    ) -> Result<Farm, FarmError> {
         let assets = Assets::new(&scene.scene, scene.meshes, scene.textures)?;
         let (listener, address) = listen(options.listen).await?;
-        let driver = Arc::new(Driver::new(options.policy, options.sequential, assets));
+        let (court, cases) = mpsc::unbounded_channel();
+        let driver = Arc::new(Driver::new(&options, assets, court));
         let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());
-        let stop = CancellationToken::new();
 
         let clock = driver.clone();
         let stopped = stop.clone();
         tokio::spawn(async move { clock.keep_time(stopped).await });
+        if let Some(trace) = trace {
+            tokio::spawn(judge::hold_court(cases, trace, driver.clone(), stop.clone()));
+        }
         tokio::spawn(server::accept(listener, driver.clone(), sessions.clone(), stop.clone()));
         let local = LocalWorkers {
             program,
@@ -276,6 +240,11 @@ impl Farm {
     /// left to render: a worker that connects later goes on with the frame.
     pub async fn finished(&mut self) -> Result<FinishedFrame, FarmError> {
         self.driver.next_finished().await
+    }
+
+    /// Waits until nothing is left to verify of the frames that are complete. Safe to drop half-way.
+    pub async fn verified(&self) {
+        self.driver.all_verified().await;
     }
 
     /// What is going on right now.

@@ -1,16 +1,20 @@
 //! Where pixels end up: one picture per frame in flight, filled by sessions in whatever order segments arrive.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use rayfarm_protocol::pixels::{BlockError, unpack};
 use rayfarm_protocol::{Encoding, FrameId, Lease};
 
+use crate::scheduler::WorkerId;
+
 /// Buffers kept for the next frame: two in flight and one on the screen.
 const SPARE_BUFFERS: usize = 3;
+/// Rejected workers that are remembered: what they had sent by then is dealt with long before there are so many more.
+const MAX_REJECTED: usize = 1024;
 
 /// The pictures in flight. A frame that is not open takes no pixels: that is how those of a superseded frame are
 /// kept out.
@@ -22,6 +26,8 @@ pub(crate) struct Framebuffers {
 #[derive(Debug, Default)]
 struct Inner {
     open: BTreeMap<FrameId, Canvas>,
+    /// Workers whose pixels are not taken any more.
+    rejected: VecDeque<WorkerId>,
     spare: Vec<Vec<u8>>,
 }
 
@@ -29,8 +35,8 @@ struct Inner {
 struct Canvas {
     row_bytes: usize,
     pixels: Vec<u8>,
-    /// For each row, whether its pixels are here.
-    filled: Vec<bool>,
+    /// For each row, whose pixels are here, if any are.
+    filled: Vec<Option<WorkerId>>,
     missing: usize,
 }
 
@@ -39,7 +45,7 @@ struct Canvas {
 pub(crate) enum Written {
     /// They are in the picture, or had been there before. To decode and copy them took that long.
     Kept { decode: Duration },
-    /// The frame is not open any more.
+    /// The frame is not open any more, or its worker was rejected.
     Superseded,
 }
 
@@ -65,19 +71,51 @@ impl Framebuffers {
             // The operating system hands out zeroed pages as they are touched; resizing would write them all.
             pixels = vec![0; row_bytes * rows];
         }
-        inner.open.insert(frame, Canvas { row_bytes, pixels, filled: vec![false; rows], missing: rows });
+        inner.open.insert(frame, Canvas { row_bytes, pixels, filled: vec![None; rows], missing: rows });
     }
 
     /// Puts the pixels of a lease into the picture. Rows that are there already stay as they are.
     ///
     /// # Errors
     /// The pixels do not fit the lease, or the lease does not fit the picture; no row counts as written.
-    pub(crate) fn write(&self, lease: Lease, encoding: Encoding, bytes: &[u8]) -> Result<Written, Misfit> {
+    pub(crate) fn write(
+        &self,
+        from: WorkerId,
+        lease: Lease,
+        encoding: Encoding,
+        bytes: &[u8],
+    ) -> Result<Written, Misfit> {
         let mut inner = self.lock();
+        if inner.rejected.contains(&from) {
+            return Ok(Written::Superseded);
+        }
         let Some(canvas) = inner.open.get_mut(&lease.frame) else { return Ok(Written::Superseded) };
         let begun = Instant::now();
-        canvas.write(lease, encoding, bytes)?;
+        canvas.write(from, lease, encoding, bytes)?;
         Ok(Written::Kept { decode: begun.elapsed() })
+    }
+
+    /// A hash of the pixels of a lease, if all of them are here and this worker's.
+    pub(crate) fn digest(&self, of: WorkerId, lease: Lease) -> Option<blake3::Hash> {
+        let inner = self.lock();
+        let canvas = inner.open.get(&lease.frame)?;
+        let (first, end) = (lease.first_row as usize, lease.first_row as usize + lease.row_count as usize);
+        let is_all_its = canvas.filled.get(first..end)?.iter().all(|filled| *filled == Some(of));
+        let pixels = canvas.pixels.get(first * canvas.row_bytes..end * canvas.row_bytes)?;
+        is_all_its.then(|| blake3::hash(pixels))
+    }
+
+    /// Takes a worker's rows out of all pictures, and takes none of it any more. Returns which rows are missing now.
+    pub(crate) fn reject(&self, worker: WorkerId) -> Vec<(FrameId, Range<u32>)> {
+        let mut inner = self.lock();
+        if !inner.rejected.contains(&worker) {
+            inner.rejected.push_back(worker);
+        }
+        while inner.rejected.len() > MAX_REJECTED {
+            inner.rejected.pop_front();
+        }
+        let canvases = inner.open.iter_mut();
+        canvases.flat_map(|(&frame, canvas)| canvas.reject(worker).map(move |rows| (frame, rows))).collect()
     }
 
     /// Closes a frame and hands out its picture; `None` if it is not open or not complete.
@@ -114,26 +152,64 @@ impl Inner {
 }
 
 impl Canvas {
-    fn write(&mut self, lease: Lease, encoding: Encoding, bytes: &[u8]) -> Result<(), Misfit> {
+    fn write(
+        &mut self,
+        from: WorkerId,
+        lease: Lease,
+        encoding: Encoding,
+        bytes: &[u8],
+    ) -> Result<(), Misfit> {
         let (first, count) = (lease.first_row as usize, lease.row_count as usize);
         let (row_bytes, rows) = (self.row_bytes, self.filled.len());
         let outside = Misfit::Rows { lease, rows };
         let filled = self.filled.get_mut(first..first.saturating_add(count)).ok_or(outside)?;
         let target = self.pixels.get_mut(first * row_bytes..(first + count) * row_bytes).ok_or(outside)?;
-        if filled.contains(&true) {
+        if filled.iter().any(Option::is_some) {
             // Somebody was quicker with some of them. What is there stays, whatever these bytes are worth.
             let mut aside = vec![0; target.len()];
             decode(lease, encoding, bytes, &mut aside)?;
             let rows = target.chunks_exact_mut(row_bytes.max(1)).zip(aside.chunks_exact(row_bytes.max(1)));
-            let missing = rows.zip(&*filled).filter(|(_, filled)| !**filled);
+            let missing = rows.zip(&*filled).filter(|(_, filled)| filled.is_none());
             missing.for_each(|((target, row), _)| target.copy_from_slice(row));
         } else {
             decode(lease, encoding, bytes, target)?;
         }
-        self.missing -= filled.iter().filter(|filled| !**filled).count();
-        filled.fill(true);
+        for filled in filled.iter_mut().filter(|filled| filled.is_none()) {
+            *filled = Some(from);
+            self.missing -= 1;
+        }
         Ok(())
     }
+
+    /// Empties a worker's rows; which they are, as runs.
+    fn reject(&mut self, worker: WorkerId) -> impl Iterator<Item = Range<u32>> + use<> {
+        let mut runs: Vec<Range<u32>> = Vec::new();
+        let its = self.filled.iter_mut().zip(0..).filter(|(filled, _)| **filled == Some(worker));
+        for (filled, row) in its {
+            *filled = None;
+            self.missing += 1;
+            match runs.last_mut().filter(|run| run.end == row) {
+                Some(run) => run.end = row + 1,
+                None => runs.push(row..row + 1),
+            }
+        }
+        runs.into_iter()
+    }
+}
+
+/// A hash of pixels that go into no picture, of rows of `row_bytes` bytes.
+///
+/// # Errors
+/// They do not fit the lease.
+pub(crate) fn digest(
+    lease: Lease,
+    row_bytes: usize,
+    encoding: Encoding,
+    bytes: &[u8],
+) -> Result<blake3::Hash, Misfit> {
+    let mut pixels = vec![0; row_bytes * lease.row_count as usize];
+    decode(lease, encoding, bytes, &mut pixels)?;
+    Ok(blake3::hash(&pixels))
 }
 
 /// The pixels of a lease, all of them or none that count.
@@ -183,136 +259,4 @@ impl Drop for FramePixels {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::collection::vec;
-    use proptest::prelude::*;
-    use rayfarm_protocol::pixels::Packer;
-
-    use super::*;
-
-    const FRAME: FrameId = FrameId(3);
-
-    fn lease(first_row: u32, row_count: u32) -> Lease {
-        Lease { frame: FRAME, segment: 0, attempt: 0, first_row, row_count }
-    }
-
-    fn opened(width: u32, height: u32) -> Arc<Framebuffers> {
-        let framebuffers = Arc::new(Framebuffers::default());
-        framebuffers.open(FRAME, width, height);
-        framebuffers
-    }
-
-    /// Whether the pixels were kept.
-    fn write(framebuffers: &Framebuffers, lease: Lease, bytes: &[u8]) -> Result<bool, Misfit> {
-        let written = framebuffers.write(lease, Encoding::Raw, bytes)?;
-        Ok(matches!(written, Written::Kept { .. }))
-    }
-
-    fn packed(bytes: &[u8], block_bytes: usize) -> Vec<u8> {
-        let mut packer = Packer::new();
-        bytes.chunks(block_bytes).flat_map(|part| packer.block(part).unwrap()).collect()
-    }
-
-    #[test]
-    fn segments_in_any_order_make_the_picture() {
-        let framebuffers = opened(1, 3);
-        assert_eq!(write(&framebuffers, lease(2, 1), &[7, 8, 9]), Ok(true));
-        assert_eq!(write(&framebuffers, lease(0, 2), &[1, 2, 3, 4, 5, 6]), Ok(true));
-        assert_eq!(framebuffers.finish(FRAME).unwrap().into_vec(), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
-    }
-
-    #[test]
-    fn an_incomplete_picture_is_not_handed_out() {
-        let framebuffers = opened(1, 2);
-        write(&framebuffers, lease(0, 1), &[1; 3]).unwrap();
-        write(&framebuffers, lease(0, 1), &[1; 3]).unwrap();
-        assert!(framebuffers.finish(FRAME).is_none());
-    }
-
-    #[test]
-    fn the_first_pixels_of_a_row_stay() {
-        let framebuffers = opened(1, 2);
-        write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
-        write(&framebuffers, lease(0, 2), &[2; 6]).unwrap();
-        assert_eq!(*framebuffers.finish(FRAME).unwrap(), [2, 2, 2, 1, 1, 1]);
-    }
-
-    #[test]
-    fn what_does_not_fit_is_refused_and_writes_nothing() {
-        let framebuffers = opened(1, 2);
-        let short = write(&framebuffers, lease(0, 2), &[9; 5]).unwrap_err();
-        assert_eq!(short, Misfit::Bytes { lease: lease(0, 2), expected: 6, got: 5 });
-        for outside in [lease(1, 2), lease(2, 1), lease(u32::MAX, u32::MAX)] {
-            assert_eq!(write(&framebuffers, outside, &[9; 6]), Err(Misfit::Rows { lease: outside, rows: 2 }));
-        }
-        write(&framebuffers, lease(0, 2), &[1; 6]).unwrap();
-        assert_eq!(*framebuffers.finish(FRAME).unwrap(), [1; 6]);
-    }
-
-    #[test]
-    fn a_closed_frame_takes_no_pixels() {
-        let framebuffers = opened(1, 1);
-        framebuffers.discard(FRAME);
-        assert_eq!(write(&framebuffers, lease(0, 1), &[1; 3]), Ok(false));
-        assert!(framebuffers.finish(FRAME).is_none());
-    }
-
-    #[test]
-    fn buffers_are_used_again_and_not_hoarded() {
-        let framebuffers = opened(1, 1);
-        let pictures: Vec<FramePixels> = (0..6)
-            .map(|n| {
-                framebuffers.open(FrameId(n), 1, 1);
-                write(&framebuffers, Lease { frame: FrameId(n), ..lease(0, 1) }, &[n as u8; 3]).unwrap();
-                framebuffers.finish(FrameId(n)).unwrap()
-            })
-            .collect();
-        let first = pictures[0].as_ptr();
-        drop(pictures);
-        assert_eq!(framebuffers.lock().spare.len(), SPARE_BUFFERS);
-        assert!(framebuffers.lock().spare.iter().any(|spare| spare.as_ptr() == first));
-        framebuffers.open(FRAME, 2, 2);
-        framebuffers.discard(FRAME);
-        assert!(framebuffers.lock().spare.iter().all(|spare| spare.len() == 12));
-    }
-
-    #[test]
-    fn packed_pixels_are_unpacked_into_their_rows() {
-        let framebuffers = opened(2, 4);
-        let rows: Vec<u8> = (0..18).collect();
-        framebuffers.write(lease(1, 3), Encoding::Lz4, &packed(&rows, 7)).unwrap();
-        write(&framebuffers, lease(0, 2), &[9; 12]).unwrap();
-        assert_eq!(*framebuffers.finish(FRAME).unwrap(), [vec![9; 6], rows].concat());
-    }
-
-    #[test]
-    fn packed_pixels_leave_the_rows_alone_that_are_there() {
-        let framebuffers = opened(1, 3);
-        write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
-        framebuffers.write(lease(0, 3), Encoding::Lz4, &packed(&[2; 9], 9)).unwrap();
-        assert_eq!(*framebuffers.finish(FRAME).unwrap(), [2, 2, 2, 1, 1, 1, 2, 2, 2]);
-    }
-
-    proptest! {
-        #[test]
-        fn broken_blocks_fill_no_row_and_spoil_none(
-            bytes in vec(any::<u8>(), 0..80),
-            at in any::<prop::sample::Index>(),
-            valid: bool,
-        ) {
-            let framebuffers = opened(4, 4);
-            write(&framebuffers, lease(2, 1), &[3; 12]).unwrap();
-            let mut broken = if valid { packed(&[5; 48], 20) } else { bytes };
-            if valid {
-                broken.truncate(at.index(broken.len()));
-            }
-            let refused = framebuffers.write(lease(0, 4), Encoding::Lz4, &broken).is_err();
-            prop_assert!(refused || !valid);
-            if refused {
-                write(&framebuffers, lease(0, 4), &[5; 48]).unwrap();
-                let expected = [vec![5; 24], vec![3; 12], vec![5; 12]].concat();
-                prop_assert_eq!(&*framebuffers.finish(FRAME).unwrap(), &expected[..]);
-            }
-        }
-    }
-}
+mod tests;

@@ -12,6 +12,7 @@ const MAX_REVOKED: usize = 4096;
 #[derive(Debug, Default)]
 pub(crate) struct LeaseBook {
     granted: BTreeSet<Lease>,
+    verifying: BTreeSet<Lease>,
     revoked: BTreeSet<Lease>,
 }
 
@@ -20,6 +21,8 @@ pub(crate) struct LeaseBook {
 pub(crate) enum Standing {
     /// The lease was granted to this session and not answered yet.
     Granted,
+    /// The same, of rows that are to be compared with those in the picture.
+    Verifying,
     /// It was taken back: the answer was on its way, and is thrown away.
     Revoked,
     /// This session never got such a lease, or has answered it.
@@ -30,6 +33,11 @@ impl LeaseBook {
     /// The session gets a lease.
     pub(crate) fn grant(&mut self, lease: Lease) {
         self.granted.insert(lease);
+    }
+
+    /// The session gets a lease of rows that are verified.
+    pub(crate) fn verify(&mut self, lease: Lease) {
+        self.verifying.insert(lease);
     }
 
     /// Leases of frames before `before` are taken back.
@@ -46,6 +54,8 @@ impl LeaseBook {
     pub(crate) fn answer(&mut self, lease: &Lease) -> Standing {
         if self.granted.remove(lease) {
             Standing::Granted
+        } else if self.verifying.remove(lease) {
+            Standing::Verifying
         } else if self.revoked.remove(lease) {
             Standing::Revoked
         } else {
@@ -55,6 +65,7 @@ impl LeaseBook {
 
     fn revoke(&mut self, which: impl Fn(&Lease) -> bool) {
         self.revoked.extend(self.granted.extract_if(.., |lease| which(lease)));
+        self.revoked.extend(self.verifying.extract_if(.., |lease| which(lease)));
         while self.revoked.len() > MAX_REVOKED {
             self.revoked.pop_first();
         }
@@ -74,8 +85,11 @@ mod tests {
         let mut book = LeaseBook::default();
         book.grant(lease(1, 0));
         assert_eq!(book.answer(&Lease { attempt: 1, ..lease(1, 0) }), Standing::Unknown);
+        book.verify(lease(1, 1));
         assert_eq!(book.answer(&lease(1, 0)), Standing::Granted);
         assert_eq!(book.answer(&lease(1, 0)), Standing::Unknown);
+        assert_eq!(book.answer(&lease(1, 1)), Standing::Verifying);
+        assert_eq!(book.answer(&lease(1, 1)), Standing::Unknown);
     }
 
     #[test]
@@ -84,8 +98,10 @@ mod tests {
         for (frame, segment) in [(1, 0), (2, 0), (3, 0)] {
             book.grant(lease(frame, segment));
         }
+        book.verify(lease(1, 1));
         book.cancel(FrameId(2));
         book.fail(FrameId(3));
+        assert_eq!(book.answer(&lease(1, 1)), Standing::Revoked);
         assert_eq!(book.answer(&lease(1, 0)), Standing::Revoked);
         assert_eq!(book.answer(&lease(1, 0)), Standing::Unknown);
         assert_eq!(book.answer(&lease(2, 0)), Standing::Granted);

@@ -16,6 +16,7 @@ mod error;
 pub mod farm;
 mod farm_control;
 mod framebuffer;
+mod judge;
 mod lease_book;
 mod local_workers;
 mod logging;
@@ -26,6 +27,7 @@ mod progress;
 mod report;
 mod roster;
 pub mod scheduler;
+mod seals;
 mod server;
 pub mod simulator;
 mod wanted;
@@ -36,6 +38,8 @@ mod fake_worker;
 mod farm_tests;
 #[cfg(test)]
 mod test_scene;
+#[cfg(test)]
+mod verify_tests;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::accounting::{AccountReport, PART_COUNT, PART_NAMES};
 use crate::error::CommandError;
-use crate::farm::FinishedFrame;
+use crate::farm::{FinishedFrame, Verification};
 use crate::wanted::Knobs;
 
 /// What a `render` run did; `--json` prints it as one line.
@@ -43,8 +43,30 @@ pub(crate) struct RenderReport {
     pub(crate) scene_bytes: u64,
     /// What became of the workers' time, from the first frame's beginning to the last one's end.
     pub(crate) accounting: AccountReport,
+    /// Where segments are verified: how many were.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) verification: Option<VerificationReport>,
     /// Of the last frame's pixels: RGB8 rows, top to bottom.
     pub(crate) blake3: String,
+}
+
+/// Segments that were rendered twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub(crate) struct VerificationReport {
+    /// The share that was asked for.
+    pub(crate) percent: u8,
+    /// Those that were to be verified.
+    pub(crate) picked: u64,
+    /// Those that were.
+    pub(crate) verified: u64,
+    /// Those of which somebody had sent wrong pixels.
+    pub(crate) mismatches: u64,
+}
+
+impl VerificationReport {
+    pub(crate) fn of(Verification { percent, picked, verified, mismatches, .. }: Verification) -> Self {
+        Self { percent, picked, verified, mismatches }
+    }
 }
 
 /// What a `bench` run measured; `--json` prints it as one line.

@@ -16,6 +16,8 @@ use crate::scheduler::{Return, WorkerId};
 const FAREWELL: Duration = Duration::from_secs(1);
 /// Kicked workers that are kept out; beyond that, the one kicked longest ago is forgotten.
 const MAX_KICKED: usize = 1024;
+/// Workers that have left and are still known by name.
+const MAX_LEFT: usize = 256;
 /// Workers whose trouble is told at a time.
 const MAX_TOLD: usize = 4;
 
@@ -27,6 +29,8 @@ pub(crate) struct Roster {
     ended: ByteCount,
     /// Who was kicked, by name and address: whoever shakes hands as such is refused.
     kicked: VecDeque<(String, IpAddr)>,
+    /// Who has left lately: a worker may be found to have lied when it is gone.
+    left: VecDeque<(WorkerId, String, IpAddr)>,
 }
 
 /// A connected worker.
@@ -116,8 +120,12 @@ impl Roster {
 
     /// Forgets a session and sees it off in the background: a last word, if there is room for it, then the end.
     pub(crate) fn end(&mut self, worker: WorkerId, reason: &str, again: Return) -> Option<JoinHandle<()>> {
-        let Session { sender, traffic, .. } = self.sessions.remove(&worker)?;
+        let Session { sender, traffic, hello, address, .. } = self.sessions.remove(&worker)?;
         self.ended.add(&traffic);
+        self.left.push_back((worker, hello.name, address.ip()));
+        while self.left.len() > MAX_LEFT {
+            self.left.pop_front();
+        }
         let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), again: again == Return::Welcome };
         Some(tokio::spawn(async move {
             let last_words = async {
@@ -131,10 +139,12 @@ impl Roster {
         }))
     }
 
-    /// Keeps a connected worker's name and address out from now on. Its session goes on until it is ended.
+    /// Keeps a worker's name and address out from now on, if it is connected or was lately. Its session goes on until it
+    /// is ended.
     pub(crate) fn bar(&mut self, worker: WorkerId) {
-        let Some(Session { hello, address, .. }) = self.sessions.get(&worker) else { return };
-        let kicked = (hello.name.clone(), address.ip());
+        let here = self.sessions.get(&worker).map(|s| (s.hello.name.clone(), s.address.ip()));
+        let gone = || self.left.iter().find(|(id, ..)| *id == worker);
+        let Some(kicked) = here.or_else(|| gone().map(|(_, name, ip)| (name.clone(), *ip))) else { return };
         if !self.kicked.contains(&kicked) {
             self.kicked.push_back(kicked);
         }

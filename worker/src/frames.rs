@@ -55,12 +55,13 @@ impl<F> Frames<F> {
         Self { held: BTreeMap::new(), before: FrameId(0) }
     }
 
-    /// Takes a new frame in; `false` when it is stale or known. At most one older frame gives way and is returned.
-    /// A frame that has failed begins anew: the master announces it again when it tries this worker again.
+    /// Takes a new frame in; `false` when it is known. At most one older frame gives way and is returned.
+    /// A frame that has failed begins anew: the master announces it again when it tries this worker again. So does one that
+    /// was cancelled: the master has rows of it verified.
     pub(crate) fn announce(&mut self, announce: FrameAnnounce) -> (bool, Option<FrameId>) {
         let frame = announce.frame;
         let known = self.held.get(&frame).is_some_and(|held| !matches!(held.state, State::Failed));
-        if frame < self.before || known {
+        if known {
             return (false, None);
         }
         self.held.insert(frame, Held { announce, state: State::Loading, waiting: Vec::new() });

@@ -1,6 +1,7 @@
 //! The accounts of all workers, fed with what happens to the scheduler and what it decides.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::Range;
 use std::time::Duration;
 
 use rayfarm_protocol::{FrameId, Lease};
@@ -150,7 +151,13 @@ impl Accounts {
                 self.workers.insert(worker, Member { ledger, account, taken_in: Default::default() });
             }
             Event::WorkerLeft { worker } => self.leave(now, worker),
-            Event::SegmentDone { worker, lease, cost } => self.answer(now, worker, lease, cost),
+            Event::SegmentDone { worker, lease, cost } => self.answer(now, worker, lease, cost, true),
+            Event::SegmentVerified { worker, lease, cost, .. } => {
+                self.answer(now, worker, lease, cost, false)
+            }
+            Event::RowsRejected { frame, first_row, row_count } => {
+                self.forget_notes(frame, first_row..first_row.saturating_add(row_count));
+            }
             Event::WorkerFailed { worker, .. } => {
                 self.advance(now, worker);
                 let stretch = self.workers.get_mut(&worker).and_then(|member| member.ledger.fail());
@@ -163,6 +170,7 @@ impl Accounts {
             | Event::DrainRequested { .. }
             | Event::Pong { .. }
             | Event::Heard { .. }
+            | Event::SegmentJudged { .. }
             | Event::Woken => {}
         }
     }
@@ -176,14 +184,15 @@ impl Accounts {
                 self.advance_all(now);
                 self.frames.remove(&frame);
             }
-            Action::Grant { worker, lease } => {
+            Action::Grant { worker, lease } | Action::Verify { worker, lease } => {
                 self.advance(now, worker);
                 if let Some(member) = self.workers.get_mut(&worker) {
                     member.ledger.grant(lease);
                 }
             }
             Action::Cancel { worker, before } => self.cancel(now, worker, before),
-            Action::Dismiss { worker, .. } => self.leave(now, worker),
+            Action::Dismiss { worker, .. } | Action::Expel { worker, .. } => self.leave(now, worker),
+            Action::Seal { .. } | Action::Judge { .. } | Action::Unseal { .. } => {}
             Action::Announce { .. } | Action::Ping { .. } | Action::Drain { .. } => {}
         }
     }
@@ -213,7 +222,8 @@ impl Accounts {
         self.done = Some(FrameAccount { workers, segments: sketch.segments });
     }
 
-    fn answer(&mut self, now: Duration, worker: WorkerId, lease: Lease, cost: Cost) {
+    /// A lease is answered; `shown`: with rows for a picture.
+    fn answer(&mut self, now: Duration, worker: WorkerId, lease: Lease, cost: Cost, shown: bool) {
         self.advance(now, worker);
         let Some(member) = self.workers.get_mut(&worker) else { return };
         let (bytes, decode) = std::mem::take(&mut member.taken_in);
@@ -223,7 +233,9 @@ impl Accounts {
         member.account.segments += 1;
         member.account.rows += u64::from(lease.row_count);
         member.account.bytes += bytes;
-        self.note(worker, lease, trace_ns);
+        if shown {
+            self.note(worker, lease, trace_ns);
+        }
         if let Some(marks) = &mut self.marks {
             let what = What::Segment { lease, bytes };
             marks.push_back(Mark::Span(Span { worker: Some(worker), from: stretch.from, to: now, what }));
@@ -238,6 +250,14 @@ impl Accounts {
         if sketch.noted.insert((first_row, row_count)) {
             sketch.segments.push(SegmentNote { first_row, row_count, worker: worker.0, trace_ns });
         }
+    }
+
+    /// Rows have left a picture: others will be noted in their place.
+    fn forget_notes(&mut self, frame: FrameId, rows: Range<u32>) {
+        let Some(sketch) = self.frames.get_mut(&frame) else { return };
+        let stays = |first: u32, count: u32| first >= rows.end || first.saturating_add(count) <= rows.start;
+        sketch.segments.retain(|note| stays(note.first_row, note.row_count));
+        sketch.noted.retain(|&(first, count)| stays(first, count));
     }
 
     fn cancel(&mut self, now: Duration, worker: WorkerId, before: FrameId) {

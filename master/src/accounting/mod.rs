@@ -7,7 +7,7 @@
 //!
 //! | part | the worker's threads ... |
 //! | --- | --- |
-//! | trace | rendered rows that came into a picture, as the worker measures it |
+//! | trace | rendered rows that came into a picture, or that verified others, as the worker measures it |
 //! | encode | made these rows small for the wire, as the worker measures it |
 //! | decode | had nothing to do while the master took their pixels in |
 //! | send | had nothing to do while leases or pixels were on the wire |

@@ -28,6 +28,9 @@ pub(crate) struct FarmArgs {
     /// Frames that workers may begin before the one on the way is complete: 1, or 0 for the newest camera.
     #[arg(long, value_name = "0|1", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=1))]
     pub(super) pipeline: u8,
+    /// Have this share of the segments rendered by a second worker too, and send away who sends wrong pixels.
+    #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
+    pub(super) verify: u8,
 }
 
 impl FarmArgs {
@@ -44,6 +47,7 @@ impl FarmArgs {
             threads: self.threads,
             policy: self.segment,
             sequential: self.pipeline == 0,
+            verify_percent: self.verify,
         }
     }
 }

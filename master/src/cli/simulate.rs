@@ -64,6 +64,9 @@ pub(crate) struct SimulateArgs {
     /// Requests a second of a moving camera; 0 asks for the next frame when one is complete.
     #[arg(long, value_name = "N", default_value = "0", value_parser = rate)]
     input: f64,
+    /// Render this share of the segments twice, in per cent, and compare.
+    #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
+    verify: u8,
     /// What everything random follows from.
     #[arg(long, value_name = "N", default_value = "1")]
     pub(crate) seed: u64,
@@ -106,6 +109,7 @@ impl SimulateArgs {
             compression: self.compression,
             round_trip: (self.rtt * 1e6) as u64,
             input_rate: self.input,
+            verify_percent: self.verify,
             frames: self.frames.into(),
             seed: self.seed,
             ..Setup::default()

@@ -16,12 +16,13 @@ use crate::accounting::RunAccount;
 use crate::cli::RenderArgs;
 use crate::display::frame_rate::FrameRate;
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmOptions, FarmScene, FinishedFrame};
+use crate::farm::{Farm, FarmOptions, FarmScene, FinishedFrame, Verification};
 use crate::orbit::Animation;
 use crate::output::{FrameWriter, OutputPattern, check_writable};
 use crate::progress::Progress;
 use crate::report::{
-    BytesPerFrame, FpsLog, FrameLine, MsPerFrame, RaysPerFrame, RenderReport, mean, print_json,
+    BytesPerFrame, FpsLog, FrameLine, MsPerFrame, RaysPerFrame, RenderReport, VerificationReport, mean,
+    print_json,
 };
 use crate::wanted::WantedPicture;
 
@@ -34,6 +35,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(200);
 /// How long local workers may take to come before the run begins without them, and how often that is looked at.
 const MUSTER: Duration = Duration::from_secs(5);
 const MUSTER_LOOK: Duration = Duration::from_millis(2);
+/// How long what is left to verify may take when the last frame is complete.
+const VERIFICATION: Duration = Duration::from_secs(30);
 
 /// Renders all frames and writes them.
 ///
@@ -102,6 +105,7 @@ impl Run {
         let rendered = self.render(&mut farm, &mut progress, &interrupted).await;
         let written = self.writer.finish().await;
         progress.finish(self.writer.written());
+        self.totals.verification = self.verify(&farm, &interrupted).await;
         farm.shut_down().await;
         let traced = self.oversight.end();
         match rendered.and(written).and(traced) {
@@ -112,6 +116,24 @@ impl Run {
             ))),
             result => result.map(|()| self.totals.report(&self.wanted)),
         }
+    }
+
+    /// Waits, not for ever, until the last frames are verified, where frames are.
+    async fn verify(&self, farm: &Farm, interrupted: &CancellationToken) -> Option<VerificationReport> {
+        farm.status().verification?;
+        tokio::select! {
+            () = interrupted.cancelled() => {}
+            _ = tokio::time::timeout(VERIFICATION, farm.verified()) => {}
+        }
+        let counts = farm.status().verification?;
+        if counts.mismatches > 0 {
+            let Verification { verified, mismatches, .. } = counts;
+            tracing::error!(
+                "{mismatches} of {verified} verified segments were wrong: frames that were complete before their worker \
+                 was found out may be, too; render them again"
+            );
+        }
+        Some(VerificationReport::of(counts))
     }
 
     /// Waits until the workers are there, so that figures are of the number of workers that was asked for and do not
@@ -204,6 +226,7 @@ struct Totals {
     bytes: BytesPerFrame,
     scene_bytes: u64,
     account: RunAccount,
+    verification: Option<VerificationReport>,
     workers: u32,
     threads: u32,
     triangles: u64,
@@ -224,6 +247,7 @@ impl Totals {
             bytes: BytesPerFrame::default(),
             scene_bytes: 0,
             account: RunAccount::default(),
+            verification: None,
             workers: 0,
             threads: 0,
             triangles,
@@ -280,6 +304,7 @@ impl Totals {
             },
             scene_bytes: self.scene_bytes,
             accounting: self.account.report(),
+            verification: self.verification,
             blake3: self.hash.to_hex().to_string(),
         }
     }

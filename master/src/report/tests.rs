@@ -50,6 +50,7 @@ fn the_json_line_has_the_documented_shape() {
         bytes_per_frame: BytesPerFrame { sent: 100, received: 9_216 },
         scene_bytes: 4_096,
         accounting: AccountReport::default(),
+        verification: None,
         blake3: "00ff".to_owned(),
     };
     assert_eq!(

@@ -45,6 +45,45 @@ pub enum Action {
         /// Which rows.
         lease: Lease,
     },
+    /// Remember what these rows of a picture look like, if all of them are this worker's: they are to be verified. Their
+    /// number is no other segment's.
+    Seal {
+        /// Who rendered them.
+        worker: WorkerId,
+        /// The rows, and the number under which they are verified.
+        lease: Lease,
+    },
+    /// Give a worker sealed rows to render again. They go into no picture: what they are worth is told by
+    /// [`Event::SegmentVerified`](super::Event::SegmentVerified).
+    Verify {
+        /// Whom.
+        worker: WorkerId,
+        /// Which rows.
+        lease: Lease,
+    },
+    /// Trace sealed rows here, compare them with whatever was sent, and tell of it by
+    /// [`Event::SegmentJudged`](super::Event::SegmentJudged).
+    Judge {
+        /// The frame.
+        frame: FrameId,
+        /// The number under which the rows are verified.
+        segment: u32,
+    },
+    /// Forget what sealed rows look like. Every seal ends so.
+    Unseal {
+        /// The frame.
+        frame: FrameId,
+        /// The number under which the rows were verified.
+        segment: u32,
+    },
+    /// End a worker's session, if it has not ended yet, and keep it out; the scheduler has forgotten it already. Its rows
+    /// leave all pictures in flight, which [`Event::RowsRejected`](super::Event::RowsRejected) tells of.
+    Expel {
+        /// Whom.
+        worker: WorkerId,
+        /// Why, for the log and for the worker.
+        reason: String,
+    },
     /// Tell a worker that leases of frames before this one are of no use any more.
     Cancel {
         /// Whom.

@@ -1,12 +1,14 @@
 //! Handing out rows: to whom, in which order. How many is the policy's to say.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::time::Duration;
 
 use super::adaptive::Crew;
+use super::forecast::Forecast;
 use super::frame::Frame;
+use super::held::Held;
 use super::policy::SEED_WINDOW;
-use super::worker::Held;
 use super::{Action, Lease, Scheduler, SegmentPolicy, WorkerId};
 
 /// Frames in flight at most: the oldest, and one that idle workers begin while its last rows are rendered.
@@ -16,7 +18,7 @@ impl Scheduler {
     /// Hands out rows until everybody has enough or nothing is left.
     pub(super) fn assign(&mut self, now: Duration) {
         self.recheck_at = None;
-        if self.frames.is_empty() {
+        if self.frames.is_empty() && self.audits.open.is_empty() {
             return;
         }
         match self.policy {
@@ -34,8 +36,14 @@ impl Scheduler {
                 if self.workers.get(&id).is_none_or(|worker| worker.leases.len() != depth) {
                     continue;
                 }
-                let fresh = self.seed_lease(id);
-                if let Some(lease) = fresh.or_else(|| if depth == 0 { self.any_copy(now, id) } else { None })
+                if self.give_old_audit(now, id, None) {
+                    continue;
+                }
+                if let Some(lease) = self.seed_lease(id) {
+                    self.grant(now, id, lease, None);
+                } else if !self.give_audit(now, id, None)
+                    && depth == 0
+                    && let Some(lease) = self.any_copy(now, id)
                 {
                     self.grant(now, id, lease, None);
                 }
@@ -77,20 +85,31 @@ impl Scheduler {
         self.copy_for_the_idle(now, &mut crew);
     }
 
-    /// Rows of the oldest frame that has some which this worker can do in time; of the request that waits, if that may
-    /// begin.
+    /// Rows to verify of complete frames; otherwise rows of the oldest frame, if this worker can do some in time; otherwise
+    /// more rows to verify; otherwise those of the next frame, which begins if it may.
     fn give_one(&mut self, now: Duration, crew: &mut Crew, hand: usize) -> bool {
         let Some(id) = crew.id(hand) else { return false };
-        let mut index = 0;
+        if self.give_old_audit(now, id, Some(&mut *crew))
+            || self.give_rows(now, crew, hand, 0)
+            || self.give_audit(now, id, Some(&mut *crew))
+        {
+            return true;
+        }
+        let mut index = 1;
         while let Some(frame) = self.frame_from(index) {
-            if let Some(rows) = self.forecast_rows(frame, crew, hand) {
-                let lease = self.frames.get_mut(frame).and_then(|frame| frame.take(id, rows));
-                lease.into_iter().for_each(|lease| self.grant(now, id, lease, Some(&mut *crew)));
-                return lease.is_some();
+            if self.give_rows(now, crew, hand, frame) {
+                return true;
             }
             index = frame + 1;
         }
         false
+    }
+
+    fn give_rows(&mut self, now: Duration, crew: &mut Crew, hand: usize, frame: usize) -> bool {
+        let Some((id, rows)) = crew.id(hand).zip(self.forecast_rows(frame, crew, hand)) else { return false };
+        let lease = self.frames.get_mut(frame).and_then(|frame| frame.take(id, rows));
+        lease.into_iter().for_each(|lease| self.grant(now, id, lease, Some(&mut *crew)));
+        lease.is_some()
     }
 
     /// The oldest frame, from the `index`th on, of which rows wait. Where none has any, the request that waits begins,
@@ -105,24 +124,66 @@ impl Scheduler {
         })
     }
 
-    /// Writes a lease down and has it sent.
+    /// Writes a lease of rows for a picture down and has it sent.
     pub(super) fn grant(&mut self, now: Duration, id: WorkerId, lease: Lease, crew: Option<&mut Crew>) {
         let rows = lease.first_row..lease.first_row + lease.row_count;
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
         frame.started_at.get_or_insert(now);
-        let work = frame.forecast.work(rows.clone());
-        let longest = frame.forecast.longest_band(rows);
+        let load = Load::of(&frame.forecast, rows);
+        if self.write_down(now, id, lease, crew, load, false) {
+            self.actions.push_back(Action::Grant { worker: id, lease });
+        }
+    }
+
+    /// The same of rows that are verified.
+    pub(super) fn grant_audit(
+        &mut self,
+        now: Duration,
+        id: WorkerId,
+        lease: Lease,
+        crew: Option<&mut Crew>,
+        load: Load,
+    ) {
+        if self.write_down(now, id, lease, crew, load, true) {
+            self.actions.push_back(Action::Verify { worker: id, lease });
+        }
+    }
+
+    /// Notes what a worker holds from now on, when it is expected, and tells the worker of the frame.
+    fn write_down(
+        &mut self,
+        now: Duration,
+        id: WorkerId,
+        lease: Lease,
+        crew: Option<&mut Crew>,
+        Load { work, longest }: Load,
+        audit: bool,
+    ) -> bool {
         // Frames in flight share the workers: one is complete every so often.
         let every = self.last_frame / self.max_frames() as u32;
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(worker) = self.workers.get_mut(&id) else { return false };
         let expected = crew.and_then(|crew| crew.expect(id, work, longest));
         let expected_at = expected.map(|(at, _)| at);
         let deadline =
             expected.map(|(at, takes)| at.saturating_add(worker.slack(takes, self.surprise, every)));
-        worker.hold(now, Held { lease, granted_at: now, work, expected_at, deadline });
+        worker.hold(now, Held { lease, granted_at: now, work, expected_at, deadline, audit });
         if worker.must_announce(lease.frame) {
             self.actions.push_back(Action::Announce { worker: id, frame: lease.frame });
         }
-        self.actions.push_back(Action::Grant { worker: id, lease });
+        true
+    }
+}
+
+/// What rows are expected to take.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Load {
+    work: f64,
+    /// Of the most expensive band among them.
+    longest: f64,
+}
+
+impl Load {
+    pub(super) fn of(forecast: &Forecast, rows: Range<u32>) -> Self {
+        Self { work: forecast.work(rows.clone()), longest: forecast.longest_band(rows) }
     }
 }

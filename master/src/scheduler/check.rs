@@ -1,5 +1,8 @@
 //! What holds after every event. Debug builds and tests check it each time.
 
+use std::collections::BTreeSet;
+
+use super::audits::{MAX_AUDITS, Stage, TRAILING_FRAMES};
 use super::frame::Frame;
 use super::policy::{MAX_WINDOW, SEED_WINDOW};
 use super::{Scheduler, SegmentPolicy};
@@ -12,12 +15,14 @@ use super::{Scheduler, SegmentPolicy};
 /// - rows do not wait for anybody while all who could render them are idle;
 /// - under the seed's policies, nobody is idle while rows wait;
 /// - at most two frames are in flight, in order, and none of them is complete;
+/// - audits are few, of frames in flight or lately complete, and nobody verifies what it has rendered itself;
 /// - without workers nothing is leased.
 pub fn violated(scheduler: &Scheduler) -> Option<String> {
     frames_are_in_order(scheduler)
         .or_else(|| scheduler.frames.iter().find_map(rows_are_somewhere))
         .or_else(|| scheduler.frames.iter().find_map(|frame| holders_hold(scheduler, frame)))
         .or_else(|| leases_are_known(scheduler))
+        .or_else(|| audits_are_in_order(scheduler))
         .or_else(|| nobody_is_idle(scheduler))
 }
 
@@ -80,6 +85,12 @@ fn leases_are_known(scheduler: &Scheduler) -> Option<String> {
             return Some(format!("{id} holds {} leases, at most {window} expected", worker.leases.len()));
         }
         worker.leases.iter().find_map(|(&(frame, number), held)| {
+            if held.audit {
+                let audit = scheduler.audits.open.get(&(frame, number));
+                let known = audit.is_some_and(|audit| audit.stage == Stage::Leased(*id));
+                return (!known)
+                    .then(|| format!("{id} verifies {:?}, which nobody asked it for", held.lease));
+            }
             let known = scheduler.frames.iter().find(|known| known.id == frame);
             let segment = known.and_then(|frame| frame.segments.get(&number));
             let rows = (held.lease.first_row, held.lease.row_count);
@@ -88,6 +99,23 @@ fn leases_are_known(scheduler: &Scheduler) -> Option<String> {
             });
             (!fits).then(|| format!("{id} holds {:?}, which its frame does not know", held.lease))
         })
+    })
+}
+
+fn audits_are_in_order(scheduler: &Scheduler) -> Option<String> {
+    let audits = &scheduler.audits;
+    let frames: BTreeSet<_> = audits.open.keys().map(|(frame, _)| frame).collect();
+    if audits.open.len() > MAX_AUDITS || frames.len() > scheduler.max_frames() + TRAILING_FRAMES {
+        return Some(format!("{} audits of {} frames are open", audits.open.len(), frames.len()));
+    }
+    audits.open.iter().find_map(|(&(frame, number), audit)| {
+        let Stage::Leased(holder) = audit.stage else { return None };
+        let worker = scheduler.workers.get(&holder);
+        let holds = worker.is_some_and(|worker| worker.leases.contains_key(&(frame, number)));
+        if !holds {
+            return Some(format!("{frame:?} audit {number} is held by {holder}, which does not hold it"));
+        }
+        (holder == audit.painter).then(|| format!("{holder} verifies what it has rendered itself"))
     })
 }
 

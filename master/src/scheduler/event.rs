@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Cost, FrameId, Lease};
+use super::{Cost, Finding, FrameId, Lease, Verdict};
 
 /// A connected worker. Numbers are given by the shell and never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -69,6 +69,35 @@ pub enum Event {
         lease: Lease,
         /// What the worker says they took.
         cost: Cost,
+    },
+    /// A segment of an audit was rendered again, and compared with what its seal tells.
+    SegmentVerified {
+        /// Who rendered it.
+        worker: WorkerId,
+        /// The lease as it was granted.
+        lease: Lease,
+        /// What the worker says it took.
+        cost: Cost,
+        /// What has come of it.
+        finding: Finding,
+    },
+    /// The master has traced a segment of an audit itself.
+    SegmentJudged {
+        /// The frame.
+        frame: FrameId,
+        /// The number of the audit in it.
+        segment: u32,
+        /// Whose bytes are others.
+        verdict: Verdict,
+    },
+    /// Rows of a frame in flight are not in its picture any more: whoever sent them was expelled.
+    RowsRejected {
+        /// Which frame.
+        frame: FrameId,
+        /// The first of them.
+        first_row: u32,
+        /// How many.
+        row_count: u32,
     },
     /// A worker cannot render a frame.
     WorkerFailed {

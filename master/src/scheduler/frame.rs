@@ -1,6 +1,7 @@
 //! One frame's rows: queued, leased or done.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::Range;
 use std::time::Duration;
 
 use super::forecast::Forecast;
@@ -34,6 +35,8 @@ pub(super) struct Segment {
     /// Who renders it now; empty once it is done.
     pub(super) holders: BTreeSet<WorkerId>,
     pub(super) done: bool,
+    /// What it took, once it is done.
+    cost: Cost,
 }
 
 /// A frame that has begun.
@@ -49,8 +52,6 @@ pub(super) struct Frame {
     pub(super) segments: BTreeMap<u32, Segment>,
     next_segment: u32,
     pub(super) rows_done: u32,
-    /// What the done segments took.
-    pub(super) cost: Cost,
     /// How often each worker has said that it cannot render this frame, since somebody last could.
     refusals: BTreeMap<WorkerId, u32>,
 }
@@ -72,7 +73,6 @@ impl Frame {
             segments: BTreeMap::new(),
             next_segment: 0,
             rows_done: 0,
-            cost: Cost::default(),
             refusals: BTreeMap::new(),
         }
     }
@@ -102,6 +102,19 @@ impl Frame {
         self.rows_done == self.height
     }
 
+    /// A number that no segment of this frame has had.
+    pub(super) fn next_number(&mut self) -> u32 {
+        self.next_segment += 1;
+        self.next_segment - 1
+    }
+
+    /// What the done segments took, summed.
+    pub(super) fn cost(&self) -> Cost {
+        let mut sum = Cost::default();
+        self.segments.values().for_each(|segment| sum += segment.cost);
+        sum
+    }
+
     /// Leases up to `max_rows` rows from the front of the queue.
     pub(super) fn take(&mut self, worker: WorkerId, max_rows: u32) -> Option<Lease> {
         let run = self.queue.pop_front()?;
@@ -109,8 +122,7 @@ impl Frame {
         if let Some(rest) = rest {
             self.queue.push_front(rest);
         }
-        let (number, attempt) = run.came_back.unwrap_or((self.next_segment, 0));
-        self.next_segment = self.next_segment.max(number + 1);
+        let (number, attempt) = run.came_back.unwrap_or_else(|| (self.next_number(), 0));
         let segment = Segment {
             first: run.first,
             count: run.count,
@@ -118,6 +130,7 @@ impl Frame {
             halved: run.halved,
             holders: BTreeSet::new(),
             done: false,
+            cost: Cost::default(),
         };
         self.segments.insert(number, segment);
         self.copy(number, worker)
@@ -145,11 +158,11 @@ impl Frame {
         Some(Lease { frame: self.id, segment: number, attempt, first_row, row_count })
     }
 
-    /// Marks the rows of a lease done; whether any of them were not. Every row's cost is counted once.
+    /// Marks the rows of a lease done; how many of them were not. Every row's cost is counted once.
     ///
     /// The lease may have been taken back as overdue, and its rows be queued again or leased to others in pieces: each
     /// of these pieces lies within it.
-    pub(super) fn finish(&mut self, lease: &Lease, cost: Cost) -> bool {
+    pub(super) fn finish(&mut self, lease: &Lease, cost: Cost) -> u32 {
         let rows = lease.first_row..lease.first_row.saturating_add(lease.row_count);
         let within = |first: u32, count: u32| rows.start <= first && first + count <= rows.end;
         for index in (0..self.queue.len()).rev() {
@@ -161,38 +174,36 @@ impl Frame {
         for segment in self.segments.values_mut().filter(|s| !s.done && within(s.first, s.count)) {
             segment.done = true;
             segment.holders.clear();
+            segment.cost = share(cost, segment.count, lease.row_count);
             fresh += segment.count;
         }
         self.rows_done += fresh;
         self.refusals.clear();
-        self.pay(cost, fresh, lease.row_count);
-        fresh > 0
+        fresh
+    }
+
+    /// Done segments of which rows have left the picture go to the front of the queue, in order. Returns their numbers.
+    pub(super) fn reject(&mut self, rows: Range<u32>) -> Vec<u32> {
+        let hit = |s: &Segment| s.done && s.first < rows.end && rows.start < s.first + s.count;
+        let numbers: Vec<u32> = self.segments.iter().filter(|(_, s)| hit(s)).map(|(&n, _)| n).collect();
+        for &number in numbers.iter().rev() {
+            let Some(Segment { first, count, next_attempt, halved, .. }) = self.segments.remove(&number)
+            else {
+                continue;
+            };
+            self.rows_done -= count;
+            self.queue.push_front(Run { first, count, came_back: Some((number, next_attempt)), halved });
+        }
+        numbers
     }
 
     /// Makes a segment of a run in the queue.
     fn settle(&mut self, index: usize) {
         let Some(Run { first, count, came_back, halved }) = self.queue.remove(index) else { return };
-        let (number, next_attempt) = came_back.unwrap_or((self.next_segment, 0));
-        self.next_segment = self.next_segment.max(number + 1);
-        let holders = BTreeSet::new();
-        self.segments.insert(number, Segment { first, count, next_attempt, halved, holders, done: false });
-    }
-
-    /// Adds what `fresh` of `rows` rows have cost.
-    fn pay(&mut self, cost: Cost, fresh: u32, rows: u32) {
-        let part = |whole: u64| {
-            let part = u128::from(whole) * u128::from(fresh) / u128::from(rows.max(1));
-            u64::try_from(part).unwrap_or(u64::MAX)
-        };
-        self.cost += Cost {
-            trace_ns: part(cost.trace_ns),
-            wait_ns: part(cost.wait_ns),
-            encode_ns: part(cost.encode_ns),
-            span_ns: part(cost.span_ns),
-            primary: part(cost.primary),
-            shadow: part(cost.shadow),
-            secondary: part(cost.secondary),
-        };
+        let (number, next_attempt) = came_back.unwrap_or_else(|| (self.next_number(), 0));
+        let (holders, cost) = (BTreeSet::new(), Cost::default());
+        let segment = Segment { first, count, next_attempt, halved, holders, done: false, cost };
+        self.segments.insert(number, segment);
     }
 
     /// Takes a segment from a worker; rows that nobody else renders go back to the front of the queue.
@@ -205,6 +216,23 @@ impl Frame {
         if let Some(Segment { first, count, next_attempt, halved, .. }) = self.segments.remove(&number) {
             self.queue.push_front(Run { first, count, came_back: Some((number, next_attempt)), halved });
         }
+    }
+}
+
+/// What `count` of `rows` rows have cost.
+fn share(cost: Cost, count: u32, rows: u32) -> Cost {
+    let part = |whole: u64| {
+        let part = u128::from(whole) * u128::from(count) / u128::from(rows.max(1));
+        u64::try_from(part).unwrap_or(u64::MAX)
+    };
+    Cost {
+        trace_ns: part(cost.trace_ns),
+        wait_ns: part(cost.wait_ns),
+        encode_ns: part(cost.encode_ns),
+        span_ns: part(cost.span_ns),
+        primary: part(cost.primary),
+        shadow: part(cost.shadow),
+        secondary: part(cost.secondary),
     }
 }
 
@@ -271,9 +299,9 @@ mod tests {
         let lease = frame.take(A, 8).unwrap();
         frame.copy(lease.segment, B).unwrap();
         let cost = Cost { primary: 80, ..Cost::default() };
-        assert!(frame.finish(&lease, cost));
-        assert!(!frame.finish(&lease, cost));
-        assert_eq!((frame.rows_done, frame.cost.primary), (8, 80));
+        assert_eq!(frame.finish(&lease, cost), 8);
+        assert_eq!(frame.finish(&lease, cost), 0);
+        assert_eq!((frame.rows_done, frame.cost().primary), (8, 80));
     }
 
     #[test]
@@ -283,11 +311,25 @@ mod tests {
         frame.give_up(late.segment, A);
         let piece = frame.take(B, 8).unwrap();
         let done = frame.take(B, 4).unwrap();
-        assert!(frame.finish(&done, Cost { primary: 40, ..Cost::default() }));
-        assert!(frame.finish(&late, Cost { primary: 200, ..Cost::default() }));
-        assert_eq!((frame.rows_done, frame.cost.primary), (20, 200));
-        assert!(!frame.finish(&piece, Cost::default()));
+        assert_eq!(frame.finish(&done, Cost { primary: 40, ..Cost::default() }), 4);
+        assert_eq!(frame.finish(&late, Cost { primary: 200, ..Cost::default() }), 16);
+        assert_eq!((frame.rows_done, frame.cost().primary), (20, 200));
+        assert_eq!(frame.finish(&piece, Cost::default()), 0);
         assert_eq!(frame.queue.iter().map(|run| (run.first, run.count)).collect::<Vec<_>>(), [(20, 10)]);
+    }
+
+    #[test]
+    fn rejected_rows_are_rendered_again_and_paid_once() {
+        let mut frame = frame(30);
+        let cost = Cost { primary: 100, ..Cost::default() };
+        let leases = [frame.take(A, 10).unwrap(), frame.take(B, 10).unwrap(), frame.take(A, 10).unwrap()];
+        leases[..2].iter().for_each(|lease| assert_eq!(frame.finish(lease, cost), 10));
+        frame.reject(9..11);
+        assert_eq!((frame.rows_done, frame.cost().primary), (0, 0));
+        assert_eq!(frame.take(B, 30), Some(Lease { attempt: 1, ..leases[0] }));
+        frame.finish(&leases[2], cost);
+        frame.reject(0..10);
+        assert_eq!((frame.rows_done, frame.cost().primary), (10, 100), "what is not done is not rejected");
     }
 
     #[test]

@@ -24,6 +24,7 @@ impl Scheduler {
     /// Rows that a worker held go to the front of the queue, in order.
     pub(super) fn requeue(&mut self, id: WorkerId, taken: Vec<(FrameId, u32)>) {
         for (frame, segment) in taken.into_iter().rev() {
+            self.reopen_audit(id, (frame, segment));
             if let Some(frame) = self.frames.iter_mut().find(|known| known.id == frame) {
                 frame.give_up(segment, id);
             }
@@ -43,7 +44,9 @@ impl Scheduler {
 
     /// A worker cannot render: its leases go to others, and it rests before it is tried again.
     pub(super) fn worker_failed(&mut self, now: Duration, id: WorkerId, frame: FrameId) {
-        let Some(known) = self.frames.iter_mut().find(|known| known.id == frame) else { return };
+        let Some(known) = self.frames.iter_mut().find(|known| known.id == frame) else {
+            return self.fail_audits(id, frame);
+        };
         let Some(worker) = self.workers.get_mut(&id) else { return };
         if worker.fail(now) {
             known.refuse(id);

@@ -9,12 +9,15 @@ use std::time::Duration;
 mod action;
 mod adaptive;
 mod assign;
+mod audits;
 pub mod check;
 mod copies;
 mod cost_map;
 mod event;
+mod flight;
 mod forecast;
 mod frame;
+mod held;
 mod lapses;
 mod motion;
 pub mod policy;
@@ -23,6 +26,8 @@ mod speed;
 mod worker;
 
 #[cfg(test)]
+mod audit_scenarios;
+#[cfg(test)]
 mod scenarios;
 #[cfg(test)]
 mod sizes_tests;
@@ -30,14 +35,15 @@ mod sizes_tests;
 mod transcript;
 
 pub use action::{Action, Return};
+pub use audits::{Finding, Verdict, Verification};
 pub use event::{Event, WorkerId};
 pub use policy::SegmentPolicy;
 pub use rayfarm_protocol::{Cost, FrameId, Lease};
 pub use record::{Progress, WorkerRecord, WorkerState};
 
 use assign::MAX_FRAMES;
+use audits::Audits;
 use cost_map::CostMap;
-use forecast::Tiles;
 use frame::Frame;
 use lapses::FIRST_PATIENCE;
 use worker::{PING_EVERY, Service, Worker};
@@ -78,6 +84,7 @@ pub struct Scheduler {
     /// The newest request that has not begun.
     waiting: Option<Request>,
     costs: CostMap,
+    audits: Audits,
     actions: VecDeque<Action>,
     next_nonce: u64,
     /// How long a worker may owe something without giving anything.
@@ -113,6 +120,7 @@ impl Scheduler {
             frames: VecDeque::new(),
             waiting: None,
             costs: CostMap::default(),
+            audits: Audits::default(),
             actions: VecDeque::new(),
             next_nonce: 0,
             patience: FIRST_PATIENCE,
@@ -157,6 +165,13 @@ impl Scheduler {
             Event::PauseRequested { worker } => self.serve(worker, Service::Paused),
             Event::ResumeRequested { worker } => self.serve(worker, Service::Active),
             Event::SegmentDone { worker, lease, cost } => self.segment_done(now, worker, lease, cost),
+            Event::SegmentVerified { worker, lease, cost, finding } => {
+                self.verified(now, worker, lease, cost, finding);
+            }
+            Event::SegmentJudged { frame, segment, verdict } => self.judged(frame, segment, verdict),
+            Event::RowsRejected { frame, first_row, row_count } => {
+                self.rejected(frame, first_row, row_count);
+            }
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
             Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
             Event::Heard { worker } => self.fed(now, worker),
@@ -168,6 +183,7 @@ impl Scheduler {
         self.take_overdue(now);
         self.fail_frames();
         self.complete_frames();
+        self.judge_alone();
         self.assign(now);
         self.dismiss_drained();
         debug_assert_eq!(check::violated(self), None);
@@ -189,93 +205,28 @@ impl Scheduler {
         pulses.chain([self.recheck_at]).flatten().min()
     }
 
-    /// A request waits for its turn, in place of the one that waited before.
-    fn request(&mut self, request: Request) {
-        if self.newest().is_some_and(|(width, height)| (width, height) != (request.width, request.height)) {
-            self.drop_frames(request.frame);
-        }
-        self.supersede_newest();
-        if let Some(replaced) = self.waiting.replace(request) {
-            self.actions.push_back(Action::FrameDropped { frame: replaced.frame });
-        }
-        if self.frames.is_empty() {
-            self.begin_waiting();
-        }
-    }
-
-    /// The latest camera wins: the frame that idle workers have begun ahead of time gives way to a newer one while
-    /// less than half of it is leased. The oldest frame never does, so that frames complete however fast the camera
-    /// moves.
-    fn supersede_newest(&mut self) {
-        let newest = self.frames.back().filter(|frame| {
-            self.frames.len() > 1 && u64::from(frame.rows_leased()) * 2 < u64::from(frame.height)
-        });
-        if let Some(frame) = newest.map(|frame| frame.id) {
-            self.actions.push_back(Action::FrameDropped { frame });
-            self.forget_frame(frame);
-        }
-    }
-
-    /// Takes a frame out of flight. Workers that hold nothing else are told at once, the others when they may be: a
-    /// cancellation names the first frame that is still wanted.
-    fn forget_frame(&mut self, frame: FrameId) {
-        self.frames.retain(|known| known.id != frame);
-        let before = FrameId(frame.0.saturating_add(1));
-        let is_oldest = self.frames.front().is_none_or(|oldest| oldest.id > frame);
-        for (&worker, known) in &mut self.workers {
-            if known.forget(frame) && (is_oldest || known.leases.is_empty() && known.owed.is_empty()) {
-                known.stale = false;
-                self.actions.push_back(Action::Cancel { worker, before });
-            }
-        }
-        if self.frames.is_empty() {
-            self.begin_waiting();
-        }
-    }
-
-    /// Picture size of the newest request that is not finished.
-    fn newest(&self) -> Option<(u32, u32)> {
-        let begun = self.frames.back().map(|frame| (frame.width, frame.height));
-        self.waiting.map(|waiting| (waiting.width, waiting.height)).or(begun)
-    }
-
-    /// Gives up all that was requested before `next`: pictures of a size that nobody shows any more.
-    fn drop_frames(&mut self, next: FrameId) {
-        let begun = std::mem::take(&mut self.frames);
-        for frame in begun {
-            self.actions.push_back(Action::FrameDropped { frame: frame.id });
-        }
-        self.cancel_leases(next);
-    }
-
-    /// Begins the request that waits, if there is one.
-    fn begin_waiting(&mut self) {
-        let Some(Request { frame, width, height }) = self.waiting.take() else { return };
-        let runs = self.policy.runs(height, self.max_rows(width));
-        let tiles = Tiles { rows: self.tile_rows, share: self.tile_share };
-        let forecast = self.costs.forecast(height, self.frames.len() + 1, tiles);
-        self.frames.push_back(Frame::new(frame, (width, height), forecast, runs));
-        self.actions.push_back(Action::BeginFrame { frame });
-    }
-
-    /// The most rows that one lease may have.
-    fn max_rows(&self, width: u32) -> u32 {
-        let row_bytes = u64::from(width.max(1)) * 3;
-        u32::try_from(self.max_segment_bytes / row_bytes).unwrap_or(u32::MAX).max(1)
-    }
-
     fn segment_done(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) {
-        let half_life = self.last_frame.max(SHORTEST_HALF_LIFE);
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        let last_done_at = worker.last_done_at();
-        let Some((held, work)) = worker.finish(now, lease, cost, half_life) else { return };
-        let surprise = held.surprise(now, last_done_at).unwrap_or(1.0).clamp(1.0, MAX_SURPRISE);
-        self.surprise = surprise.max(1.0 + (self.surprise - 1.0) * SURPRISE_MEMORY);
+        let Some(work) = self.finish(now, id, lease, cost) else { return };
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
-        let is_news = frame.finish(&lease, cost);
-        if let Some(work) = work.filter(|_| is_news) {
+        let fresh_rows = frame.finish(&lease, cost);
+        if let Some(work) = work.filter(|_| fresh_rows > 0) {
             frame.forecast.learn(lease.first_row..lease.first_row + lease.row_count, work);
         }
+        if fresh_rows == lease.row_count {
+            self.pick(id, &lease);
+        }
+    }
+
+    /// Takes a lease off a worker that has answered it, if it held it; the work that it turned out to be, if that can be
+    /// told.
+    fn finish(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) -> Option<Option<f64>> {
+        let half_life = self.last_frame.max(SHORTEST_HALF_LIFE);
+        let worker = self.workers.get_mut(&id)?;
+        let last_done_at = worker.last_done_at();
+        let (held, work) = worker.finish(now, lease, cost, half_life)?;
+        let surprise = held.surprise(now, last_done_at).unwrap_or(1.0).clamp(1.0, MAX_SURPRISE);
+        self.surprise = surprise.max(1.0 + (self.surprise - 1.0) * SURPRISE_MEMORY);
+        Some(work)
     }
 
     /// Changes whether a worker gets leases. One that drains goes on draining: it has been told already.
@@ -338,29 +289,5 @@ impl Scheduler {
     fn take_leases(&mut self, id: WorkerId) {
         let taken = self.workers.get_mut(&id).map(Worker::take_all).unwrap_or_default();
         self.requeue(id, taken.into_keys().collect());
-    }
-
-    /// Reports complete frames, oldest first, and lets the next one begin.
-    fn complete_frames(&mut self) {
-        while let Some(frame) = self.frames.pop_front_if(|frame| frame.is_complete()) {
-            self.costs.learn(&frame.forecast);
-            let next = FrameId(frame.id.0.saturating_add(1));
-            self.cancel_leases(self.frames.front().map_or(next, |frame| frame.id));
-            let elapsed = self.handled_at.saturating_sub(frame.started_at.unwrap_or(self.handled_at));
-            self.last_frame = elapsed;
-            self.actions.push_back(Action::FrameDone { frame: frame.id, cost: frame.cost, elapsed });
-            if self.frames.is_empty() {
-                self.begin_waiting();
-            }
-        }
-    }
-
-    /// Frees everybody who still renders for a frame before `before`.
-    fn cancel_leases(&mut self, before: FrameId) {
-        for (&worker, known) in &mut self.workers {
-            if known.cancel(before) {
-                self.actions.push_back(Action::Cancel { worker, before });
-            }
-        }
     }
 }

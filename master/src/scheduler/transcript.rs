@@ -1,17 +1,21 @@
 //! Scripts and transcripts: what is told to the scheduler (`>`), and exactly what it answers.
 //!
 //! A line of a script is `MILLISECONDS COMMAND`: `frame N WxH`, `join W THREADS`, `leave W`, `drain W`,
-//! `retire W` (the user wants it to drain), `pause W`, `resume W`, `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`.
+//! `retire W` (the user wants it to drain), `pause W`, `resume W`, `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`,
+//! `verified W FRAME.SEGMENT same|different`, `judged FRAME.SEGMENT right|wrong right|wrong` (painter, checker),
+//! `reject FRAME FIRST+ROWS`. After the policy, `, verify PERCENT` may stand.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use super::{Action, Cost, Event, FrameId, Lease, Return, Scheduler, WorkerId};
+use super::{Action, Cost, Event, Finding, FrameId, Lease, Return, Scheduler, Verdict, WorkerId};
 
 /// Runs a script and writes the transcript.
 pub(super) fn transcript(policy: &str, script: &str) -> String {
-    let mut scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20, 8);
+    let (policy, percent) = policy.split_once(", verify ").unwrap_or((policy, "0"));
+    let scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20, 8);
+    let mut scheduler = scheduler.with_verification(percent.parse().unwrap());
     let mut granted = BTreeMap::new();
     let mut log = String::new();
     for line in script.lines().map(str::trim).filter(|line| !line.is_empty()) {
@@ -20,7 +24,7 @@ pub(super) fn transcript(policy: &str, script: &str) -> String {
         let now = Duration::from_millis(at_ms.parse().unwrap());
         scheduler.handle(now, event(command, &granted));
         while let Some(action) = scheduler.poll_action() {
-            if let Action::Grant { worker, lease } = &action {
+            if let Action::Grant { worker, lease } | Action::Verify { worker, lease } = &action {
                 granted.insert((*worker, lease.frame, lease.segment), *lease);
             }
             writeln!(log, "{}", spoken(&action)).unwrap();
@@ -33,7 +37,7 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
     let words: Vec<&str> = command.split(' ').collect();
     let number = |word: &str| word.parse::<u64>().unwrap();
     let pair = |word: &str, by| word.split_once(by).map(|(a, b)| (number(a), number(b) as u32)).unwrap();
-    let worker = WorkerId(words.get(1).map_or(0, |word| number(word)));
+    let worker = WorkerId(words.get(1).and_then(|word| word.parse().ok()).unwrap_or(0));
     match words[..] {
         ["frame", frame, size] => {
             let (width, height) = pair(size, 'x');
@@ -49,6 +53,21 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             let (frame, segment) = pair(segment, '.');
             let lease = granted[&(worker, FrameId(frame), segment)];
             Event::SegmentDone { worker, lease, cost: Cost { primary: 1, ..Cost::default() } }
+        }
+        ["verified", _, segment, finding] => {
+            let (frame, segment) = pair(segment, '.');
+            let lease = granted[&(worker, FrameId(frame), segment)];
+            let finding = if finding == "same" { Finding::Same } else { Finding::Different };
+            Event::SegmentVerified { worker, lease, cost: Cost::default(), finding }
+        }
+        ["judged", segment, painter, checker] => {
+            let (frame, segment) = pair(segment, '.');
+            let verdict = Verdict { traced: true, painter: painter == "wrong", checker: checker == "wrong" };
+            Event::SegmentJudged { frame: FrameId(frame), segment, verdict }
+        }
+        ["reject", frame, rows] => {
+            let (first_row, row_count) = pair(rows, '+');
+            Event::RowsRejected { frame: FrameId(number(frame)), first_row: first_row as u32, row_count }
         }
         ["fail", _, frame] => Event::WorkerFailed { worker, frame: FrameId(number(frame)) },
         ["pong", _, nonce] => Event::Pong { worker, nonce: number(nonce) },
@@ -71,6 +90,17 @@ fn spoken(action: &Action) -> String {
             let again = if *attempt > 0 { format!(" (attempt {attempt})") } else { String::new() };
             format!("{}: render {}.{segment}{again}, rows {first_row}+{row_count}", worker.0, frame.0)
         }
+        Action::Seal { worker, lease } => {
+            let Lease { frame, segment, first_row, row_count, .. } = lease;
+            format!("seal {}.{segment}, rows {first_row}+{row_count} of {}", frame.0, worker.0)
+        }
+        Action::Verify { worker, lease } => {
+            let Lease { frame, segment, first_row, row_count, .. } = lease;
+            format!("{}: verify {}.{segment}, rows {first_row}+{row_count}", worker.0, frame.0)
+        }
+        Action::Judge { frame, segment } => format!("judge {}.{segment}", frame.0),
+        Action::Unseal { frame, segment } => format!("unseal {}.{segment}", frame.0),
+        Action::Expel { worker, reason } => format!("{}: expelled, {reason}", worker.0),
         Action::Cancel { worker, before } => format!("{}: cancel before {}", worker.0, before.0),
         Action::Ping { worker, nonce } => format!("{}: ping {nonce}", worker.0),
         Action::Dismiss { worker, reason, again: Return::Welcome } => {

@@ -3,6 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use super::assign::MAX_FRAMES;
+use super::audits::TRAILING_FRAMES;
+use super::held::Held;
 use super::speed::{Observation, Speed};
 use super::{Cost, FrameId, Lease};
 
@@ -27,28 +30,8 @@ const SLACK_FRAMES: f64 = 0.3;
 const SLACK_SURPRISE: f64 = 4.0;
 /// ...and by so many round trips.
 const SLACK_ROUND_TRIPS: f64 = 4.0;
-
-/// A promise of rows, as kept by the scheduler.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Held {
-    pub(super) lease: Lease,
-    pub(super) granted_at: Duration,
-    /// Predicted work of the rows, see `cost_map`.
-    pub(super) work: f64,
-    /// When the pixels should be here; `None` while nothing is known of the worker's speed.
-    pub(super) expected_at: Option<Duration>,
-    /// When they are so late that others are given the rows.
-    pub(super) deadline: Option<Duration>,
-}
-
-impl Held {
-    /// By what factor it took longer than predicted, done at `now` by a worker that was busy until `busy_until`.
-    pub(super) fn surprise(&self, now: Duration, busy_until: Duration) -> Option<f64> {
-        let begun = self.granted_at.max(busy_until);
-        let predicted = self.expected_at?.checked_sub(begun)?.as_secs_f64();
-        (predicted > 0.0).then(|| now.saturating_sub(begun).as_secs_f64() / predicted)
-    }
-}
+/// Two in flight, and the complete ones that are verified.
+const KNOWN_FRAMES: usize = MAX_FRAMES + TRAILING_FRAMES;
 
 /// What somebody wants of a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,8 +53,8 @@ pub(super) struct Worker {
     pub(super) owed: BTreeMap<(FrameId, u32), Held>,
     /// Whether it renders rows of a frame that was given up meanwhile, and has yet to be told.
     pub(super) stale: bool,
-    /// The newest frames it has been told of; two are in flight at most.
-    announced: [Option<FrameId>; 2],
+    /// Frames it has lately been told of: those in flight, and those of which rows are verified.
+    announced: [Option<FrameId>; KNOWN_FRAMES],
     pub(super) service: Service,
     pub(super) speed: Speed,
     pub(super) segments_done: u64,
@@ -98,7 +81,7 @@ impl Worker {
             leases: BTreeMap::new(),
             owed: BTreeMap::new(),
             stale: false,
-            announced: [None; 2],
+            announced: [None; KNOWN_FRAMES],
             service: Service::Active,
             speed: Speed::new(threads),
             segments_done: 0,
@@ -135,7 +118,8 @@ impl Worker {
         if self.announced.contains(&Some(frame)) {
             return false;
         }
-        self.announced = [self.announced[1], Some(frame)];
+        self.announced.rotate_left(1);
+        self.announced[KNOWN_FRAMES - 1] = Some(frame);
         true
     }
 
@@ -223,30 +207,53 @@ impl Worker {
         self.waited_for_since
     }
 
-    /// Leases of frames before `before` are of no use any more. Whether it has to be told.
+    /// Leases of frames before `before` are of no use any more, unless they verify. Whether it is to be told now: it is
+    /// not while it verifies rows of such a frame.
     pub(super) fn cancel(&mut self, before: FrameId) -> bool {
-        let count = |worker: &Self| worker.leases.len() + worker.owed.len();
-        let held = count(self);
-        self.leases.retain(|&(frame, _), _| frame >= before);
-        self.owed.retain(|&(frame, _), _| frame >= before);
-        let left = count(self);
-        if left == 0 {
-            self.waited_for_since = None;
+        self.keep(|frame, held| frame >= before || held.audit);
+        let tell = self.stale && !self.audits_before(before);
+        if tell {
+            self.told_to_cancel(before);
         }
-        std::mem::take(&mut self.stale) || left < held
+        tell
     }
 
-    /// A frame is out of flight; whether it held some of it. It still renders that, until it is told.
-    pub(super) fn forget(&mut self, frame: FrameId) -> bool {
-        let held = self.leases.len() + self.owed.len();
-        self.leases.retain(|&(known, _), _| known != frame);
-        self.owed.retain(|&(known, _), _| known != frame);
-        let left = self.leases.len() + self.owed.len();
+    /// Whether it verifies rows of a frame before `before`.
+    pub(super) fn audits_before(&self, before: FrameId) -> bool {
+        let mut all = self.leases.values().chain(self.owed.values());
+        all.any(|held| held.audit && held.lease.frame < before)
+    }
+
+    /// It is told to forget all frames before `before`: of any of them, it has to be told again.
+    pub(super) fn told_to_cancel(&mut self, before: FrameId) {
+        self.stale = false;
+        for known in &mut self.announced {
+            known.take_if(|frame| *frame < before);
+        }
+    }
+
+    /// A lease is of no use any more.
+    pub(super) fn drop_lease(&mut self, key: (FrameId, u32)) {
+        self.keep(|frame, held| (frame, held.lease.segment) != key);
+    }
+
+    /// Keeps some of what it holds and owes. It still renders the rest, until it is told. Whether there was any.
+    fn keep(&mut self, which: impl Fn(FrameId, &Held) -> bool) -> bool {
+        let count = |worker: &Self| worker.leases.len() + worker.owed.len();
+        let held = count(self);
+        self.leases.retain(|&(frame, _), held| which(frame, held));
+        self.owed.retain(|&(frame, _), held| which(frame, held));
+        let left = count(self);
         if left == 0 {
             self.waited_for_since = None;
         }
         self.stale |= left < held;
         left < held
+    }
+
+    /// A frame is out of flight; whether it held some of it.
+    pub(super) fn forget(&mut self, frame: FrameId) -> bool {
+        self.keep(|known, _| known != frame)
     }
 
     /// Nobody listened for a while: what it has not said does not count against it.
@@ -308,7 +315,7 @@ impl Worker {
         let rest = FIRST_REST.saturating_mul(1 << self.failures.min(5)).min(LONGEST_REST);
         self.failures = self.failures.saturating_add(1);
         self.resting_until = Some(now + rest);
-        self.announced = [None; 2];
+        self.announced = [None; KNOWN_FRAMES];
         true
     }
 
@@ -319,77 +326,4 @@ impl Worker {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SECOND: Duration = Duration::from_secs(1);
-
-    fn hold(worker: &mut Worker, segment: u32, at: Duration) -> Lease {
-        let lease = Lease { frame: FrameId(1), segment, attempt: 0, first_row: segment * 8, row_count: 8 };
-        let held = Held { lease, granted_at: at, work: 8.0, expected_at: None, deadline: Some(at + SECOND) };
-        worker.hold(at, held);
-        lease
-    }
-
-    #[test]
-    fn what_arrives_slower_than_it_is_traced_counts_as_it_arrives() {
-        let mut worker = Worker::new(1, Duration::ZERO);
-        let leases = [0, 1, 2].map(|segment| hold(&mut worker, segment, Duration::ZERO));
-        let cost = Cost { trace_ns: 1_000_000_000, ..Cost::default() };
-        worker.finish(SECOND * 20, leases[0], cost, SECOND);
-        assert_eq!(worker.speed.value(), Some(8.0), "its first segment waited for the scene");
-        worker.finish(SECOND * 22, leases[1], cost, SECOND);
-        worker.finish(SECOND * 24, leases[2], cost, SECOND);
-        assert!((worker.speed.value().unwrap() - 4.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn who_is_late_rests_until_it_answers() {
-        let mut worker = Worker::new(1, Duration::ZERO);
-        let lease = hold(&mut worker, 0, Duration::ZERO);
-        assert_eq!(worker.overdue_at(), Some(SECOND));
-        assert_eq!(worker.lapse(SECOND), [(FrameId(1), 0)]);
-        assert!(!worker.is_ready(SECOND) && worker.overdue_at().is_none());
-        assert_eq!(worker.waited_for_since(), Some(Duration::ZERO));
-        assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
-        assert!(worker.is_ready(SECOND) && worker.waited_for_since().is_none());
-    }
-
-    #[test]
-    fn a_lease_is_finished_once_and_only_as_granted() {
-        let mut worker = Worker::new(1, Duration::ZERO);
-        let lease = hold(&mut worker, 0, Duration::ZERO);
-        assert!(worker.finish(SECOND, Lease { attempt: 1, ..lease }, Cost::default(), SECOND).is_none());
-        assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
-        assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_none());
-    }
-
-    #[test]
-    fn rests_double_up_to_a_limit_and_end_with_success() {
-        let mut worker = Worker::new(1, Duration::ZERO);
-        let mut now = Duration::ZERO;
-        let mut rests = Vec::new();
-        for _ in 0..7 {
-            worker.fail(now);
-            let until = worker.rested_at(now).unwrap();
-            rests.push((until - now).as_secs());
-            now = until;
-        }
-        assert_eq!(rests, [1, 2, 4, 8, 16, 30, 30]);
-        let lease = hold(&mut worker, 0, now);
-        worker.finish(now, lease, Cost::default(), SECOND);
-        worker.fail(now);
-        assert_eq!(worker.rested_at(now), Some(now + SECOND));
-    }
-
-    #[test]
-    fn only_the_open_ping_measures_the_round_trip() {
-        let mut worker = Worker::new(1, Duration::ZERO);
-        worker.pinged(SECOND, 5);
-        worker.pong(SECOND * 2, 4);
-        assert_eq!(worker.round_trip, None);
-        worker.pong(SECOND * 3, 5);
-        assert_eq!(worker.round_trip, Some(2.0));
-        assert_eq!(worker.lost_at(), SECOND * 13);
-    }
-}
+mod tests;

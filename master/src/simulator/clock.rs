@@ -26,6 +26,8 @@ pub(crate) enum Happening {
     Request,
     /// Something goes wrong.
     Fault,
+    /// The master has traced rows itself.
+    Judged { frame: FrameId, segment: u32 },
 }
 
 /// What a master says.
@@ -41,7 +43,13 @@ pub(crate) enum Down {
 /// What a worker says.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Up {
-    Pixels { lease: Lease, cost: Cost, fits: bool },
+    /// `content` is 0 in each row where the pixels are the right ones.
+    Pixels {
+        lease: Lease,
+        cost: Cost,
+        fits: bool,
+        content: u64,
+    },
     Pong(u64),
     Failed(FrameId),
     Drain,

@@ -27,7 +27,7 @@ impl World {
         self.clock.plan(self.clock.now + pause, Happening::Fault);
         let ids: Vec<WorkerId> = self.machines.keys().copied().collect();
         let victim = self.dice.pick(&ids);
-        match (self.dice.roll(20), victim) {
+        match (self.dice.roll(21), victim) {
             (0..4, _) | (_, None) => self.join_any(),
             (4 | 5, Some(id)) => self.lose(id),
             (6, Some(_)) => self.storm(&ids),
@@ -44,6 +44,7 @@ impl World {
                 let frame = FrameId(self.requested.saturating_sub(self.dice.roll(3)));
                 self.say(id, Up::Failed(frame));
             }
+            (19, Some(id)) => self.corrupt(id),
             (_, Some(_)) => self.sleep(),
         }
     }

@@ -14,6 +14,9 @@ mod dice;
 mod faults;
 mod link;
 mod machine;
+mod pictures;
+mod post;
+mod render;
 mod shell;
 mod survival;
 mod tally;
@@ -67,6 +70,10 @@ pub struct Setup {
     pub message_cost: u64,
     /// Requests a second of a moving camera; 0: one as soon as a frame is complete.
     pub input_rate: f64,
+    /// The share of the segments that is verified, in per cent.
+    pub verify_percent: u8,
+    /// Workers of which half of what they send is wrong: the first to join.
+    pub liars: u32,
     /// Frames measured, after some that are not.
     pub frames: u64,
     /// What everything random follows from.
@@ -93,6 +100,8 @@ impl Default for Setup {
             lease_cost: 20_000,
             message_cost: 10_000,
             input_rate: 0.0,
+            verify_percent: 0,
+            liars: 0,
             frames: 30,
             seed: 1,
         }

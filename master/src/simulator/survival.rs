@@ -96,6 +96,8 @@ fn any_setup(dice: &mut Dice, seed: u64) -> Setup {
         round_trip: dice.roll(20_000_000),
         jitter: dice.roll(5_000_000),
         input_rate: 0.5 + 4.0 * dice.fraction(),
+        verify_percent: dice.pick(&[0, 0, 5, 30, 100]).unwrap_or(0),
+        liars: dice.roll(3) as u32,
         seed,
         ..Setup::default()
     }
@@ -103,6 +105,10 @@ fn any_setup(dice: &mut Dice, seed: u64) -> Setup {
 
 fn rest(world: &World) -> Result<(), String> {
     let at = world.clock.now as f64 / SECOND as f64;
+    let (sealed, open) = (world.shell.sealed(), world.scheduler.verification().open);
+    if sealed > open {
+        return Err(format!("{sealed} seals of {open} audits, at {at:.6} s"));
+    }
     world.violation.as_ref().map_or(Ok(()), |what| Err(format!("{what}, at {at:.6} s")))
 }
 

@@ -61,6 +61,8 @@ pub(crate) struct Tally {
     frame_ns: u64,
     worst_ns: u64,
     latency_ns: u64,
+    pub(crate) expelled: u64,
+    pub(crate) wrong_frames: u64,
     pub(crate) link_ns: f64,
     pub(crate) master_ns: f64,
 }

@@ -65,6 +65,58 @@ fn a_worker_that_fails_makes_a_frame_late_by_a_frame_at_most() {
     }
 }
 
+/// Frames that were shown wrong, and workers that were expelled, in so many frames; the same again in as many more.
+fn with_liars(setup: Setup) -> [(u64, u64); 2] {
+    let frames = setup.frames;
+    let mut world = World::new(setup);
+    world.checking = true;
+    world.begin();
+    [0, 0].map(|_| {
+        world.tally.restart(world.clock.now);
+        world.run(world.clock.now + 1000 * SECOND, |world| world.tally.frames >= frames);
+        assert_eq!(world.violation, None);
+        (world.tally.wrong_frames, world.tally.expelled)
+    })
+}
+
+#[test]
+fn liars_are_found_and_the_picture_is_right_from_then_on() {
+    for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Static(16), SegmentPolicy::Smart(16)] {
+        for (workers, liars, verify_percent) in [(1, 1, 100), (2, 1, 20), (8, 2, 20), (8, 7, 30), (32, 4, 10)]
+        {
+            // With one worker there is nobody to go on with, and no further frame.
+            let frames = if workers == 1 { 1 } else { 40 };
+            let setup = Setup { workers, liars, verify_percent, policy, frames, ..Setup::default() };
+            let [(_, expelled), (wrong, more)] = with_liars(setup);
+            let what = format!("{policy} {workers} workers, {liars} liars: {expelled} expelled");
+            assert_eq!((expelled + more, wrong), (u64::from(liars), 0), "{what}");
+        }
+    }
+}
+
+#[test]
+fn nobody_who_is_honest_is_expelled_and_little_is_left_unverified() {
+    for workers in [1, 2, 8] {
+        let mut world = World::new(Setup { workers, verify_percent: 10, frames: 40, ..Setup::default() });
+        world.begin();
+        world.run(1000 * SECOND, |world| world.tally.frames >= 40);
+        let counts = world.scheduler.verification();
+        assert_eq!((counts.mismatches, world.tally.expelled, &world.violation), (0, 0, &None));
+        // The master alone does one segment in a tenth of a second.
+        let least = if workers == 1 { counts.picked / 4 } else { counts.picked * 9 / 10 - 2 };
+        assert!(counts.verified + counts.open >= least && counts.picked > 10, "{workers}: {counts:?}");
+    }
+}
+
+#[test]
+fn verifying_costs_its_share_and_makes_no_frame_late() {
+    let run = |verify_percent| measure(&Setup { verify_percent, ..Setup::default() }).unwrap();
+    let (without, with) = (run(0), run(20));
+    assert!(with.useful > without.useful / 1.2 - 0.03, "{} instead of {}", with.useful, without.useful);
+    assert!(with.useful < without.useful / 1.1, "so much is not verified: {}", with.useful);
+    assert!(with.frame_ms < without.frame_ms * 1.5, "{} ms after {} ms", with.frame_ms, without.frame_ms);
+}
+
 #[test]
 fn costs_sum_to_one_whatever_the_profile() {
     let rows = CostProfile::from_text("1, 2\n3;0").unwrap();

@@ -1,15 +1,15 @@
 //! The farm: events into the scheduler, actions out of it, messages over the links.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
-use super::clock::{Clock, Down, Happening, Up};
+use super::clock::{Clock, Down, Happening};
 use super::dice::Dice;
-use super::link::{Lane, bytes};
-use super::machine::{Ailment, BAND_ROWS, Band, Machine};
-use super::shell::{Answer, Shell};
+use super::link::Lane;
+use super::machine::{BAND_ROWS, Machine};
+use super::shell::Shell;
 use super::tally::{Measured, Tally};
 use super::{SECOND, Setup};
-use crate::scheduler::{Action, Cost, Event, FrameId, Lease, Scheduler, WorkerId, check};
+use crate::scheduler::{Action, Event, FrameId, Lease, Scheduler, WorkerId, check};
 
 /// Nobody waits longer for a measurement.
 const PATIENCE: u64 = 3600 * SECOND;
@@ -17,6 +17,8 @@ const PATIENCE: u64 = 3600 * SECOND;
 const MAX_STEPS_AT_ONCE: u32 = 100_000;
 /// What leases ask for at most, as the protocol has it.
 const MAX_SEGMENT_BYTES: u64 = 32 << 20;
+/// What it takes the master to trace a segment itself.
+const JUDGEMENT: u64 = SECOND / 10;
 /// Requests open at a time: the frame being rendered and the one after it.
 const OPEN_REQUESTS: u64 = 2;
 
@@ -48,20 +50,21 @@ pub(crate) struct World {
     pub(crate) requests_more: bool,
     open: BTreeMap<FrameId, Open>,
     /// Sums of row costs of frames, by row.
-    costs: BTreeMap<u64, Vec<f64>>,
+    pub(super) costs: BTreeMap<u64, Vec<f64>>,
     last_worker: u64,
     /// Idle work up to when the last frame was complete: a tail is counted once.
     idle_counted: f64,
-    master_in: Lane,
-    master_out: Lane,
-    master: Lane,
+    pub(super) master_in: Lane,
+    pub(super) master_out: Lane,
+    pub(super) master: Lane,
 }
 
 impl World {
     pub(crate) fn new(setup: Setup) -> Self {
         let scheduler = Scheduler::new(setup.policy, MAX_SEGMENT_BYTES, BAND_ROWS)
             .with_pipeline(setup.pipeline)
-            .with_tile_share(setup.tile_share);
+            .with_tile_share(setup.tile_share)
+            .with_verification(setup.verify_percent);
         Self {
             clock: Clock::default(),
             dice: Dice::new(setup.seed),
@@ -130,8 +133,16 @@ impl World {
         self.machines.insert(id, machine);
         self.tally.power += speed;
         self.shell.join(id);
+        if self.last_worker <= u64::from(self.setup.liars) {
+            self.corrupt(id);
+        }
         self.tell(Event::WorkerJoined { worker: id, threads: self.setup.threads });
         id
+    }
+
+    /// From now on, half of what a worker sends is wrong.
+    pub(crate) fn corrupt(&mut self, id: WorkerId) {
+        self.shell.liars.insert(id);
     }
 
     /// Workers that have ever joined.
@@ -164,13 +175,16 @@ impl World {
 
     /// Tells the scheduler, and does what it says.
     pub(crate) fn tell(&mut self, event: Event) {
-        self.scheduler.handle(self.clock.time(), event);
-        if self.checking && self.violation.is_none() {
-            let violated = check::violated(&self.scheduler);
-            self.violation = violated.map(|what| format!("{what}, after {event:?}"));
-        }
-        while let Some(action) = self.scheduler.poll_action() {
-            self.perform(action);
+        let mut events = VecDeque::from([event]);
+        while let Some(event) = events.pop_front() {
+            self.scheduler.handle(self.clock.time(), event);
+            if self.checking && self.violation.is_none() {
+                let violated = check::violated(&self.scheduler);
+                self.violation = violated.map(|what| format!("{what}, after {event:?}"));
+            }
+            while let Some(action) = self.scheduler.poll_action() {
+                self.perform(action, &mut events);
+            }
         }
     }
 
@@ -215,153 +229,14 @@ impl World {
             }
             Happening::Request => self.request(),
             Happening::Fault => self.fault(),
-        }
-    }
-
-    fn at_worker(&mut self, id: WorkerId, message: Down) {
-        let Some(machine) = self.machines.get_mut(&id) else { return };
-        match (machine.ailment, message) {
-            (Ailment::Vanished, _) => {}
-            (Ailment::Stopped, _) => machine.unread.push(message),
-            (Ailment::Stuck, Down::Lease(_)) => {}
-            (_, Down::Lease(lease)) if self.faults && self.dice.one_in(200) => {
-                self.say(id, Up::Failed(lease.frame));
+            Happening::Judged { frame, segment } => {
+                let verdict = self.shell.judge(frame, segment);
+                self.tell(Event::SegmentJudged { frame, segment, verdict });
             }
-            (_, Down::Lease(lease)) => {
-                machine.lease(lease);
-                self.start(id);
-            }
-            (_, Down::Cancel(before)) => machine.cancel(before),
-            (_, Down::Ping(nonce)) => self.say(id, Up::Pong(nonce)),
-            (_, Down::Announce | Down::Drain) => {}
         }
     }
 
-    /// Gives rows to idle threads.
-    fn start(&mut self, id: WorkerId) {
-        while let Some(machine) = self.machines.get_mut(&id) {
-            if matches!(machine.ailment, Ailment::Stopped | Ailment::Vanished) {
-                return;
-            }
-            let Some(thread) = machine.idle_thread() else { return };
-            let Some((lease, rows)) = machine.next_band() else { return };
-            let speed = machine.thread_speed();
-            let last = rows.end == lease.first_row + lease.row_count;
-            let lease_seconds = if last { self.setup.lease_cost as f64 / SECOND as f64 } else { 0.0 };
-            let (work, cutting) = self.work(lease.frame, rows.clone());
-            let nanoseconds = (((work + cutting) / speed + lease_seconds) * SECOND as f64) as u64;
-            self.tally.cutting += cutting;
-            self.tally.leases += lease_seconds * speed;
-            self.tally.trace(self.clock.now, speed);
-            let done_at = self.clock.now + nanoseconds;
-            if let Some(machine) = self.machines.get_mut(&id) {
-                machine.threads[thread] = Some(Band { lease, rows, nanoseconds, speed, stale: false });
-            }
-            self.clock.plan(done_at, Happening::BandDone { worker: id, thread });
-        }
-    }
-
-    /// The work of rows, and what cutting their tiles adds to it.
-    fn work(&mut self, frame: FrameId, rows: std::ops::Range<u32>) -> (f64, f64) {
-        let height = self.setup.size.1;
-        // Costs that never change are computed once.
-        let key = if self.setup.costs.moves() { frame.0 } else { 0 };
-        let costs = self.costs.entry(key).or_insert_with(|| {
-            let mut sums = vec![0.0];
-            let mut sum = 0.0;
-            sums.extend(self.setup.costs.shares(frame.0, height).into_iter().map(|share| {
-                sum += share;
-                sum
-            }));
-            sums
-        });
-        let at = |row: u32| costs.get(row.min(height) as usize).copied().unwrap_or(0.0);
-        let band_first = rows.start - rows.start % BAND_ROWS;
-        let band_rows = (band_first + BAND_ROWS).min(height) - band_first;
-        let left_out = 1.0 - f64::from(rows.end - rows.start) / f64::from(band_rows.max(1));
-        let band = at(band_first + BAND_ROWS) - at(band_first);
-        let work = (at(rows.end) - at(rows.start)) * self.setup.frame_seconds;
-        let cutting = self.setup.tile_share * band * left_out.max(0.0) * self.setup.frame_seconds;
-        while self.costs.len() > 16 {
-            self.costs.pop_first();
-        }
-        (work, cutting)
-    }
-
-    fn band_done(&mut self, id: WorkerId, thread: usize) {
-        let Some(machine) = self.machines.get_mut(&id) else { return };
-        match machine.ailment {
-            Ailment::Stopped => return machine.unfinished.push(thread),
-            Ailment::Vanished => return,
-            Ailment::Healthy | Ailment::Slow(_) | Ailment::Stuck => {}
-        }
-        let Some(band) = machine.threads.get_mut(thread).and_then(Option::take) else { return };
-        self.tally.trace(self.clock.now, -band.speed);
-        let stuck = machine.ailment == Ailment::Stuck;
-        let whole = if band.stale { None } else { machine.finish(&band) };
-        if let Some((lease, trace_ns)) = whole.filter(|_| !stuck) {
-            let cost = Cost { trace_ns, primary: u64::from(lease.row_count), ..Cost::default() };
-            self.deliver(id, lease, cost);
-        }
-        self.start(id);
-    }
-
-    /// A finished lease goes to the master; where faults happen, now and then late, twice or wrong.
-    fn deliver(&mut self, id: WorkerId, lease: Lease, cost: Cost) {
-        let fits = !(self.faults && self.dice.one_in(500));
-        self.say(id, Up::Pixels { lease, cost, fits });
-        if self.faults && self.dice.one_in(300) {
-            self.say(id, Up::Pixels { lease, cost, fits });
-        }
-    }
-
-    pub(crate) fn say(&mut self, id: WorkerId, message: Up) {
-        let now = self.clock.now;
-        let size = self.bytes(&message);
-        let jitter = self.jitter();
-        let rate = self.bytes_per_second();
-        let Some(machine) = self.machines.get_mut(&id) else { return };
-        // The first byte reaches the master's link a latency after it left; both links then carry it at once.
-        let sent = machine.up.pass(now, size, rate);
-        let begun = sent.saturating_sub((size / rate * SECOND as f64) as u64);
-        let at = machine.up_order.arrive(begun + machine.latency + jitter);
-        self.clock.plan(at, Happening::AtLink(id, message));
-    }
-
-    fn at_link(&mut self, id: WorkerId, message: Up) {
-        let size = self.bytes(&message);
-        let rate = self.bytes_per_second();
-        let arrived = self.master_in.pass(self.clock.now, size, rate);
-        self.tally.link_ns += size / rate * SECOND as f64;
-        let costs = matches!(message, Up::Pixels { .. });
-        let cost = if costs { self.setup.message_cost as f64 } else { 0.0 };
-        self.tally.master_ns += cost;
-        let at = self.master.pass(arrived, cost, SECOND as f64);
-        self.clock.plan(at, Happening::AtMaster(id, message));
-    }
-
-    fn at_master(&mut self, worker: WorkerId, message: Up) {
-        if !self.shell.books.contains_key(&worker) {
-            return;
-        }
-        match message {
-            Up::Pixels { lease, cost, fits } => match self.shell.answer(worker, &lease, fits) {
-                Answer::Kept => self.tell(Event::SegmentDone { worker, lease, cost }),
-                Answer::Late => {}
-                Answer::Refused => self.lose(worker),
-            },
-            Up::Pong(nonce) => self.tell(Event::Pong { worker, nonce }),
-            Up::Failed(frame) => {
-                if let Some(book) = self.shell.books.get_mut(&worker) {
-                    book.fail(frame);
-                }
-                self.tell(Event::WorkerFailed { worker, frame });
-            }
-            Up::Drain => self.tell(Event::WorkerDrains { worker }),
-        }
-    }
-
-    fn perform(&mut self, action: Action) {
+    fn perform(&mut self, action: Action, events: &mut VecDeque<Event>) {
         let checked = match action {
             Action::BeginFrame { frame } => self.shell.begin(frame, self.setup.size.1),
             Action::FrameDone { frame, elapsed, .. } => self.frame_done(frame, elapsed.as_nanos() as u64),
@@ -376,9 +251,7 @@ impl World {
             }
             Action::Grant { worker, lease } => self.grant(worker, lease),
             Action::Cancel { worker, before } => {
-                if let Some(book) = self.shell.books.get_mut(&worker) {
-                    book.cancel(before);
-                }
+                self.shell.cancel(worker, before);
                 self.send(worker, Down::Cancel(before));
                 Ok(())
             }
@@ -393,6 +266,29 @@ impl World {
             Action::Dismiss { worker, .. } => {
                 self.part(worker);
                 Ok(())
+            }
+            Action::Seal { worker, lease } => {
+                self.shell.seal(worker, lease);
+                Ok(())
+            }
+            Action::Verify { worker, lease } => {
+                self.send(worker, Down::Lease(lease));
+                self.shell.verify(worker, lease)
+            }
+            Action::Judge { frame, segment } => {
+                self.clock.plan(self.clock.now + JUDGEMENT, Happening::Judged { frame, segment });
+                Ok(())
+            }
+            Action::Unseal { frame, segment } => {
+                self.shell.unseal(frame, segment);
+                Ok(())
+            }
+            Action::Expel { worker, .. } => {
+                self.part(worker);
+                self.tally.expelled += 1;
+                let (rejected, checked) = self.shell.expel(worker);
+                events.extend(rejected);
+                checked
             }
         };
         if let Err(what) = checked {
@@ -414,7 +310,7 @@ impl World {
     }
 
     fn frame_done(&mut self, frame: FrameId, elapsed: u64) -> Result<(), String> {
-        self.shell.done(frame)?;
+        self.tally.wrong_frames += u64::from(self.shell.done(frame)?);
         if let Some(Open { requested_at, idle_before }) = self.open.remove(&frame) {
             let idle = idle_before.unwrap_or_else(|| self.tally.idle(self.clock.now));
             let idle = idle.max(self.idle_counted);
@@ -425,50 +321,5 @@ impl World {
             self.clock.plan(self.clock.now, Happening::Request);
         }
         Ok(())
-    }
-
-    fn send(&mut self, id: WorkerId, message: Down) {
-        let size = match message {
-            Down::Announce => bytes::ANNOUNCE,
-            Down::Lease(_) | Down::Cancel(_) | Down::Ping(_) | Down::Drain => bytes::CONTROL,
-        };
-        let sent = self.master_out.pass(self.clock.now, size, self.bytes_per_second());
-        let jitter = self.jitter();
-        let Some(machine) = self.machines.get_mut(&id) else { return };
-        let at = machine.down_order.arrive(sent + machine.latency + jitter);
-        self.clock.plan(at, Happening::AtWorker(id, message));
-    }
-
-    fn bytes(&self, message: &Up) -> f64 {
-        match message {
-            Up::Pixels { lease, .. } => {
-                let raw = f64::from(lease.row_count) * f64::from(self.setup.size.0) * 3.0;
-                bytes::PIXELS_HEAD + raw / self.setup.compression
-            }
-            Up::Pong(_) | Up::Failed(_) | Up::Drain => bytes::CONTROL,
-        }
-    }
-
-    fn bytes_per_second(&self) -> f64 {
-        self.setup.link_bits / 8.0 * bytes::PAYLOAD_SHARE
-    }
-
-    fn jitter(&mut self) -> u64 {
-        self.dice.roll(self.setup.jitter.saturating_add(1))
-    }
-
-    /// A machine is well again: it reads what it was sent meanwhile, and goes on.
-    fn recover(&mut self, id: WorkerId) {
-        let Some(machine) = self.machines.get_mut(&id) else { return };
-        machine.ailment = Ailment::Healthy;
-        let unread = std::mem::take(&mut machine.unread);
-        let unfinished = std::mem::take(&mut machine.unfinished);
-        for thread in unfinished {
-            self.band_done(id, thread);
-        }
-        for message in unread {
-            self.at_worker(id, message);
-        }
-        self.start(id);
     }
 }

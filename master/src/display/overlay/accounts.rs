@@ -3,7 +3,7 @@
 use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, grouped};
 use crate::accounting::{Fading, PART_COUNT, Smoothed};
 use crate::display::canvas::Canvas;
-use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
+use crate::farm::{FarmStatus, Verification, WorkerState, WorkerStatus};
 
 /// What the parts are called where there is room for words, and where there is not.
 const WORDS: [&str; PART_COUNT] = ["trace", "wait", "encode", "send", "decode", "tail", "scene"];
@@ -95,7 +95,8 @@ fn lines(
 ) -> Vec<(String, u32)> {
     let workers = &status.workers;
     let mut lines = vec![(layout.header(), SOFT)];
-    let visible = room.saturating_sub(4).clamp(1, workers.len().max(1));
+    let below = if status.verification.is_some() { 5 } else { 4 };
+    let visible = room.saturating_sub(below).clamp(1, workers.len().max(1));
     let place = workers.iter().position(|worker| Some(worker.id) == selected).unwrap_or(0);
     let first = place.saturating_sub(visible - 1);
     for worker in workers.iter().skip(first).take(visible) {
@@ -115,6 +116,10 @@ fn lines(
     if workers.len() > 1 {
         let speed = workers.iter().map(|worker| worker.speed).sum();
         lines.push((layout.line(' ', "all", accounts.sum(), speed), WHITE));
+    }
+    if let Some(Verification { verified, mismatches, .. }) = status.verification {
+        let text = format!("  verified {}, wrong {}", grouped(verified), grouped(mismatches));
+        lines.push((text, if mismatches > 0 { WHITE } else { SOFT }));
     }
     lines.push((layout.hint.to_owned(), SOFT));
     lines
@@ -185,6 +190,15 @@ mod tests {
         assert_eq!(words(1), "1 machine-1 90.0 7.5 0.0 2.5 0.0 0.0 0.0 12,346 250");
         assert_eq!(words(2), "> 2 paused: machine-2 - - - - - - - 12,346 0");
         assert_eq!(words(3), "all 90.0 7.5 0.0 2.5 0.0 0.0 0.0 24,691 250");
+    }
+
+    #[test]
+    fn what_was_verified_is_told_where_it_is() {
+        let counts = Verification { percent: 5, verified: 1234, mismatches: 2, ..Verification::default() };
+        let status = FarmStatus { verification: Some(counts), ..status(1) };
+        let lines = lines(&Layout::of(120), &status, &accounts(), None, 20);
+        let told: Vec<_> = lines.iter().filter(|(text, _)| text.contains("verified")).collect();
+        assert_eq!(told, [&("  verified 1,234, wrong 2".to_owned(), WHITE)]);
     }
 
     #[test]

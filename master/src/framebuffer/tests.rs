@@ -1,0 +1,166 @@
+//! Segments in any order, damaged ones, those of workers that lie.
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use rayfarm_protocol::pixels::Packer;
+
+use super::*;
+
+const FRAME: FrameId = FrameId(3);
+const A: WorkerId = WorkerId(1);
+const B: WorkerId = WorkerId(2);
+
+fn lease(first_row: u32, row_count: u32) -> Lease {
+    Lease { frame: FRAME, segment: 0, attempt: 0, first_row, row_count }
+}
+
+fn opened(width: u32, height: u32) -> Arc<Framebuffers> {
+    let framebuffers = Arc::new(Framebuffers::default());
+    framebuffers.open(FRAME, width, height);
+    framebuffers
+}
+
+/// Whether the pixels were kept.
+fn write(framebuffers: &Framebuffers, lease: Lease, bytes: &[u8]) -> Result<bool, Misfit> {
+    let written = framebuffers.write(A, lease, Encoding::Raw, bytes)?;
+    Ok(matches!(written, Written::Kept { .. }))
+}
+
+fn packed(bytes: &[u8], block_bytes: usize) -> Vec<u8> {
+    let mut packer = Packer::new();
+    bytes.chunks(block_bytes).flat_map(|part| packer.block(part).unwrap()).collect()
+}
+
+#[test]
+fn segments_in_any_order_make_the_picture() {
+    let framebuffers = opened(1, 3);
+    assert_eq!(write(&framebuffers, lease(2, 1), &[7, 8, 9]), Ok(true));
+    assert_eq!(write(&framebuffers, lease(0, 2), &[1, 2, 3, 4, 5, 6]), Ok(true));
+    assert_eq!(framebuffers.finish(FRAME).unwrap().into_vec(), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
+}
+
+#[test]
+fn an_incomplete_picture_is_not_handed_out() {
+    let framebuffers = opened(1, 2);
+    write(&framebuffers, lease(0, 1), &[1; 3]).unwrap();
+    write(&framebuffers, lease(0, 1), &[1; 3]).unwrap();
+    assert!(framebuffers.finish(FRAME).is_none());
+}
+
+#[test]
+fn the_first_pixels_of_a_row_stay() {
+    let framebuffers = opened(1, 2);
+    write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
+    write(&framebuffers, lease(0, 2), &[2; 6]).unwrap();
+    assert_eq!(*framebuffers.finish(FRAME).unwrap(), [2, 2, 2, 1, 1, 1]);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_writes_nothing() {
+    let framebuffers = opened(1, 2);
+    let short = write(&framebuffers, lease(0, 2), &[9; 5]).unwrap_err();
+    assert_eq!(short, Misfit::Bytes { lease: lease(0, 2), expected: 6, got: 5 });
+    for outside in [lease(1, 2), lease(2, 1), lease(u32::MAX, u32::MAX)] {
+        assert_eq!(write(&framebuffers, outside, &[9; 6]), Err(Misfit::Rows { lease: outside, rows: 2 }));
+    }
+    write(&framebuffers, lease(0, 2), &[1; 6]).unwrap();
+    assert_eq!(*framebuffers.finish(FRAME).unwrap(), [1; 6]);
+}
+
+#[test]
+fn a_closed_frame_takes_no_pixels() {
+    let framebuffers = opened(1, 1);
+    framebuffers.discard(FRAME);
+    assert_eq!(write(&framebuffers, lease(0, 1), &[1; 3]), Ok(false));
+    assert!(framebuffers.finish(FRAME).is_none());
+}
+
+#[test]
+fn buffers_are_used_again_and_not_hoarded() {
+    let framebuffers = opened(1, 1);
+    let pictures: Vec<FramePixels> = (0..6)
+        .map(|n| {
+            framebuffers.open(FrameId(n), 1, 1);
+            write(&framebuffers, Lease { frame: FrameId(n), ..lease(0, 1) }, &[n as u8; 3]).unwrap();
+            framebuffers.finish(FrameId(n)).unwrap()
+        })
+        .collect();
+    let first = pictures[0].as_ptr();
+    drop(pictures);
+    assert_eq!(framebuffers.lock().spare.len(), SPARE_BUFFERS);
+    assert!(framebuffers.lock().spare.iter().any(|spare| spare.as_ptr() == first));
+    framebuffers.open(FRAME, 2, 2);
+    framebuffers.discard(FRAME);
+    assert!(framebuffers.lock().spare.iter().all(|spare| spare.len() == 12));
+}
+
+#[test]
+fn packed_pixels_are_unpacked_into_their_rows() {
+    let framebuffers = opened(2, 4);
+    let rows: Vec<u8> = (0..18).collect();
+    framebuffers.write(A, lease(1, 3), Encoding::Lz4, &packed(&rows, 7)).unwrap();
+    write(&framebuffers, lease(0, 2), &[9; 12]).unwrap();
+    assert_eq!(*framebuffers.finish(FRAME).unwrap(), [vec![9; 6], rows].concat());
+}
+
+#[test]
+fn packed_pixels_leave_the_rows_alone_that_are_there() {
+    let framebuffers = opened(1, 3);
+    write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
+    framebuffers.write(A, lease(0, 3), Encoding::Lz4, &packed(&[2; 9], 9)).unwrap();
+    assert_eq!(*framebuffers.finish(FRAME).unwrap(), [2, 2, 2, 1, 1, 1, 2, 2, 2]);
+}
+
+#[test]
+fn rows_of_a_rejected_worker_leave_the_picture_for_good() {
+    let framebuffers = opened(1, 5);
+    let write = |worker, lease, byte: u8| {
+        framebuffers.write(worker, lease, Encoding::Raw, &vec![byte; lease.row_count as usize * 3]).unwrap()
+    };
+    write(A, lease(0, 1), 1);
+    write(B, lease(1, 2), 2);
+    write(A, lease(2, 2), 3);
+    write(B, lease(4, 1), 4);
+    assert_eq!(framebuffers.reject(B), [(FRAME, 1..3), (FRAME, 4..5)]);
+    assert_eq!(write(B, lease(1, 2), 5), Written::Superseded);
+    assert!(framebuffers.reject(B).is_empty());
+    write(A, lease(1, 4), 6);
+    assert_eq!(*framebuffers.finish(FRAME).unwrap(), [1, 1, 1, 6, 6, 6, 6, 6, 6, 3, 3, 3, 6, 6, 6]);
+}
+
+#[test]
+fn a_digest_is_of_one_workers_rows_alone() {
+    let framebuffers = opened(1, 3);
+    framebuffers.write(A, lease(0, 2), Encoding::Raw, &[1; 6]).unwrap();
+    framebuffers.write(B, lease(1, 2), Encoding::Raw, &[2; 6]).unwrap();
+    assert_eq!(framebuffers.digest(A, lease(0, 2)), Some(blake3::hash(&[1; 6])));
+    assert_eq!(framebuffers.digest(B, lease(2, 1)), Some(blake3::hash(&[2; 3])));
+    for other in [lease(0, 3), lease(1, 2), lease(2, 2)] {
+        assert_eq!(framebuffers.digest(B, other), None);
+    }
+    assert_eq!(digest(lease(0, 2), 3, Encoding::Lz4, &packed(&[1; 6], 4)), Ok(blake3::hash(&[1; 6])));
+    assert!(digest(lease(0, 2), 3, Encoding::Raw, &[1; 5]).is_err());
+}
+
+proptest! {
+    #[test]
+    fn broken_blocks_fill_no_row_and_spoil_none(
+        bytes in vec(any::<u8>(), 0..80),
+        at in any::<prop::sample::Index>(),
+        valid: bool,
+    ) {
+        let framebuffers = opened(4, 4);
+        write(&framebuffers, lease(2, 1), &[3; 12]).unwrap();
+        let mut broken = if valid { packed(&[5; 48], 20) } else { bytes };
+        if valid {
+            broken.truncate(at.index(broken.len()));
+        }
+        let refused = framebuffers.write(A, lease(0, 4), Encoding::Lz4, &broken).is_err();
+        prop_assert!(refused || !valid);
+        if refused {
+            write(&framebuffers, lease(0, 4), &[5; 48]).unwrap();
+            let expected = [vec![5; 24], vec![3; 12], vec![5; 12]].concat();
+            prop_assert_eq!(&*framebuffers.finish(FRAME).unwrap(), &expected[..]);
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! What rows that are to be verified look like: hashes of what was sent, and of which frame they are.
+
+use std::collections::BTreeMap;
+
+use blake3::Hash;
+use rayfarm_protocol::{FrameAnnounce, FrameId, Lease};
+use rayfarm_tracer::scene::FrameView;
+
+use crate::scheduler::{Finding, WorkerId};
+
+/// Rows that are verified.
+#[derive(Clone, Debug)]
+pub(crate) struct Seal {
+    pub(crate) lease: Lease,
+    pub(crate) view: FrameView,
+    pub(crate) announce: FrameAnnounce,
+    pub(crate) painter: Signed,
+    /// Whoever has sent other bytes.
+    pub(crate) checker: Option<Signed>,
+}
+
+/// Bytes, and whose.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Signed {
+    pub(crate) worker: WorkerId,
+    pub(crate) hash: Hash,
+}
+
+/// The seals of all open audits: the scheduler bounds how many.
+#[derive(Debug, Default)]
+pub(crate) struct Seals(BTreeMap<(FrameId, u32), Seal>);
+
+impl Seals {
+    pub(crate) fn add(&mut self, seal: Seal) {
+        self.0.insert((seal.lease.frame, seal.lease.segment), seal);
+    }
+
+    pub(crate) fn get(&self, frame: FrameId, segment: u32) -> Option<&Seal> {
+        self.0.get(&(frame, segment))
+    }
+
+    pub(crate) fn remove(&mut self, frame: FrameId, segment: u32) {
+        self.0.remove(&(frame, segment));
+    }
+
+    /// A frame of which rows are sealed.
+    pub(crate) fn announce(&self, frame: FrameId) -> Option<&FrameAnnounce> {
+        self.0.range((frame, 0)..=(frame, u32::MAX)).next().map(|(_, seal)| &seal.announce)
+    }
+
+    /// Compares what a worker has sent now with what was sent before.
+    pub(crate) fn compare(&mut self, lease: &Lease, now: Signed) -> Finding {
+        let Some(seal) = self.0.get_mut(&(lease.frame, lease.segment)) else { return Finding::Unknown };
+        if seal.painter.hash == now.hash {
+            return Finding::Same;
+        }
+        seal.checker.get_or_insert(now);
+        let (painter, checker) = (seal.painter.worker, now.worker);
+        tracing::warn!(
+            "{painter} and {checker} have sent different pixels of {lease}: the master traces them itself"
+        );
+        Finding::Different
+    }
+}

@@ -1,0 +1,104 @@
+//! Workers at work: which thread renders what, and how long that takes.
+
+use super::SECOND;
+use super::clock::{Happening, Up};
+use super::machine::{Ailment, BAND_ROWS, Band};
+use super::world::World;
+use crate::scheduler::{Cost, FrameId, Lease, WorkerId};
+
+impl World {
+    /// Gives rows to idle threads.
+    pub(super) fn start(&mut self, id: WorkerId) {
+        while let Some(machine) = self.machines.get_mut(&id) {
+            if matches!(machine.ailment, Ailment::Stopped | Ailment::Vanished) {
+                return;
+            }
+            let Some(thread) = machine.idle_thread() else { return };
+            let Some((lease, rows)) = machine.next_band() else { return };
+            let speed = machine.thread_speed();
+            let last = rows.end == lease.first_row + lease.row_count;
+            let lease_seconds = if last { self.setup.lease_cost as f64 / SECOND as f64 } else { 0.0 };
+            let (work, cutting) = self.work(lease.frame, rows.clone());
+            let nanoseconds = (((work + cutting) / speed + lease_seconds) * SECOND as f64) as u64;
+            self.tally.cutting += cutting;
+            self.tally.leases += lease_seconds * speed;
+            self.tally.trace(self.clock.now, speed);
+            let done_at = self.clock.now + nanoseconds;
+            if let Some(machine) = self.machines.get_mut(&id) {
+                machine.threads[thread] = Some(Band { lease, rows, nanoseconds, speed, stale: false });
+            }
+            self.clock.plan(done_at, Happening::BandDone { worker: id, thread });
+        }
+    }
+
+    /// The work of rows, and what cutting their tiles adds to it.
+    fn work(&mut self, frame: FrameId, rows: std::ops::Range<u32>) -> (f64, f64) {
+        let height = self.setup.size.1;
+        // Costs that never change are computed once.
+        let key = if self.setup.costs.moves() { frame.0 } else { 0 };
+        let costs = self.costs.entry(key).or_insert_with(|| {
+            let mut sums = vec![0.0];
+            let mut sum = 0.0;
+            sums.extend(self.setup.costs.shares(frame.0, height).into_iter().map(|share| {
+                sum += share;
+                sum
+            }));
+            sums
+        });
+        let at = |row: u32| costs.get(row.min(height) as usize).copied().unwrap_or(0.0);
+        let band_first = rows.start - rows.start % BAND_ROWS;
+        let band_rows = (band_first + BAND_ROWS).min(height) - band_first;
+        let left_out = 1.0 - f64::from(rows.end - rows.start) / f64::from(band_rows.max(1));
+        let band = at(band_first + BAND_ROWS) - at(band_first);
+        let work = (at(rows.end) - at(rows.start)) * self.setup.frame_seconds;
+        let cutting = self.setup.tile_share * band * left_out.max(0.0) * self.setup.frame_seconds;
+        while self.costs.len() > 16 {
+            self.costs.pop_first();
+        }
+        (work, cutting)
+    }
+
+    pub(super) fn band_done(&mut self, id: WorkerId, thread: usize) {
+        let Some(machine) = self.machines.get_mut(&id) else { return };
+        match machine.ailment {
+            Ailment::Stopped => return machine.unfinished.push(thread),
+            Ailment::Vanished => return,
+            Ailment::Healthy | Ailment::Slow(_) | Ailment::Stuck => {}
+        }
+        let Some(band) = machine.threads.get_mut(thread).and_then(Option::take) else { return };
+        self.tally.trace(self.clock.now, -band.speed);
+        let stuck = machine.ailment == Ailment::Stuck;
+        let whole = if band.stale { None } else { machine.finish(&band) };
+        if let Some((lease, trace_ns)) = whole.filter(|_| !stuck) {
+            let cost = Cost { trace_ns, primary: u64::from(lease.row_count), ..Cost::default() };
+            self.deliver(id, lease, cost);
+        }
+        self.start(id);
+    }
+
+    /// A finished lease goes to the master; where faults happen, now and then late, twice or wrong.
+    fn deliver(&mut self, id: WorkerId, lease: Lease, cost: Cost) {
+        let fits = !(self.faults && self.dice.one_in(500));
+        let lies = self.shell.liars.contains(&id) && self.dice.one_in(2);
+        let content = if lies { 1 + self.dice.roll(1 << 32) } else { 0 };
+        self.say(id, Up::Pixels { lease, cost, fits, content });
+        if self.faults && self.dice.one_in(300) {
+            self.say(id, Up::Pixels { lease, cost, fits, content });
+        }
+    }
+
+    /// A machine is well again: it reads what it was sent meanwhile, and goes on.
+    pub(super) fn recover(&mut self, id: WorkerId) {
+        let Some(machine) = self.machines.get_mut(&id) else { return };
+        machine.ailment = Ailment::Healthy;
+        let unread = std::mem::take(&mut machine.unread);
+        let unfinished = std::mem::take(&mut machine.unfinished);
+        for thread in unfinished {
+            self.band_done(id, thread);
+        }
+        for message in unread {
+            self.at_worker(id, message);
+        }
+        self.start(id);
+    }
+}
