@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 const FIRST: Duration = Duration::from_secs(1);
-const LONGEST: Duration = Duration::from_secs(30);
+const LONGEST: Duration = Duration::from_secs(10);
 
-/// 1 s, doubled each time up to 30 s, until it is reset.
+/// 1 s, doubled each time up to 10 s, until it is reset.
 #[derive(Debug)]
 pub(crate) struct Pauses {
     next: Duration,
@@ -33,10 +33,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pauses_grow_to_half_a_minute_and_start_again() {
+    fn pauses_grow_to_ten_seconds_and_start_again() {
         let mut pauses = Pauses::new();
         let seconds: Vec<u64> = (0..7).map(|_| pauses.next().as_secs()).collect();
-        assert_eq!(seconds, [1, 2, 4, 8, 16, 30, 30]);
+        assert_eq!(seconds, [1, 2, 4, 8, 10, 10, 10]);
         pauses.reset();
         assert_eq!(pauses.next().as_secs(), 1);
     }

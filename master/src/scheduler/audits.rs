@@ -212,7 +212,7 @@ impl Scheduler {
     /// The master has traced a segment itself.
     pub(super) fn judged(&mut self, frame: FrameId, segment: u32, verdict: Verdict) {
         let audit = self.audits.open.get(&(frame, segment));
-        let Some(&Audit { lease, painter, stage: Stage::Judged(checker) }) = audit else { return };
+        let Some(&Audit { lease, painter, stage: Stage::Judged(checker), .. }) = audit else { return };
         self.audits.counts.verified += u64::from(verdict.traced);
         self.audits.counts.mismatches += u64::from(checker.is_some() || verdict.painter);
         self.close_audit((frame, segment));

@@ -34,7 +34,7 @@ fn the_same_seed_is_the_same_run() {
 }
 
 fn efficiency(workers: u32, costs: CostProfile, policy: SegmentPolicy) -> f64 {
-    measure(&Setup { workers, costs, policy, tile_share: 0.0, frames: 60, ..Setup::default() })
+    measure(&Setup { workers, costs, policy, tile_share: 0.0, frames: 120, ..Setup::default() })
         .unwrap()
         .useful
 }
@@ -82,7 +82,7 @@ fn with_liars(setup: Setup) -> [(u64, u64); 2] {
 #[test]
 fn liars_are_found_and_the_picture_is_right_from_then_on() {
     for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Static(16), SegmentPolicy::Smart(16)] {
-        for (workers, liars, verify_percent) in [(1, 1, 100), (2, 1, 20), (8, 2, 20), (8, 7, 30), (32, 4, 10)]
+        for (workers, liars, verify_percent) in [(1, 1, 100), (2, 1, 20), (8, 2, 20), (8, 7, 30), (32, 4, 25)]
         {
             // With one worker there is nobody to go on with, and no further frame.
             let frames = if workers == 1 { 1 } else { 40 };

@@ -10,6 +10,8 @@ use crate::scene::FrameView;
 /// A pixel stands at an edge when the oracle sees this far away, in pixels, what the fast path saw. The fast path shades points
 /// that are rounded to `f32`, to 2^-24 of their distance: in a picture of 16384 pixels that is 2^-10 of one.
 const NEXT_TO: f64 = 1.0 / 1024.0;
+/// As far away, at the edge of a shadow: there the rounding of the point counts as often as light that grazes draws it out.
+const NEXT_TO_SHADOW: f64 = 1.0 / 16.0;
 
 /// What the oracle says of some pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,5 +72,8 @@ fn is_near(found: &[u8], expected: [u8; 3]) -> bool {
 
 fn around(center: DVec2) -> impl Iterator<Item = DVec2> {
     let steps = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
-    steps.into_iter().map(move |(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * NEXT_TO)
+    let ring = move |away: f64| {
+        steps.into_iter().map(move |(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * away)
+    };
+    [NEXT_TO, NEXT_TO_SHADOW].into_iter().flat_map(ring)
 }
