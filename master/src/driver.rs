@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
 use rayfarm_protocol::{FrameAnnounce, FrameId, codec};
-use rayfarm_tracer::TILE_SIZE;
 use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::tile_rows;
 use tokio::sync::{Notify, mpsc};
 use tokio_util::sync::CancellationToken;
 
@@ -79,7 +79,7 @@ struct Requested {
 impl Driver {
     /// `court`: whoever traces rows for the master itself.
     pub(crate) fn new(options: &FarmOptions, assets: Assets, court: mpsc::UnboundedSender<Case>) -> Self {
-        let scheduler = Scheduler::new(options.policy, MAX_PIXELS_BYTES as u64, TILE_SIZE)
+        let scheduler = Scheduler::new(options.policy, MAX_PIXELS_BYTES as u64)
             .with_pipeline(!options.sequential)
             .with_verification(options.verify_percent);
         let inner = Inner {
@@ -148,9 +148,9 @@ impl Driver {
         let frame = FrameId(inner.last_frame);
         match self.announcement(frame, &view) {
             Ok(announce) => {
-                let FrameView { width, height, .. } = view;
+                let (FrameView { width, height, .. }, tile_rows) = (view, tile_rows(&view));
                 inner.views.insert(frame, Requested { view, announce, at: self.started.elapsed() });
-                self.drive(&mut inner, Event::FrameRequested { frame, width, height });
+                self.drive(&mut inner, Event::FrameRequested { frame, width, height, tile_rows });
             }
             Err(error) => self.hand_out(&mut inner, Err(error)),
         }

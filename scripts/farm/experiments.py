@@ -74,7 +74,7 @@ class Bench:
 
 
 # Of simulated workers; the report says the same in words.
-FARM = ["--speeds", "4", "--link", "1e9", "--rtt", "0.2", "--work", "1000"]
+FARM = ["--speeds", "4", "--link", "1e9", "--rtt", "0.2", "--work", "1000", "--frames", "60"]
 FPS = ["--y", "fps", "--y-label", "frames per second", "--from-zero"]
 BY_ROWS = ["--x", "rows", "--x-label", "rows in a segment", "--log-x", *FPS]
 

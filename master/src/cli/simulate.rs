@@ -48,8 +48,11 @@ pub(crate) struct SimulateArgs {
     /// The fastest worker's speed over the slowest one's.
     #[arg(long, value_name = "RATIO", default_value = "4", value_parser = positive)]
     speeds: f64,
-    /// What a band of 16 rows costs however few of them are traced, as a share: 0.38 was measured, 0 is a tracer without
-    /// tiles.
+    /// Rows that are traced together: a tile's height. Frames of a second have so many samples a pixel that it is 1; frames
+    /// with one sample have 16.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=16))]
+    tile_rows: u32,
+    /// What a tile's height of rows costs however few of them are traced, as a share: 0.38 was measured.
     #[arg(long, value_name = "SHARE", default_value = "0.38", value_parser = share)]
     tile_share: f64,
     /// Bits a second of every link.
@@ -104,6 +107,7 @@ impl SimulateArgs {
             pipeline: self.pipeline == 1,
             size: (self.size.width, self.size.height),
             frame_seconds: self.work / 1e3,
+            tile_rows: self.tile_rows,
             tile_share: self.tile_share,
             link_bits: self.link,
             compression: self.compression,

@@ -39,7 +39,7 @@ struct Hand {
     /// Whether that is its own measured speed: only then are its leases predicted.
     known: bool,
     leases: usize,
-    /// Rows that it holds, in bands of a tile's height.
+    /// Bands of tiles that it holds.
     bands: u32,
     round_trip: f64,
     /// Seconds until it has done what it holds, or until a message reaches it.
@@ -60,7 +60,7 @@ pub(super) struct Crew {
 impl Crew {
     pub(super) fn of(scheduler: &Scheduler, now: Duration) -> Self {
         let ready = scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(now));
-        let mut hands: Vec<Hand> = ready.map(|(&id, w)| Hand::of(id, w, now, scheduler.tile_rows)).collect();
+        let mut hands: Vec<Hand> = ready.map(|(&id, w)| Hand::of(id, w, now)).collect();
         let measured = hands.iter().filter_map(|hand| Some((hand.speed?, hand.threads)));
         let (speed, threads) = measured.fold((0.0, 0.0), |(s, t), (speed, threads)| (s + speed, t + threads));
         if threads > 0.0 {
@@ -131,11 +131,11 @@ impl Crew {
 }
 
 impl Hand {
-    fn of(id: WorkerId, worker: &Worker, now: Duration, tile_rows: u32) -> Self {
+    fn of(id: WorkerId, worker: &Worker, now: Duration) -> Self {
         let round_trip = worker.round_trip.unwrap_or(0.0);
         let last = worker.leases.values().filter_map(|held| held.expected_at).max();
         let left = last.map_or(0.0, |at| at.saturating_sub(now).as_secs_f64());
-        let bands = worker.leases.values().map(|held| held.lease.row_count.div_ceil(tile_rows.max(1))).sum();
+        let bands = worker.leases.values().map(|held| held.bands).sum();
         Self {
             id,
             threads: f64::from(worker.threads),
@@ -158,7 +158,7 @@ impl Scheduler {
         let hand = crew.hands.get(hand)?;
         let Some(speed) = hand.speed else {
             let rows = frame.height / (FIRST_SEGMENTS * crew.hands.len().max(1) as u32);
-            let step = self.tile_rows.min(rows.max(1));
+            let step = frame.forecast.tiles.rows.min(rows.max(1));
             return Some(to_boundary(run.first, rows.max(1), step).min(limit));
         };
         let waits: f64 = self.frames.iter().take(index + 1).map(Frame::waiting_work).sum();

@@ -156,7 +156,7 @@ impl Scheduler {
         id: WorkerId,
         lease: Lease,
         crew: Option<&mut Crew>,
-        Load { work, longest }: Load,
+        Load { work, longest, bands }: Load,
         audit: bool,
     ) -> bool {
         // Frames in flight share the workers: one is complete every so often.
@@ -166,7 +166,7 @@ impl Scheduler {
         let expected_at = expected.map(|(at, _)| at);
         let deadline =
             expected.map(|(at, takes)| at.saturating_add(worker.slack(takes, self.surprise, every)));
-        worker.hold(now, Held { lease, granted_at: now, work, expected_at, deadline, audit });
+        worker.hold(now, Held { lease, granted_at: now, work, bands, expected_at, deadline, audit });
         if worker.must_announce(lease.frame) {
             self.actions.push_back(Action::Announce { worker: id, frame: lease.frame });
         }
@@ -180,10 +180,13 @@ pub(super) struct Load {
     work: f64,
     /// Of the most expensive band among them.
     longest: f64,
+    /// Bands of tiles.
+    bands: u32,
 }
 
 impl Load {
     pub(super) fn of(forecast: &Forecast, rows: Range<u32>) -> Self {
-        Self { work: forecast.work(rows.clone()), longest: forecast.longest_band(rows) }
+        let bands = (rows.len() as u32).div_ceil(forecast.tiles.rows);
+        Self { work: forecast.work(rows.clone()), longest: forecast.longest_band(rows), bands }
     }
 }

@@ -252,14 +252,16 @@ impl Scheduler {
         }
     }
 
-    /// A frame is complete: audits of frames that are too old by now are given up.
+    /// A frame is complete: audits of frames that are too old by now are given up. Where two renderings differ they are not:
+    /// somebody has lied, and how long the master takes to see who must not save him.
     pub(super) fn outlive_audits(&mut self, frame: FrameId) {
         self.audits.complete.push_back(frame);
         if self.audits.complete.len() > TRAILING_FRAMES {
             self.audits.complete.pop_front();
         }
         let oldest = self.audits.complete.front().copied().unwrap_or(frame);
-        self.forget_audits(|audit| audit.lease.frame < oldest);
+        let is_judged = |audit: &Audit| matches!(audit.stage, Stage::Judged(Some(_)));
+        self.forget_audits(|audit| audit.lease.frame < oldest && !is_judged(audit));
     }
 
     /// A worker says that it cannot render a frame which is complete: what it was to verify of it is given up.

@@ -26,6 +26,8 @@ pub enum Event {
         width: u32,
         /// Rows.
         height: u32,
+        /// Rows that workers trace together, from multiples of it on: cuts elsewhere cost them.
+        tile_rows: u32,
     },
     /// A session is ready for leases.
     WorkerJoined {

@@ -70,9 +70,9 @@ impl Scheduler {
 
     /// Begins the request that waits, if there is one.
     pub(super) fn begin_waiting(&mut self) {
-        let Some(Request { frame, width, height }) = self.waiting.take() else { return };
+        let Some(Request { frame, width, height, tile_rows }) = self.waiting.take() else { return };
         let runs = self.policy.runs(height, self.max_rows(width));
-        let tiles = Tiles { rows: self.tile_rows, share: self.tile_share };
+        let tiles = Tiles { rows: tile_rows, share: self.tile_share };
         let forecast = self.costs.forecast(height, self.frames.len() + 1, tiles);
         self.frames.push_back(Frame::new(frame, (width, height), forecast, runs));
         self.actions.push_back(Action::BeginFrame { frame });

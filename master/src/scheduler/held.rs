@@ -11,6 +11,8 @@ pub(super) struct Held {
     pub(super) granted_at: Duration,
     /// Predicted work of the rows, see `cost_map`.
     pub(super) work: f64,
+    /// Bands of tiles that the rows are.
+    pub(super) bands: u32,
     /// When the pixels should be here; `None` while nothing is known of the worker's speed.
     pub(super) expected_at: Option<Duration>,
     /// When they are so late that others are given the rows.

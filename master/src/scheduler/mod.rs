@@ -75,7 +75,6 @@ const AWAY: Duration = PING_EVERY.saturating_mul(2);
 pub struct Scheduler {
     policy: SegmentPolicy,
     max_segment_bytes: u64,
-    tile_rows: u32,
     tile_share: f64,
     pipeline: bool,
     workers: BTreeMap<WorkerId, Worker>,
@@ -103,17 +102,16 @@ struct Request {
     frame: FrameId,
     width: u32,
     height: u32,
+    tile_rows: u32,
 }
 
 impl Scheduler {
     /// A scheduler without workers and frames. No lease asks for more than `max_segment_bytes` bytes of RGB8
-    /// pixels, except that a single row is always one lease. Workers trace `tile_rows` rows at a time: cuts elsewhere
-    /// cost them.
-    pub fn new(policy: SegmentPolicy, max_segment_bytes: u64, tile_rows: u32) -> Self {
+    /// pixels, except that a single row is always one lease.
+    pub fn new(policy: SegmentPolicy, max_segment_bytes: u64) -> Self {
         Self {
             policy,
             max_segment_bytes,
-            tile_rows,
             tile_share: TILE_SHARE,
             pipeline: true,
             workers: BTreeMap::new(),
@@ -154,7 +152,9 @@ impl Scheduler {
     pub fn handle(&mut self, now: Duration, event: Event) {
         self.excuse_own_absence(now);
         match event {
-            Event::FrameRequested { frame, width, height } => self.request(Request { frame, width, height }),
+            Event::FrameRequested { frame, width, height, tile_rows } => {
+                self.request(Request { frame, width, height, tile_rows });
+            }
             Event::WorkerJoined { worker, threads } => {
                 self.lose(worker);
                 self.workers.insert(worker, Worker::new(threads, now));

@@ -6,7 +6,7 @@ use super::{Action, Cost, Event, FrameId, Lease, Scheduler, SegmentPolicy, Worke
 
 #[test]
 fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
-    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24, 16);
+    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
     let rows = drive_two(&mut scheduler, [1, 4], 6);
     let last: Vec<u32> = rows.last().copied().unwrap().into();
     assert!(last[1] > 2 * last[0], "rows of the worker and of one four times as fast, by frame: {rows:?}");
@@ -24,7 +24,7 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
         let mut done = [0; 2];
         let mut queues: [Vec<Lease>; 2] = Default::default();
         let mut busy_until_us = [now_us; 2];
-        let request = Event::FrameRequested { frame: FrameId(frame), width: 64, height: 512 };
+        let request = Event::FrameRequested { frame: FrameId(frame), width: 64, height: 512, tile_rows: 16 };
         scheduler.handle(Duration::from_micros(now_us), request);
         'frame: loop {
             while let Some(action) = scheduler.poll_action() {
@@ -60,9 +60,9 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
 #[test]
 fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
     for policy in ["static:1000", "smart:1000", "adaptive"] {
-        let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000, 16);
+        let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000);
         scheduler.handle(Duration::ZERO, Event::WorkerJoined { worker: WorkerId(1), threads: 1 });
-        let request = Event::FrameRequested { frame: FrameId(1), width: 300, height: 100 };
+        let request = Event::FrameRequested { frame: FrameId(1), width: 300, height: 100, tile_rows: 16 };
         scheduler.handle(Duration::ZERO, request);
         while let Some(action) = scheduler.poll_action() {
             if let Action::Grant { lease, .. } = action {

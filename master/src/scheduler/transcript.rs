@@ -14,7 +14,7 @@ use super::{Action, Cost, Event, Finding, FrameId, Lease, Return, Scheduler, Ver
 /// Runs a script and writes the transcript.
 pub(super) fn transcript(policy: &str, script: &str) -> String {
     let (policy, percent) = policy.split_once(", verify ").unwrap_or((policy, "0"));
-    let scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20, 8);
+    let scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20);
     let mut scheduler = scheduler.with_verification(percent.parse().unwrap());
     let mut granted = BTreeMap::new();
     let mut log = String::new();
@@ -41,7 +41,7 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
     match words[..] {
         ["frame", frame, size] => {
             let (width, height) = pair(size, 'x');
-            Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height }
+            Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height, tile_rows: 8 }
         }
         ["join", _, threads] => Event::WorkerJoined { worker, threads: number(threads) as u32 },
         ["leave", _] => Event::WorkerLeft { worker },

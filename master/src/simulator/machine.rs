@@ -7,9 +7,6 @@ use super::clock::Down;
 use super::link::{Lane, Order};
 use crate::scheduler::{FrameId, Lease};
 
-/// Rows that one thread takes at a time end on multiples of this: the tracer's tile.
-pub(crate) const BAND_ROWS: u32 = 16;
-
 /// A machine.
 #[derive(Debug)]
 pub(crate) struct Machine {
@@ -101,12 +98,12 @@ impl Machine {
         self.threads.iter().position(Option::is_none)
     }
 
-    /// The next rows that no thread has, of the earliest lease.
-    pub(crate) fn next_band(&mut self) -> Option<(Lease, Range<u32>)> {
+    /// The next rows that no thread has, of the earliest lease, up to a multiple of `tile_rows`.
+    pub(crate) fn next_band(&mut self, tile_rows: u32) -> Option<(Lease, Range<u32>)> {
         let job =
             self.queue.iter_mut().find(|job| job.next_row < job.lease.first_row + job.lease.row_count)?;
         let end = job.lease.first_row + job.lease.row_count;
-        let stop = (job.next_row + 1).next_multiple_of(BAND_ROWS).min(end);
+        let stop = (job.next_row + 1).next_multiple_of(tile_rows.max(1)).min(end);
         let rows = job.next_row..stop;
         job.next_row = stop;
         Some((job.lease, rows))

@@ -54,6 +54,9 @@ pub struct Setup {
     pub costs: CostProfile,
     /// What a frame takes an average worker, in seconds.
     pub frame_seconds: f64,
+    /// Rows that are traced together, from multiples of it on: a tile's height. A tile has 256 rays, so it is 16 rows high
+    /// with one sample a pixel, and one row with 81 and more.
+    pub tile_rows: u32,
     /// What a band of a tile's height costs however few of its rows are traced, as a share.
     pub tile_share: f64,
     /// Bits a second of every link; the master's is shared by all workers.
@@ -91,6 +94,8 @@ impl Default for Setup {
             size: (1024, 768),
             costs: CostProfile::Bust,
             frame_seconds: 1.0,
+            // The bust takes a second with 100 samples a pixel.
+            tile_rows: 1,
             // Measured: see `costs`.
             tile_share: 0.38,
             link_bits: 1e9,

@@ -2,7 +2,7 @@
 
 use super::SECOND;
 use super::clock::{Happening, Up};
-use super::machine::{Ailment, BAND_ROWS, Band};
+use super::machine::{Ailment, Band};
 use super::world::World;
 use crate::scheduler::{Cost, FrameId, Lease, WorkerId};
 
@@ -14,7 +14,7 @@ impl World {
                 return;
             }
             let Some(thread) = machine.idle_thread() else { return };
-            let Some((lease, rows)) = machine.next_band() else { return };
+            let Some((lease, rows)) = machine.next_band(self.setup.tile_rows) else { return };
             let speed = machine.thread_speed();
             let last = rows.end == lease.first_row + lease.row_count;
             let lease_seconds = if last { self.setup.lease_cost as f64 / SECOND as f64 } else { 0.0 };
@@ -46,10 +46,11 @@ impl World {
             sums
         });
         let at = |row: u32| costs.get(row.min(height) as usize).copied().unwrap_or(0.0);
-        let band_first = rows.start - rows.start % BAND_ROWS;
-        let band_rows = (band_first + BAND_ROWS).min(height) - band_first;
+        let tile_rows = self.setup.tile_rows.max(1);
+        let band_first = rows.start - rows.start % tile_rows;
+        let band_rows = (band_first + tile_rows).min(height) - band_first;
         let left_out = 1.0 - f64::from(rows.end - rows.start) / f64::from(band_rows.max(1));
-        let band = at(band_first + BAND_ROWS) - at(band_first);
+        let band = at(band_first + tile_rows) - at(band_first);
         let work = (at(rows.end) - at(rows.start)) * self.setup.frame_seconds;
         let cutting = self.setup.tile_share * band * left_out.max(0.0) * self.setup.frame_seconds;
         while self.costs.len() > 16 {

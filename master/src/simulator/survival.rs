@@ -92,6 +92,7 @@ fn any_setup(dice: &mut Dice, seed: u64) -> Setup {
         pipeline: !dice.one_in(3),
         size: (64 + dice.roll(2000) as u32, 1 + dice.roll(300) as u32),
         costs: costs.get(dice.roll(3) as usize).cloned().unwrap_or(CostProfile::Flat),
+        tile_rows: 1 + dice.roll(16) as u32,
         frame_seconds: 0.02 + dice.fraction(),
         round_trip: dice.roll(20_000_000),
         jitter: dice.roll(5_000_000),

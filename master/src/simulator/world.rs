@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use super::clock::{Clock, Down, Happening};
 use super::dice::Dice;
 use super::link::Lane;
-use super::machine::{BAND_ROWS, Machine};
+use super::machine::Machine;
 use super::shell::Shell;
 use super::tally::{Measured, Tally};
 use super::{SECOND, Setup};
@@ -61,7 +61,7 @@ pub(crate) struct World {
 
 impl World {
     pub(crate) fn new(setup: Setup) -> Self {
-        let scheduler = Scheduler::new(setup.policy, MAX_SEGMENT_BYTES, BAND_ROWS)
+        let scheduler = Scheduler::new(setup.policy, MAX_SEGMENT_BYTES)
             .with_pipeline(setup.pipeline)
             .with_tile_share(setup.tile_share)
             .with_verification(setup.verify_percent);
@@ -170,7 +170,7 @@ impl World {
         let frame = FrameId(self.requested);
         self.open.insert(frame, Open { requested_at: self.clock.now, idle_before: None });
         let (width, height) = self.setup.size;
-        self.tell(Event::FrameRequested { frame, width, height });
+        self.tell(Event::FrameRequested { frame, width, height, tile_rows: self.setup.tile_rows });
     }
 
     /// Tells the scheduler, and does what it says.

@@ -9,6 +9,7 @@ fn hold(worker: &mut Worker, segment: u32, at: Duration) -> Lease {
     let held = Held {
         lease,
         granted_at: at,
+        bands: 1,
         work: 8.0,
         expected_at: None,
         deadline: Some(at + SECOND),
