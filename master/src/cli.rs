@@ -19,12 +19,14 @@ mod farm;
 mod picture;
 mod plot;
 mod simulate;
+mod tradeoff;
 mod values;
 
 pub(crate) use farm::FarmArgs;
 pub(crate) use picture::{PictureArgs, QualityArgs};
 pub(crate) use plot::PlotArgs;
 pub(crate) use simulate::{Profile, SimulateArgs};
+pub(crate) use tradeoff::TradeoffArgs;
 
 /// The word that turns the master into a worker.
 pub(crate) const LOCAL_WORKER: &str = "local-worker";
@@ -104,6 +106,8 @@ pub(crate) enum Command {
     Explain(ExplainArgs),
     /// Check a scene's numbers: leaks, acne, scale, distance from the origin, levels of SIMD.
     CheckNumerics(CheckNumericsArgs),
+    /// Measure what each setting of the tracer costs and how far its picture is from the best one; write table, plot and pictures.
+    Tradeoff(TradeoffArgs),
 }
 
 /// `view`.

@@ -16,6 +16,7 @@ mod error;
 pub mod farm;
 mod farm_control;
 mod framebuffer;
+mod in_process;
 mod judge;
 mod lease_book;
 mod local_workers;
@@ -30,7 +31,9 @@ pub mod scheduler;
 mod seals;
 mod server;
 pub mod simulator;
+mod tradeoff;
 mod wanted;
+mod whole_file;
 
 #[cfg(test)]
 mod fake_worker;

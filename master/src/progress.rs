@@ -43,9 +43,7 @@ impl Progress {
             false => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target(Some(frames), target).with_style(style());
-        if !bar.is_hidden() {
-            *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
-        }
+        stand_below_the_log(&bar);
         let now = Instant::now();
         Self {
             bar,
@@ -81,7 +79,7 @@ impl Progress {
     /// The run is over, and `written` frames are on the disk.
     pub(crate) fn finish(&mut self, written: u64) {
         self.bar.finish_and_clear();
-        *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        nothing_below_the_log();
         let seconds = self.started.elapsed().as_secs_f64();
         tracing::info!("{written} of {} frames written in {seconds:.1} s", self.frames);
     }
@@ -129,6 +127,18 @@ fn message(status: &FarmStatus, fps: f64) -> String {
     }
     let percent = 100.0 * f64::from(status.rows_done) / f64::from(status.rows.max(1));
     format!("{fps:.2} FPS, {workers}, frame {percent:.0} %")
+}
+
+/// From now on, log lines are written above this bar, where it is to be seen at all.
+pub(crate) fn stand_below_the_log(bar: &ProgressBar) {
+    if !bar.is_hidden() {
+        *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
+    }
+}
+
+/// The bar is gone.
+pub(crate) fn nothing_below_the_log() {
+    *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
 }
 
 /// Standard error, below which a progress bar may stand: what is written appears above the bar.

@@ -26,7 +26,7 @@ pub(crate) struct PictureArgs {
 }
 
 /// What may be left out or done more roughly; each wins over the scene file.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Copy, Debug, Default, Args)]
 pub(crate) struct QualityArgs {
     /// Whether lights cast shadows.
     #[arg(long, value_name = "on|off", value_parser = one_of(&SWITCH))]

@@ -8,6 +8,7 @@ use rayfarm_tracer::scene::MAX_SAMPLES;
 const MAX_FRAMES: u32 = 10_000_000;
 const MAX_LOCAL_WORKERS: u32 = 64;
 const MAX_THREADS: usize = 1_024;
+const MAX_REPEATS: u32 = 1_000;
 const MAX_RAYS: u64 = 1_000_000_000_000;
 
 /// Picture size in pixels; neither side is zero or above [`MAX_SIDE`].
@@ -51,6 +52,11 @@ pub(super) fn worker_count(text: &str) -> Result<u32, String> {
 /// One render thread or more.
 pub(super) fn thread_count(text: &str) -> Result<usize, String> {
     whole_number(text, 1, MAX_THREADS)
+}
+
+/// One repeat or more.
+pub(super) fn repeat_count(text: &str) -> Result<u32, String> {
+    whole_number(text, 1, MAX_REPEATS)
 }
 
 /// One ray or more.

@@ -1,17 +1,17 @@
 //! `bench`: the tracer alone, in this one process: what a farm of one worker could reach if it cost nothing.
 
 use std::io::{self, Write};
-use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_tracer::scene::FrameView;
-use rayfarm_tracer::{Cancelled, CompiledScene, PreparedFrame, RayCounts, render_rows};
+use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
 
 use super::source::{Source, animation};
 use crate::cli::BenchArgs;
 use crate::display::overlay::{counted, grouped};
 use crate::error::CommandError;
+use crate::in_process::{all_cores, trace};
 use crate::report::{BenchReport, MsPerFrame, RaysPerFrame, print_json, round_to_us};
 use crate::wanted::WantedPicture;
 
@@ -39,10 +39,6 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
     if args.json { print_json(&report) } else { print_table(&report) }
 }
 
-fn all_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
 struct Bench {
     scene: Arc<CompiledScene>,
     threads: usize,
@@ -61,7 +57,7 @@ impl Bench {
     fn frame(&mut self, view: &FrameView) -> Result<(), CommandError> {
         let started = Instant::now();
         let frame = PreparedFrame::new(Arc::clone(&self.scene), view).map_err(CommandError::failed)?;
-        let rays = trace(&frame, view, &mut self.pixels, self.threads).map_err(|_| {
+        let rays = trace(&frame, &mut self.pixels, self.threads, &|| false, &|_| ()).map_err(|_| {
             CommandError::Failed("the tracer stopped although nobody cancelled it".to_owned())
         })?;
         self.times.push(started.elapsed());
@@ -97,42 +93,6 @@ impl Bench {
     }
 }
 
-/// Traces a frame with `threads` threads, each taking the next band of rows that nobody has begun.
-fn trace(
-    frame: &PreparedFrame,
-    view: &FrameView,
-    pixels: &mut [u8],
-    threads: usize,
-) -> Result<RayCounts, Cancelled> {
-    let band_rows = frame.tile_rows();
-    let band_bytes = view.width as usize * 3 * band_rows as usize;
-    let bands = Mutex::new(pixels.chunks_mut(band_bytes).zip(bands(view.height, band_rows)));
-    let work = || {
-        let mut rays = RayCounts::default();
-        loop {
-            let next = bands.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let Some((out, rows)) = next else { return Ok(rays) };
-            rays += render_rows(frame, rows, out, &|| false)?;
-        }
-    };
-    if threads == 1 {
-        return work();
-    }
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        let mut rays = RayCounts::default();
-        for thread in threads {
-            rays += thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-        }
-        Ok(rays)
-    })
-}
-
-/// The rows of each band, top to bottom.
-fn bands(height: u32, rows: u32) -> impl Iterator<Item = Range<u32>> {
-    (0..height).step_by(rows as usize).map(move |first| first..(first + rows).min(height))
-}
-
 fn print_table(report: &BenchReport) -> Result<(), CommandError> {
     let BenchReport { ms_per_frame: ms, rays_per_frame: rays, .. } = report;
     let text = format!(
@@ -160,17 +120,4 @@ fn print_table(report: &BenchReport) -> Result<(), CommandError> {
     );
     writeln!(io::stdout().lock(), "{text}")
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bands_cover_every_row_once() {
-        for height in [1, 7, 8, 9, 768] {
-            let rows: Vec<u32> = bands(height, 16).flatten().collect();
-            assert_eq!(rows, (0..height).collect::<Vec<_>>());
-        }
-    }
 }

@@ -1,8 +1,7 @@
 //! `compile`: a model with its bounding volume hierarchy, ready to load.
 
-use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use rayfarm_tracer::mesh::{BuildQuality, CompileOptions};
@@ -12,6 +11,7 @@ use crate::cli::{CompileArgs, Quality};
 use crate::display::overlay::counted;
 use crate::error::CommandError;
 use crate::output::check_writable;
+use crate::whole_file::write_whole;
 
 /// Reads a model, builds its tree and writes both; tells what came of it on standard output.
 ///
@@ -62,40 +62,11 @@ fn refuse_the_model_itself(args: &CompileArgs) -> Result<(), CommandError> {
     }
 }
 
-/// Writes a file under a temporary name beside it and renames it: it is there whole, or as it was before.
-fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let temporary = temporary_name(path);
-    let written = File::create(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()
-    });
-    let result = written.and_then(|()| fs::rename(&temporary, path));
-    if result.is_err() {
-        let _ = fs::remove_file(&temporary); // what went wrong is already known
-    }
-    result
-}
-
-fn temporary_name(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.tmp", std::process::id()));
-    path.with_file_name(name)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs;
 
-    #[test]
-    fn a_file_is_replaced_whole_and_nothing_else_is_left() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.rfm");
-        write_whole(&path, b"first").unwrap();
-        write_whole(&path, b"second").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"second");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
+    use super::*;
 
     #[test]
     fn a_model_is_not_overwritten_by_its_own_compiled_form() {

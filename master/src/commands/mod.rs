@@ -10,6 +10,7 @@ mod plot;
 mod render;
 mod simulate;
 mod source;
+mod tradeoff;
 mod view;
 
 use crate::cli::Command;
@@ -29,6 +30,7 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Plot(args) => plot::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::CheckNumerics(args) => check_numerics::run(&args),
+        Command::Tradeoff(args) => tradeoff::run(&args),
     }
 }
 

@@ -8,6 +8,7 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::labels::{self, Drawn, Label};
 use super::scale::Scale;
 use super::{Chart, Line, PlotError, Series};
 
@@ -22,12 +23,16 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
 ];
+/// From points to text that has no room beside them.
+const LEADER: RGBColor = RGBColor(150, 150, 150);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 /// Sizes of text, in the units of `plotters`.
 const TITLE: f64 = 28.0;
 const LABEL: f64 = 22.0;
 const SMALL: f64 = 18.0;
-/// Pixels of a letter in the legend, of a line of it, and before its text.
+/// Pixels of a label upwards.
+const LABEL_HEIGHT: i32 = 20;
+/// Pixels of a letter in the legend and of a label, of a line of the legend, and before its text.
 const LETTER: usize = 11;
 const LEGEND_LINE: i32 = 28;
 const LEGEND_MARK: i32 = 44;
@@ -35,7 +40,7 @@ const LEGEND_MARK: i32 = 44;
 const MAX_MARKS: usize = 80;
 
 type Area<B> = DrawingArea<B, Shift>;
-type Pixel = (i32, i32);
+pub(super) type Pixel = (i32, i32);
 type Plane = Cartesian2d<Scale, Scale>;
 
 /// Draws everything.
@@ -67,9 +72,11 @@ pub(super) fn draw<B: DrawingBackend>(chart: &Chart, backend: B) -> Result<(), P
         .y_desc(&chart.y.label)
         .draw()
         .map_err(failed)?;
+    let pen = |index| Pen { plane: context.plotting_area(), x: &x, y: &y, look: Look::of(index) };
     for (index, series) in chart.series.iter().enumerate() {
-        Pen { plane: context.plotting_area(), x: &x, y: &y, look: Look::of(index) }.draw(series)?;
+        pen(index).draw(series)?;
     }
+    pen(0).draw_labels(&chart.series)?;
     legend(chart, &beside)?;
     root.present().map_err(failed)
 }
@@ -168,9 +175,6 @@ impl<B: DrawingBackend> Pen<'_, B> {
             if marked {
                 self.look.draw_mark(&area, at)?;
             }
-            if let Some(label) = &point.label {
-                self.draw_label(&area, at, label)?;
-            }
         }
         Ok(())
     }
@@ -201,13 +205,49 @@ impl<B: DrawingBackend> Pen<'_, B> {
         Ok(())
     }
 
-    /// To the right of the point, or to its left where there is no room.
-    fn draw_label(&self, area: &Area<B>, (x, y): Pixel, label: &str) -> Result<(), PlotError> {
-        let needed = (label.chars().count() * LETTER) as i32 + 9;
-        let (x, side) = if x + needed < self.right() { (x + 9, HPos::Left) } else { (x - 9, HPos::Right) };
-        let style = (FontFamily::SansSerif, SMALL).into_text_style(area).pos(Pos::new(side, VPos::Bottom));
-        area.draw(&Text::new(label.to_owned(), (x, y), style)).map_err(failed)
+    /// The text beside points, when all else is drawn, so that it keeps clear of it.
+    fn draw_labels(&self, all: &[Series]) -> Result<(), PlotError> {
+        let area = self.plane.use_screen_coord();
+        let (mut drawn, mut texts, mut wanted) = (Drawn::default(), Vec::new(), Vec::new());
+        for series in all {
+            let pixels: Vec<Pixel> = series.points.iter().map(|point| self.pixel(point.x, point.y)).collect();
+            for (point, at) in series.points.iter().zip(&pixels) {
+                let Some(text) = &point.label else { continue };
+                let width = (text.chars().count() * LETTER) as i32;
+                wanted.push(Label { at: *at, width, height: LABEL_HEIGHT });
+                texts.push(text);
+            }
+            if series.line != Line::None {
+                drawn.lines.extend(pixels.windows(2).map(|ends| [ends[0], ends[1]]));
+            }
+            drawn.marks.extend(pixels);
+        }
+        if wanted.is_empty() {
+            return Ok(());
+        }
+        let (low, high) = (self.pixel(self.x.low, self.y.low), self.pixel(self.x.high, self.y.high));
+        let room = labels::Area { left: low.0, top: high.1, right: high.0, bottom: low.1 };
+        let places = labels::place(&wanted, &drawn, room);
+        for ((text, label), place) in texts.into_iter().zip(&wanted).zip(places) {
+            draw_label(&area, text, label.at, place)?;
+        }
+        Ok(())
     }
+}
+
+fn draw_label<B: DrawingBackend>(
+    area: &Area<B>,
+    text: &str,
+    at: Pixel,
+    place: labels::Area,
+) -> Result<(), PlotError> {
+    if place.is_away_from(at) {
+        area.draw(&PathElement::new([at, place.nearest_to(at)], LEADER.stroke_width(1))).map_err(failed)?;
+    }
+    // Beside its point, text begins or ends there, however wide the letters of its font are.
+    let (x, side) = if place.right <= at.0 { (place.right, HPos::Right) } else { (place.left, HPos::Left) };
+    let style = (FontFamily::SansSerif, SMALL).into_text_style(area).pos(Pos::new(side, VPos::Bottom));
+    area.draw(&Text::new(text.to_owned(), (x, place.bottom), style)).map_err(failed)
 }
 
 fn draw_line<B: DrawingBackend>(

@@ -1,10 +1,11 @@
 //! Plots of measurements: a table becomes series, series become a picture.
 //!
 //! A [`Chart`] says what to show, and nothing about pixels. [`table`] makes its series from CSV files, [`scale`] lays its axes
-//! out, [`draw`] draws it with `plotters`; an SVG keeps its text as text, a PNG gets its letters from [`canvas`].
+//! out, [`labels`] finds room for text, [`draw`] draws it with `plotters`; an SVG keeps its text as text, a PNG gets its letters from [`canvas`].
 
 mod canvas;
 mod draw;
+mod labels;
 mod scale;
 mod table;
 
@@ -13,6 +14,7 @@ use std::path::{Path, PathBuf};
 use plotters::backend::SVGBackend;
 use rayfarm_tracer::image;
 
+use crate::whole_file::write_whole;
 use canvas::Canvas;
 
 pub(crate) use table::{Columns, read_series};
@@ -115,7 +117,7 @@ impl Chart {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("svg") => {
                 let text = self.to_svg()?;
-                std::fs::write(path, text).map_err(|error| refuse(error.to_string()))
+                write_whole(path, text.as_bytes()).map_err(|error| refuse(error.to_string()))
             }
             Some("png") => {
                 let picture = self.to_picture()?;
