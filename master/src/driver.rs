@@ -21,10 +21,11 @@ use crate::farm::{FarmError, FarmOptions, FinishedFrame};
 use crate::framebuffer::Framebuffers;
 use crate::judge::Case;
 use crate::roster::{ByteCount, Roster};
-use crate::scheduler::{Event, Scheduler, WorkerId};
+use crate::scheduler::{Event, Scheduler};
 use crate::seals::Seals;
 
 mod answers;
+mod passing;
 mod people;
 mod perform;
 mod verify;
@@ -48,6 +49,8 @@ pub(crate) struct Driver {
     verified: Notify,
     /// Rows that the master is to trace itself; no more than there are open audits.
     court: mpsc::UnboundedSender<Case>,
+    /// What the workers' keys are made of; without it, nothing is passed on.
+    secret: Option<[u8; 32]>,
 }
 
 struct Inner {
@@ -105,6 +108,7 @@ impl Driver {
             finished: Notify::new(),
             verified: Notify::new(),
             court,
+            secret: secret(),
         }
     }
 
@@ -187,11 +191,6 @@ impl Driver {
         self.hand_out(&mut self.lock(), Err(error));
     }
 
-    /// A worker asks for an asset.
-    pub(crate) fn asset_wanted(&self, worker: WorkerId) {
-        self.lock().accounts.asset_wanted(self.started.elapsed(), worker);
-    }
-
     /// Tells a timeline of everything from now on.
     pub(crate) fn trace_into(&self, sink: TraceSink) {
         let mut inner = self.lock();
@@ -236,5 +235,17 @@ impl Driver {
     /// No panic leaves the state half changed in a way that later events could not live with.
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Numbers that nobody can guess.
+fn secret() -> Option<[u8; 32]> {
+    let mut secret = [0; 32];
+    match getrandom::fill(&mut secret) {
+        Ok(()) => Some(secret),
+        Err(error) => {
+            tracing::warn!("workers pass no assets on: the system gives no random numbers: {error}");
+            None
+        }
     }
 }

@@ -103,7 +103,11 @@ async fn live(stream: TcpStream, mut script: Script) -> Outcome {
             ToWorker::Goodbye { reason, .. } => outcome.goodbye = Some(reason),
             ToWorker::Drain => outcome.drained = true,
             ToWorker::Cancel { .. } => {}
-            ToWorker::AssetBegin { .. } | ToWorker::AssetChunk { .. } | ToWorker::AssetUnknown { .. } => {
+            ToWorker::AssetBegin { .. }
+            | ToWorker::AssetChunk { .. }
+            | ToWorker::AssetUnknown { .. }
+            | ToWorker::AssetFrom { .. }
+            | ToWorker::ShareKey { .. } => {
                 unreachable!("a fake worker asks for no assets")
             }
         }

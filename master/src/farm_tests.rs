@@ -279,8 +279,8 @@ async fn the_scene_is_fetched_by_hash_and_unknown_assets_are_named() {
     assert_eq!(codec::decode::<FrameView>(&announce.view, 4096).unwrap(), view());
 
     let unknown = AssetId([7; 32]);
-    sender.send(ToMaster::NeedAsset { id: announce.scene }).await.unwrap();
-    sender.send(ToMaster::NeedAsset { id: unknown }).await.unwrap();
+    sender.send(ToMaster::NeedAsset { id: announce.scene, offset: 0, again: false }).await.unwrap();
+    sender.send(ToMaster::NeedAsset { id: unknown, offset: 0, again: false }).await.unwrap();
     let mut size_announced = None;
     let mut body = Vec::new();
     loop {

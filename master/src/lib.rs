@@ -7,6 +7,7 @@
 mod accounting;
 mod assets;
 mod camera_control;
+mod chains;
 mod cli;
 mod commands;
 mod control;
@@ -39,6 +40,8 @@ mod whole_file;
 mod fake_worker;
 #[cfg(test)]
 mod farm_tests;
+#[cfg(test)]
+mod passing_tests;
 #[cfg(test)]
 mod test_scene;
 #[cfg(test)]

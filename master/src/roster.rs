@@ -5,10 +5,12 @@ use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
+use rayfarm_protocol::passing::ShareKey;
 use rayfarm_protocol::session::{Sender, Traffic};
-use rayfarm_protocol::{Hello, ToWorker};
+use rayfarm_protocol::{AssetId, Hello, ToWorker};
 use tokio::task::JoinHandle;
 
+use crate::chains::{Chains, Source};
 use crate::lease_book::LeaseBook;
 use crate::scheduler::{Return, WorkerId};
 
@@ -31,6 +33,7 @@ pub(crate) struct Roster {
     kicked: VecDeque<(String, IpAddr)>,
     /// Who has left lately: a worker may be found to have lied when it is gone.
     left: VecDeque<(WorkerId, String, IpAddr)>,
+    pub(crate) chains: Chains,
 }
 
 /// A connected worker.
@@ -40,6 +43,8 @@ pub(crate) struct Session {
     pub(crate) leases: LeaseBook,
     /// Why it could not render, the last time it could not.
     pub(crate) trouble: Option<String>,
+    /// Where it passes assets on, and what opens them there.
+    pub(crate) sharing: Option<(SocketAddr, ShareKey)>,
     sender: Sender<ToWorker>,
     traffic: Arc<Traffic>,
 }
@@ -65,7 +70,7 @@ impl Session {
         sender: Sender<ToWorker>,
         traffic: Arc<Traffic>,
     ) -> Self {
-        Self { hello, address, leases: LeaseBook::default(), trouble: None, sender, traffic }
+        Self { hello, address, leases: LeaseBook::default(), trouble: None, sharing: None, sender, traffic }
     }
 }
 
@@ -122,6 +127,7 @@ impl Roster {
     pub(crate) fn end(&mut self, worker: WorkerId, reason: &str, again: Return) -> Option<JoinHandle<()>> {
         let Session { sender, traffic, hello, address, .. } = self.sessions.remove(&worker)?;
         self.ended.add(&traffic);
+        self.chains.left(worker);
         self.left.push_back((worker, hello.name, address.ip()));
         while self.left.len() > MAX_LEFT {
             self.left.pop_front();
@@ -168,6 +174,23 @@ impl Roster {
     /// The names of those who are kept out, in the order in which they were kicked.
     pub(crate) fn barred(&self) -> Vec<String> {
         self.kicked.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Where a worker gets an asset, and what opens it there, if another worker passes it on.
+    pub(crate) fn source(
+        &mut self,
+        now: Duration,
+        worker: WorkerId,
+        id: AssetId,
+        again: bool,
+    ) -> Option<(SocketAddr, ShareKey)> {
+        // Where a worker of this very machine listens, others cannot connect.
+        let is_here = |id: WorkerId| self.sessions.get(&id).map(|s| s.address.ip().is_loopback());
+        let here = is_here(worker);
+        match self.chains.wanted(now, worker, id, again, |other| is_here(other) == here) {
+            Source::Worker(from) => self.sessions.get(&from)?.sharing,
+            Source::Master => None,
+        }
     }
 
     /// All bytes up to now.

@@ -135,15 +135,18 @@ async fn listen(
     driver: &Driver,
     worker: WorkerId,
     mut receiver: Receiver<ToMaster>,
-    want: mpsc::Sender<AssetId>,
+    want: mpsc::Sender<(AssetId, u64)>,
 ) -> Result<String, SessionError> {
     while let Some(message) = receiver.recv().await {
         match message? {
             ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
-            ToMaster::NeedAsset { id } => {
-                driver.asset_wanted(worker);
-                want.try_send(id).map_err(|_| SessionError::Greedy)?;
+            ToMaster::NeedAsset { id, offset, again } => {
+                if !driver.asset_wanted(worker, id, again) {
+                    want.try_send((id, offset)).map_err(|_| SessionError::Greedy)?;
+                }
             }
+            ToMaster::Sharing { port } => driver.shares(worker, port),
+            ToMaster::HaveAsset { id } => driver.asset_taken(worker, id),
             ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
             ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
@@ -158,11 +161,11 @@ async fn send_assets(
     driver: &Driver,
     worker: WorkerId,
     sender: &Sender<ToWorker>,
-    mut wanted: mpsc::Receiver<AssetId>,
+    mut wanted: mpsc::Receiver<(AssetId, u64)>,
 ) {
-    while let Some(id) = wanted.recv().await {
+    while let Some((id, offset)) = wanted.recv().await {
         let sent = match driver.assets.get(id) {
-            Some(bytes) => send_asset(driver, worker, sender, id, bytes).await,
+            Some(bytes) => send_asset(driver, worker, sender, id, bytes, offset).await,
             None => sender.send(ToWorker::AssetUnknown { id }).await,
         };
         match sent {
@@ -174,15 +177,18 @@ async fn send_assets(
     }
 }
 
+/// An asset from some byte on.
 async fn send_asset(
     driver: &Driver,
     worker: WorkerId,
     sender: &Sender<ToWorker>,
     id: AssetId,
     mut bytes: Bytes,
+    mut offset: u64,
 ) -> Result<(), SendError> {
     sender.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await?;
-    let mut offset = 0;
+    // From beyond its end there is nothing to send.
+    let _ = bytes.split_to(usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len()));
     while !bytes.is_empty() {
         let chunk = bytes.split_to(bytes.len().min(MAX_CHUNK_BYTES));
         let next = offset + chunk.len() as u64;

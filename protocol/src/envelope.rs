@@ -47,12 +47,20 @@ pub enum Kind {
     AssetChunk = 0x14,
     /// The master does not have that asset.
     AssetUnknown = 0x15,
+    /// Another worker passes an asset on.
+    AssetFrom = 0x16,
+    /// What a worker shares with its master alone.
+    ShareKey = 0x17,
     /// A worker lacks an asset.
     NeedAsset = 0x20,
     /// The rows of a lease.
     Pixels = 0x21,
     /// A worker cannot render a frame.
     Failed = 0x22,
+    /// A worker passes assets on.
+    Sharing = 0x23,
+    /// A worker has all of an asset.
+    HaveAsset = 0x24,
     /// Asks for a pong.
     Ping = 0x30,
     /// Answers a ping.
@@ -61,11 +69,13 @@ pub enum Kind {
     Drain = 0x32,
     /// The last message of a session.
     Goodbye = 0x33,
+    /// A worker asks another one for an asset.
+    Fetch = 0x40,
 }
 
 impl Kind {
     /// Every type there is.
-    pub const ALL: [Kind; 16] = [
+    pub const ALL: [Kind; 21] = [
         Self::Hello,
         Self::Welcome,
         Self::Refused,
@@ -75,13 +85,18 @@ impl Kind {
         Self::AssetBegin,
         Self::AssetChunk,
         Self::AssetUnknown,
+        Self::AssetFrom,
+        Self::ShareKey,
         Self::NeedAsset,
         Self::Pixels,
         Self::Failed,
+        Self::Sharing,
+        Self::HaveAsset,
         Self::Ping,
         Self::Pong,
         Self::Drain,
         Self::Goodbye,
+        Self::Fetch,
     ];
 
     /// The longest body that this type may have.
@@ -92,8 +107,9 @@ impl Kind {
             Self::Pixels => MAX_HEAD_BYTES + MAX_PIXELS_BYTES,
             Self::Hello | Self::Welcome | Self::Refused => MAX_CONTROL_BYTES,
             Self::Segment | Self::Cancel | Self::AssetBegin | Self::AssetUnknown => MAX_CONTROL_BYTES,
+            Self::AssetFrom | Self::ShareKey | Self::Sharing | Self::HaveAsset => MAX_CONTROL_BYTES,
             Self::NeedAsset | Self::Failed | Self::Ping | Self::Pong => MAX_CONTROL_BYTES,
-            Self::Drain | Self::Goodbye => MAX_CONTROL_BYTES,
+            Self::Drain | Self::Goodbye | Self::Fetch => MAX_CONTROL_BYTES,
         }
     }
 

@@ -12,7 +12,8 @@
 //!    checked against [`limits`] before anything is allocated.
 //! 3. [`message`]: [`ToWorker`] and [`ToMaster`]. Small ones are bincode ([`codec`]); frames, asset chunks and pixels
 //!    have hand-laid heads and their bytes are never copied on the way out.
-//! 4. [`session`]: one task that writes (control before bulk), one that reads, bounded queues between them and the user.
+//! 4. [`passing`]: assets from worker to worker, over connections of their own.
+//! 5. [`session`]: one task that writes (control before bulk), one that reads, bounded queues between them and the user.
 
 pub mod codec;
 pub mod envelope;
@@ -21,6 +22,7 @@ pub mod handshake;
 mod ids;
 pub mod limits;
 pub mod message;
+pub mod passing;
 pub mod pixels;
 pub mod session;
 pub mod tcp;
@@ -32,4 +34,4 @@ pub use message::{FrameAnnounce, Hello, ToMaster, ToWorker, Welcome};
 pub use pixels::{Cost, Encoding, PixelsHeader};
 
 /// Version of everything behind the preamble. It grows with every change that an older peer would misread.
-pub const PROTOCOL_VERSION: u16 = 2;
+pub const PROTOCOL_VERSION: u16 = 3;

@@ -23,6 +23,27 @@ pub const MAX_ASSET_BYTES: u64 = 2 << 30;
 /// Bytes of an asset in one envelope. Small enough that a control message waits at most some 2 ms behind it on gigabit.
 pub const MAX_CHUNK_BYTES: usize = 256 << 10;
 
+/// Workers that one worker passes assets on to at a time; more wait.
+pub const MAX_FOLLOWERS: usize = 8;
+
+/// How long a worker keeps a whole asset ready to be passed on after it was last asked for.
+pub const SHELF_TIME: Duration = Duration::from_secs(20);
+
+/// Bytes of whole assets that a worker keeps for that alone (512 MiB).
+pub const MAX_SHELF_BYTES: usize = 512 << 20;
+
+/// How long another worker may take to accept a connection.
+pub const PEER_CONNECT: Duration = Duration::from_secs(2);
+
+/// A worker that passes on what it has yet to receive says so this often while it waits...
+pub const PEER_PULSE: Duration = Duration::from_millis(500);
+
+/// ...and so often in a row at most.
+pub const MAX_PULSES: u32 = 240;
+
+/// How long a worker may be silent in the middle of what it passes on.
+pub const PEER_PATIENCE: Duration = Duration::from_secs(3);
+
 /// Pixel bytes of one segment (32 MiB: a whole 3840 x 2160 frame fits). See [`max_lease_rows`].
 pub const MAX_PIXELS_BYTES: usize = 32 << 20;
 

@@ -7,6 +7,7 @@ mod common;
 use bytes::Bytes;
 use rayfarm_protocol::envelope::{Kind, read_body, read_header};
 use rayfarm_protocol::message::Message;
+use rayfarm_protocol::passing::{Fetch, ShareKey, Token, ask, token};
 use rayfarm_protocol::{
     AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, ToMaster, ToWorker,
     Welcome, codec, limits,
@@ -29,7 +30,7 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 
 #[test]
 fn these_bytes_belong_to_this_version() {
-    assert_eq!(PROTOCOL_VERSION, 2);
+    assert_eq!(PROTOCOL_VERSION, 3);
 }
 
 #[tokio::test]
@@ -59,6 +60,12 @@ async fn to_worker() {
     let chunk = ToWorker::AssetChunk { id: ID, offset: 5, bytes: Bytes::from_static(b"xyz") };
     golden(chunk, &[&[43, 0, 0, 0, 0x14, 0, 0, 0], &ID.0, &number, b"xyz"]).await;
     golden(ToWorker::AssetUnknown { id: ID }, &[&[32, 0, 0, 0, 0x15, 0, 0, 0], &ID.0]).await;
+    let peer = ([10, 0, 0, 7], 0x1234).into();
+    let from = ToWorker::AssetFrom { id: ID, size: 5, peer, token: Token([0xcd; 32]) };
+    let v4: &[u8] = &[0, 0, 0, 0, 10, 0, 0, 7, 0x34, 0x12];
+    golden(from, &[&[82, 0, 0, 0, 0x16, 0, 0, 0], &ID.0, &number, v4, &[0xcd; 32]]).await;
+    let key = ToWorker::ShareKey { key: ShareKey([0xef; 32]) };
+    golden(key, &[&[32, 0, 0, 0, 0x17, 0, 0, 0], &[0xef; 32]]).await;
     golden(ToWorker::Ping { nonce: 5 }, &[&[8, 0, 0, 0, 0x30, 0, 0, 0], &number]).await;
     golden(ToWorker::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
     let goodbye = ToWorker::Goodbye { reason: "hé".into(), again: true };
@@ -68,7 +75,10 @@ async fn to_worker() {
 #[tokio::test]
 async fn to_master() {
     let number = [5, 0, 0, 0, 0, 0, 0, 0];
-    golden(ToMaster::NeedAsset { id: ID }, &[&[32, 0, 0, 0, 0x20, 0, 0, 0], &ID.0]).await;
+    let need = ToMaster::NeedAsset { id: ID, offset: 5, again: true };
+    golden(need, &[&[41, 0, 0, 0, 0x20, 0, 0, 0], &ID.0, &number, &[1]]).await;
+    golden(ToMaster::Sharing { port: 0x1234 }, &[&[2, 0, 0, 0, 0x23, 0, 0, 0], &[0x34, 0x12]]).await;
+    golden(ToMaster::HaveAsset { id: ID }, &[&[32, 0, 0, 0, 0x24, 0, 0, 0], &ID.0]).await;
     let rows: [&[u8]; 12] = [
         &[90, 0, 0, 0, 0x21, 0, 0, 0],
         &[4, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0],
@@ -94,6 +104,18 @@ async fn to_master() {
     golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;
     golden(ToMaster::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
     golden(ToMaster::Goodbye { reason: String::new() }, &[&[0, 0, 0, 0, 0x33, 0, 0, 0]]).await;
+}
+
+#[tokio::test]
+async fn what_a_worker_asks_another_for() {
+    let mut bytes = Vec::new();
+    ask(&mut bytes, &Fetch { id: ID, token: Token([0xcd; 32]), offset: 5 }).await.unwrap();
+    let parts: [&[u8]; 4] = [&[72, 0, 0, 0, 0x40, 0, 0, 0], &ID.0, &[0xcd; 32], &[5, 0, 0, 0, 0, 0, 0, 0]];
+    assert_eq!(bytes, parts.concat());
+    let made = token(&ShareKey([0; 32]), ID);
+    assert_eq!(made, Token(blake3::keyed_hash(&[0; 32], &ID.0).into()));
+    assert_ne!(made, token(&ShareKey([1; 32]), ID));
+    assert_eq!(format!("{made:?} {:?}", ShareKey([1; 32])), "Token(..) ShareKey(..)");
 }
 
 #[test]

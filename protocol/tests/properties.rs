@@ -8,6 +8,7 @@ use bytes::Bytes;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use rayfarm_protocol::message::Message;
+use rayfarm_protocol::passing::{ShareKey, Token};
 use rayfarm_protocol::session::spawn;
 use rayfarm_protocol::{
     AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelsHeader, ToMaster,
@@ -37,6 +38,11 @@ fn bytes(sizes: std::ops::Range<usize>) -> impl Strategy<Value = Bytes> {
     vec(any::<u8>(), sizes).prop_map(Bytes::from)
 }
 
+/// The wire carries neither a flow nor a scope.
+fn plain(address: std::net::SocketAddr) -> std::net::SocketAddr {
+    (address.ip(), address.port()).into()
+}
+
 fn to_worker() -> impl Strategy<Value = ToWorker> {
     let side = 1..=limits::MAX_FRAME_SIDE;
     prop_oneof![
@@ -54,6 +60,15 @@ fn to_worker() -> impl Strategy<Value = ToWorker> {
             bytes
         }),
         ids().prop_map(|id| ToWorker::AssetUnknown { id }),
+        (ids(), 0..=limits::MAX_ASSET_BYTES, any::<std::net::SocketAddr>(), any::<[u8; 32]>()).prop_map(
+            |(id, size, peer, token)| ToWorker::AssetFrom {
+                id,
+                size,
+                peer: plain(peer),
+                token: Token(token)
+            }
+        ),
+        any::<[u8; 32]>().prop_map(|key| ToWorker::ShareKey { key: ShareKey(key) }),
         any::<u64>().prop_map(|nonce| ToWorker::Ping { nonce }),
         Just(ToWorker::Drain),
     ]
@@ -70,7 +85,10 @@ fn headers() -> impl Strategy<Value = PixelsHeader> {
 
 fn to_master() -> impl Strategy<Value = ToMaster> {
     prop_oneof![
-        ids().prop_map(|id| ToMaster::NeedAsset { id }),
+        (ids(), 0..=limits::MAX_ASSET_BYTES, any::<bool>())
+            .prop_map(|(id, offset, again)| ToMaster::NeedAsset { id, offset, again }),
+        (1..=u16::MAX).prop_map(|port| ToMaster::Sharing { port }),
+        ids().prop_map(|id| ToMaster::HaveAsset { id }),
         (headers(), bytes(0..3000)).prop_map(|(header, bytes)| ToMaster::Pixels { header, bytes }),
         any::<u64>().prop_map(|nonce| ToMaster::Pong { nonce }),
         (any::<u64>(), "[ -~äöü]{0,200}")

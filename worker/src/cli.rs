@@ -9,7 +9,7 @@ use clap::{Args, Parser, ValueEnum};
 use rayfarm_protocol::Encoding;
 use tracing_subscriber::EnvFilter;
 
-use crate::client::{DiskCacheOptions, WorkerOptions, run};
+use crate::client::{DiskCacheOptions, Share, WorkerOptions, run};
 use crate::disk_cache::user_folder;
 use crate::ending::Ending;
 
@@ -57,6 +57,11 @@ pub struct WorkerArgs {
     #[arg(long, value_name = "HOW", value_enum, default_value_t = PixelEncoding::Auto)]
     pub pixels: PixelEncoding,
 
+    /// Where scenes and meshes are passed on to other workers, so that the master need not send them to each: off, or an
+    /// address and port [default: any free port, for masters on other machines]
+    #[arg(long, value_name = "off|ADDR:PORT", value_parser = share)]
+    pub share: Option<Share>,
+
     /// End when standard input ends: with whoever started this worker
     #[arg(long)]
     pub exit_with_stdin: bool,
@@ -94,6 +99,7 @@ impl WorkerArgs {
             reconnect: !self.no_reconnect,
             asset_cache_bytes: self.asset_cache << 20,
             disk_cache: self.disk_cache(),
+            share: self.share.unwrap_or_default(),
             encoding: match self.pixels {
                 PixelEncoding::Auto => None,
                 PixelEncoding::Raw => Some(Encoding::Raw),
@@ -235,6 +241,14 @@ fn host_and_port(text: &str) -> Result<String, String> {
     match port.parse::<u16>() {
         Ok(1..) => Ok(text.to_owned()),
         _ => Err(format!("{port:?} is no port from 1 to 65535; {form}")),
+    }
+}
+
+fn share(text: &str) -> Result<Share, String> {
+    match (text, text.parse()) {
+        ("off", _) => Ok(Share::Off),
+        (_, Ok(address)) => Ok(Share::At(address)),
+        _ => Err("expected off, or ADDR:PORT as in 192.168.1.20:7200".to_owned()),
     }
 }
 

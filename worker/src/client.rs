@@ -1,22 +1,26 @@
 //! Connects to the master, serves it, and comes back when the connection fails.
 
 use std::io;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_protocol::{Encoding, Hello, Welcome, handshake, tcp};
-use tokio::net::TcpStream;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::task::JoinSet;
 
 use crate::disk_cache::DiskCache;
 use crate::disk_writer::DiskWriter;
-use crate::duty::{End, Keep, Terms, serve};
+use crate::duty::{End, Keep, Sharing, Terms, serve};
 use crate::ending::Ending;
 use crate::error::WorkerError;
 use crate::pause::Pauses;
 use crate::render_pool::RenderPool;
 use crate::renderer::Renderer;
 use crate::scene_loader::SceneLoader;
+use crate::share::share;
+use crate::shelf::Shelf;
 use crate::tracer::TracerRenderer;
 
 /// How long a host may take to accept a connection.
@@ -43,6 +47,20 @@ pub struct WorkerOptions {
     /// How pixels are sent; `None`: in fewer bytes to another machine, and as they are within this one, where that is
     /// quicker than to encode them.
     pub encoding: Option<Encoding>,
+    /// Where scenes and meshes are passed on to other workers, if they are.
+    pub share: Share,
+}
+
+/// Whether a worker passes on what it gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Share {
+    /// At any free port, to a master on another machine; not within this one.
+    #[default]
+    Auto,
+    /// At this address.
+    At(SocketAddr),
+    /// No.
+    Off,
 }
 
 /// A folder of assets for the next run, and for the other workers of this machine.
@@ -123,7 +141,9 @@ async fn attend<R: Renderer>(
         let error = match connected {
             Ok(stream) => {
                 let begun = Instant::now();
-                let terms = terms(options, tcp::is_within_machine(&stream));
+                // Ended with the session.
+                let mut sharers = JoinSet::new();
+                let terms = terms(options, &stream, &mut sharers).await;
                 let end = serve(stream, terms, keep, ending).await;
                 // One that ends as soon as it has begun is no success.
                 if begun.elapsed() > LASTING_SESSION {
@@ -157,10 +177,37 @@ async fn attend<R: Renderer>(
 }
 
 /// Memory is quicker than LZ4, and than most disks.
-fn terms(options: &WorkerOptions, within_machine: bool) -> Terms {
+async fn terms(options: &WorkerOptions, stream: &TcpStream, sharers: &mut JoinSet<()>) -> Terms {
+    let within_machine = tcp::is_within_machine(stream);
     let usual = if within_machine { Encoding::Raw } else { Encoding::Lz4 };
     let uses_disk = options.disk_cache.as_ref().is_some_and(|disk| disk.within_machine || !within_machine);
-    Terms { encoding: options.encoding.unwrap_or(usual), uses_disk }
+    let ours = stream.local_addr().ok().filter(|_| !within_machine);
+    let at = match options.share {
+        Share::Auto => ours.map(|ours| SocketAddr::new(ours.ip(), 0)),
+        Share::At(address) => Some(address),
+        Share::Off => None,
+    };
+    let sharing = match at {
+        Some(at) => begin_to_share(at, sharers).await,
+        None => None,
+    };
+    Terms { encoding: options.encoding.unwrap_or(usual), uses_disk, sharing }
+}
+
+/// Listens for other workers. Where that cannot be, nothing is passed on, and all is well but slower.
+async fn begin_to_share(at: SocketAddr, sharers: &mut JoinSet<()>) -> Option<Sharing> {
+    let bound = TcpListener::bind(at).await;
+    match bound.and_then(|listener| listener.local_addr().map(|address| (listener, address.port()))) {
+        Ok((listener, port)) => {
+            let shelf = Arc::new(Shelf::default());
+            sharers.spawn(share(listener, Arc::clone(&shelf)));
+            Some(Sharing { port, shelf })
+        }
+        Err(error) => {
+            tracing::warn!("nothing is passed on to other workers: cannot listen on {at}: {error}");
+            None
+        }
+    }
 }
 
 fn report(end: &End) {

@@ -5,12 +5,15 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
+use rayfarm_protocol::passing::ShareKey;
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
 
+use crate::fetch::{FromPeer, Peer};
 use crate::frames::{Frames, Verdict};
+use crate::growing::Growing;
 use crate::render_pool::ReadyFrame;
 use crate::renderer::Renderer;
-use crate::scene_loader::{SceneDone, SceneLoader, SceneWork, Step};
+use crate::scene_loader::{SceneDone, SceneLoader, SceneWork, Step, Wish};
 
 /// Something to be done by whoever owns the connection and the threads.
 pub(crate) enum Effect<R: Renderer> {
@@ -20,6 +23,12 @@ pub(crate) enum Effect<R: Renderer> {
     Work(Work<R>),
     /// Keep an asset on the disk.
     Save(AssetId, Bytes),
+    /// Get an asset of that size from another worker, and bring what comes of it to [`Desk::passed`].
+    Fetch { id: AssetId, size: u64, peer: Peer },
+    /// Pass this asset on to whoever the master sends.
+    Shelve(AssetId, Arc<Growing>),
+    /// What the master's tokens are made of.
+    Key(ShareKey),
     /// Render a lease.
     Render { lease: Lease, rows: Range<u32>, frame: Arc<ReadyFrame<R::Frame>>, arrived: Instant },
     /// Forget leases of earlier frames.
@@ -53,8 +62,9 @@ pub(crate) struct Desk<'a, R: Renderer> {
 
 impl<'a, R: Renderer> Desk<'a, R> {
     /// Begins a session with what earlier ones have left in the store, and on the disk if there is one.
-    pub(crate) fn new(loader: &'a mut SceneLoader<R>, has_disk: bool) -> Self {
-        loader.reset(has_disk);
+    /// `shares`: what comes in may be passed on.
+    pub(crate) fn new(loader: &'a mut SceneLoader<R>, has_disk: bool, shares: bool) -> Self {
+        loader.reset(has_disk, shares);
         Self { loader, frames: Frames::new(), effects: Default::default() }
     }
 
@@ -79,10 +89,20 @@ impl<'a, R: Renderer> Desk<'a, R> {
             ToWorker::AssetBegin { id, size } => self.loader.begin(id, size),
             ToWorker::AssetChunk { id, offset, bytes } => self.loader.chunk(id, offset, &bytes),
             ToWorker::AssetUnknown { id } => self.loader.unknown(id),
+            ToWorker::AssetFrom { id, size, peer, token } => {
+                self.loader.begin_from(id, size, Peer { address: peer, token });
+            }
+            ToWorker::ShareKey { key } => self.effects.push_back(Effect::Key(key)),
             ToWorker::Ping { nonce } => self.effects.push_back(Effect::Say(ToMaster::Pong { nonce })),
             ToWorker::Drain => self.effects.push_back(Effect::Drain),
             ToWorker::Goodbye { reason, again } => self.effects.push_back(Effect::End { reason, again }),
         }
+        self.take_steps();
+    }
+
+    /// Another worker passes on an asset, or does not.
+    pub(crate) fn passed(&mut self, from: FromPeer) {
+        self.loader.passed(from);
         self.take_steps();
     }
 
@@ -133,7 +153,12 @@ impl<'a, R: Renderer> Desk<'a, R> {
     fn take_steps(&mut self) {
         while let Some(step) = self.loader.poll_step() {
             match step {
-                Step::Ask(id) => self.effects.push_back(Effect::Say(ToMaster::NeedAsset { id })),
+                Step::Ask(Wish { id, offset, again }) => {
+                    self.effects.push_back(Effect::Say(ToMaster::NeedAsset { id, offset, again }));
+                }
+                Step::Fetch { id, size, peer } => self.effects.push_back(Effect::Fetch { id, size, peer }),
+                Step::Shelve(id, bytes) => self.effects.push_back(Effect::Shelve(id, bytes)),
+                Step::Taken(id) => self.effects.push_back(Effect::Say(ToMaster::HaveAsset { id })),
                 Step::Save(id, bytes) => self.effects.push_back(Effect::Save(id, bytes)),
                 Step::Work(work) => self.effects.push_back(Effect::Work(Work::Scene(work))),
                 Step::Ready(id, scene) => {

@@ -15,14 +15,19 @@ use crate::desk::{Desk, Done, Effect, Work};
 use crate::disk_cache::DiskCache;
 use crate::disk_writer::DiskWriter;
 use crate::ending::Ending;
+use crate::fetch::{FromPeer, fetch};
 use crate::guard::guarded;
 use crate::render_pool::{Answers, PoolJob, RenderPool};
 use crate::renderer::Renderer;
 use crate::scene_loader::{SceneDone, SceneLoader, SceneWork};
+use crate::shelf::Shelf;
 use crate::silence::{LOOK_EVERY, Silence};
 
 /// Finished segments between the render threads and the session's own queue.
 const UNSENT_SEGMENTS: usize = 8;
+
+/// Parts of assets from other workers that were not looked at yet.
+const UNREAD_CHUNKS: usize = 8;
 
 /// Pieces of blocking work at a time; while there are more, the master is not listened to.
 const MAX_WORK: usize = 64;
@@ -42,12 +47,21 @@ pub(crate) struct Keep<R: Renderer> {
 }
 
 /// What depends on where the master is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Terms {
     /// How pixels are written where that makes them fewer bytes.
     pub(crate) encoding: Encoding,
     /// Whether assets are kept on the disk.
     pub(crate) uses_disk: bool,
+    /// Where assets are passed on, if they are.
+    pub(crate) sharing: Option<Sharing>,
+}
+
+/// What is passed on, and where others ask for it.
+#[derive(Clone, Debug)]
+pub(crate) struct Sharing {
+    pub(crate) port: u16,
+    pub(crate) shelf: Arc<Shelf>,
 }
 
 /// How a session ended.
@@ -72,14 +86,16 @@ where
     let (sender, receiver, traffic) = session::spawn(io);
     let Keep { renderer, pool, loader, disk } = keep;
     let disk = disk.as_ref().filter(|_| terms.uses_disk);
-    let (desk, work) = (Desk::new(loader, disk.is_some()), JoinSet::new());
+    let desk = Desk::new(loader, disk.is_some(), terms.sharing.is_some());
     let duty = Duty {
         renderer,
         pool,
         disk,
         desk,
         sender: sender.clone(),
-        work,
+        work: JoinSet::new(),
+        fetches: JoinSet::new(),
+        sharing: terms.sharing,
         encoding: terms.encoding,
         ending,
         traffic,
@@ -115,6 +131,9 @@ struct Duty<'a, R: Renderer> {
     desk: Desk<'a, R>,
     sender: Sender<ToMaster>,
     work: JoinSet<Done<R>>,
+    /// Assets that other workers pass on.
+    fetches: JoinSet<()>,
+    sharing: Option<Sharing>,
     encoding: Encoding,
     ending: &'a Ending,
     traffic: Arc<Traffic>,
@@ -128,6 +147,11 @@ impl<R: Renderer> Duty<'_, R> {
         let mut answers = Some(Answers { pixels, failures, encoding: self.encoding });
         let mut mailman = JoinSet::new();
         mailman.spawn(send_finished(finished, self.sender.clone()));
+        let (from_peers, mut passed) = mpsc::channel(UNREAD_CHUNKS);
+        if let Some(Sharing { port, shelf }) = &self.sharing {
+            shelf.clear();
+            self.say(ToMaster::Sharing { port: *port }).await;
+        }
         let mut draining = false;
         let mut has_asked_to_drain = false;
         let (mut silence, mut looks) = (Silence::default(), interval(LOOK_EVERY));
@@ -143,7 +167,7 @@ impl<R: Renderer> Duty<'_, R> {
                     Effect::End { reason, .. } => return End::Goodbye(reason),
                     Effect::Say(message) => self.say(message).await,
                     effect => {
-                        if let Err(why) = self.perform(effect, answers.as_ref()) {
+                        if let Err(why) = self.perform(effect, answers.as_ref(), &from_peers) {
                             return End::Lost(why);
                         }
                     }
@@ -163,6 +187,8 @@ impl<R: Renderer> Duty<'_, R> {
                     // Panics are caught inside, and nobody cancels: the runtime is shutting down.
                     Err(error) => tracing::debug!("work was not finished: {error}"),
                 },
+                Some(from) = passed.recv() => self.desk.passed(from),
+                Some(_) = self.fetches.join_next() => {}
                 Some((frame, reason)) = failed.recv() => self.desk.frame_failed(frame, reason),
                 Some(_) = mailman.join_next(), if answers.is_none() => return End::Drained,
                 () = self.ending.draining(), if !has_asked_to_drain => {
@@ -172,6 +198,9 @@ impl<R: Renderer> Duty<'_, R> {
                 }
                 // While we do not listen it is our own silence.
                 _ = looks.tick(), if self.work.len() < MAX_WORK => {
+                    if let Some(Sharing { shelf, .. }) = &self.sharing {
+                        shelf.tidy(Instant::now());
+                    }
                     if silence.is_too_long(self.traffic.received_bytes()) {
                         return End::Lost(Silence::reason());
                     }
@@ -180,7 +209,12 @@ impl<R: Renderer> Duty<'_, R> {
         }
     }
 
-    fn perform(&mut self, effect: Effect<R>, answers: Option<&Answers>) -> Result<(), String> {
+    fn perform(
+        &mut self,
+        effect: Effect<R>,
+        answers: Option<&Answers>,
+        from_peers: &mpsc::Sender<FromPeer>,
+    ) -> Result<(), String> {
         match effect {
             Effect::Work(work) => {
                 let renderer = Arc::clone(self.renderer);
@@ -190,6 +224,19 @@ impl<R: Renderer> Duty<'_, R> {
             Effect::Save(id, bytes) => {
                 if let Some(disk) = self.disk {
                     disk.save(id, bytes);
+                }
+            }
+            Effect::Fetch { id, size, peer } => {
+                self.fetches.spawn(fetch(id, size, peer, from_peers.clone()));
+            }
+            Effect::Shelve(id, bytes) => {
+                if let Some(Sharing { shelf, .. }) = &self.sharing {
+                    shelf.put(id, bytes);
+                }
+            }
+            Effect::Key(key) => {
+                if let Some(Sharing { shelf, .. }) = &self.sharing {
+                    shelf.set_key(key);
                 }
             }
             Effect::Render { lease, rows, frame, arrived } => {

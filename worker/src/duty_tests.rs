@@ -281,7 +281,7 @@ async fn a_master_that_vanishes_or_babbles_is_lost_with_the_reason() {
     use tokio::io::AsyncWriteExt;
     let (mut ours, theirs) = tokio::io::duplex(1 << 10);
     ours.write_all(b"HTTP/1.1 200 OK\r\n\r\n").await.unwrap();
-    let terms = Terms { encoding: Encoding::Raw, uses_disk: false };
+    let terms = Terms { encoding: Encoding::Raw, uses_disk: false, sharing: None };
     let end = crate::duty::serve(theirs, terms, &mut keep(1, PLENTY).0, &Ending::new()).await;
     assert!(matches!(&end, End::Lost(why) if why.contains("unknown type")), "{end:?}");
 }

@@ -6,8 +6,9 @@
 //! 2. `desk` takes the master's messages and decides what they lead to. It is pure: no socket, no thread, no clock.
 //! 3. `scene_loader` fetches a scene by hash (`transfer`), keeps it (`asset_store`), and leaves its assets to later runs (`disk_cache`); `frames` holds the leases of a
 //!    frame until it is ready.
-//! 4. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads, hands out leases.
-//! 5. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
+//! 4. What comes in may be passed on: `fetch` gets an asset from another worker, `share` gives what is on the `shelf`.
+//! 5. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads, hands out leases.
+//! 6. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
 //!
 //! What is drawn, and how, is behind [`Renderer`]; the real one is [`TracerRenderer`].
 
@@ -25,20 +26,26 @@ mod duty;
 mod duty_tests;
 mod ending;
 mod error;
+mod fetch;
 mod frames;
+mod growing;
 mod guard;
 mod job_queue;
 mod pause;
 mod render_pool;
 mod renderer;
 mod scene_loader;
+mod share;
+#[cfg(test)]
+mod share_tests;
+mod shelf;
 mod silence;
 #[cfg(test)]
 mod testing;
 mod tracer;
 mod transfer;
 
-pub use client::{DiskCacheOptions, WorkerOptions, run, run_with};
+pub use client::{DiskCacheOptions, Share, WorkerOptions, run, run_with};
 pub use ending::Ending;
 pub use error::WorkerError;
 pub use renderer::{Cancelled, Counts, Renderer};

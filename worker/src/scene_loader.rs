@@ -7,66 +7,22 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use bytes::Bytes;
-use rayfarm_protocol::{AssetId, limits};
+use rayfarm_protocol::AssetId;
 
 use crate::asset_store::AssetStore;
 use crate::renderer::Renderer;
-use crate::transfer::{Transfer, TransferError};
+
+mod arrivals;
+mod step;
+
+use arrivals::Arrival;
+pub(crate) use step::{SceneDone, SceneWork, Step, Wish};
 
 /// Assets that are asked for at a time: the next one is on its way while one is decoded.
 const MAX_ASKED: usize = 4;
 
 /// Failed scenes that are remembered, so that they are not fetched again for every frame.
 const MAX_REFUSED: usize = 64;
-
-/// Something to be done, or known.
-pub(crate) enum Step<R: Renderer> {
-    /// Ask the master for an asset.
-    Ask(AssetId),
-    /// Do this on a blocking thread.
-    Work(SceneWork<R>),
-    /// Keep this asset on the disk, when there is time.
-    Save(AssetId, Bytes),
-    /// Frames of this scene can be prepared.
-    Ready(AssetId, Arc<R::Scene>),
-    /// Frames of this scene cannot be rendered here.
-    Failed(AssetId, String),
-}
-
-/// Work that takes its time.
-pub(crate) enum SceneWork<R: Renderer> {
-    /// See whether the disk has it.
-    Find {
-        id: AssetId,
-    },
-    /// Read it from there.
-    Read {
-        id: AssetId,
-        size: u64,
-    },
-    DecodeScene {
-        id: AssetId,
-        body: Bytes,
-    },
-    DecodePart {
-        id: AssetId,
-        bytes: Bytes,
-    },
-    Compile {
-        id: AssetId,
-        draft: R::Draft,
-        parts: Vec<Arc<R::Part>>,
-    },
-}
-
-/// What became of it.
-pub(crate) enum SceneDone<R: Renderer> {
-    Found { id: AssetId, size: Option<u64> },
-    Read { id: AssetId, bytes: Option<Vec<u8>> },
-    SceneDecoded { id: AssetId, result: Result<(R::Draft, Vec<AssetId>), String> },
-    PartDecoded { id: AssetId, result: Result<R::Part, String> },
-    Compiled { id: AssetId, result: Result<R::Scene, String> },
-}
 
 enum Stored<R: Renderer> {
     Part(Arc<R::Part>),
@@ -81,7 +37,7 @@ enum Incoming {
     /// Read from there.
     Reading,
     Asked,
-    Arriving(Transfer),
+    Arriving(Arrival),
     Decoding,
 }
 
@@ -104,6 +60,8 @@ pub(crate) struct SceneLoader<R: Renderer> {
     steps: VecDeque<Step<R>>,
     /// Whether there is a disk to look at first.
     has_disk: bool,
+    /// Whether what comes in may be passed on.
+    shares: bool,
 }
 
 impl<R: Renderer> SceneLoader<R> {
@@ -117,12 +75,13 @@ impl<R: Renderer> SceneLoader<R> {
             current: BTreeSet::new(),
             steps: VecDeque::new(),
             has_disk: false,
+            shares: false,
         }
     }
 
     /// A new session: nothing is on its way any more, and what failed may succeed.
-    pub(crate) fn reset(&mut self, has_disk: bool) {
-        self.has_disk = has_disk;
+    pub(crate) fn reset(&mut self, has_disk: bool, shares: bool) {
+        (self.has_disk, self.shares) = (has_disk, shares);
         self.incoming.clear();
         self.wishes.clear();
         self.loads.clear();
@@ -191,7 +150,7 @@ impl<R: Renderer> SceneLoader<R> {
 
     fn ask_master(&mut self, id: AssetId) {
         self.incoming.insert(id, (Incoming::Asked, 0));
-        self.steps.push_back(Step::Ask(id));
+        self.steps.push_back(Step::Ask(Wish { id, offset: 0, again: false }));
     }
 
     /// What the disk has of an asset. One that does not fit is the master's to announce: only its size is to be believed.
@@ -215,79 +174,6 @@ impl<R: Renderer> SceneLoader<R> {
         match bytes {
             Some(bytes) => self.decode(id, bytes.into()),
             None => self.ask_master(id),
-        }
-        self.ask();
-    }
-
-    /// The master announces an asset.
-    pub(crate) fn begin(&mut self, id: AssetId, size: u64) {
-        if !matches!(self.incoming.get(&id), Some((Incoming::Asked, _))) {
-            tracing::warn!("the master sends asset {id}, which was not asked for; it is not kept");
-            return;
-        }
-        let begun = self.admit(id, size).and_then(|()| Transfer::begin(id, size).map_err(|e| e.to_string()));
-        match begun {
-            Ok(transfer) => {
-                self.incoming.insert(id, (Incoming::Arriving(transfer), size));
-                self.complete(id);
-            }
-            Err(reason) => self.fail(id, &reason),
-        }
-    }
-
-    /// Makes room for an asset of that size.
-    fn admit(&mut self, id: AssetId, size: u64) -> Result<(), String> {
-        if self.loads.contains_key(&id) && size > limits::MAX_DECODE_BYTES as u64 {
-            let limit = limits::MAX_DECODE_BYTES;
-            return Err(format!("the scene body has {size} bytes, at most {limit} are decoded"));
-        }
-        let reserved: u64 = self.incoming.values().map(|(_, bytes)| bytes).sum();
-        let needed = self.in_use();
-        if !self.store.make_room(size, reserved, &needed) {
-            let limit_mib = self.store.limit_bytes() >> 20;
-            return Err(format!(
-                "the scene's assets need more than the {limit_mib} MiB that this worker keeps; \
-                 start it with a larger --asset-cache"
-            ));
-        }
-        Ok(())
-    }
-
-    /// A part of an asset. Parts of what was given up meanwhile are dropped.
-    pub(crate) fn chunk(&mut self, id: AssetId, offset: u64, bytes: &[u8]) {
-        let Some((Incoming::Arriving(transfer), _)) = self.incoming.get_mut(&id) else { return };
-        match transfer.chunk(offset, bytes) {
-            Ok(()) => self.complete(id),
-            Err(error) => self.fail(id, &error.to_string()),
-        }
-    }
-
-    /// The master does not have an asset.
-    pub(crate) fn unknown(&mut self, id: AssetId) {
-        if self.incoming.contains_key(&id) {
-            self.fail(id, &format!("the master does not have asset {id}"));
-        }
-    }
-
-    /// Hands a complete asset to be decoded; its bytes stay reserved until that is done.
-    fn complete(&mut self, id: AssetId) {
-        let Some((state, _)) = self.incoming.get_mut(&id) else { return };
-        if !matches!(state, Incoming::Arriving(transfer) if transfer.is_complete()) {
-            return;
-        }
-        let Incoming::Arriving(transfer) = std::mem::replace(state, Incoming::Decoding) else { return };
-        match transfer.finish() {
-            Ok(bytes) => {
-                let bytes = Bytes::from(bytes);
-                self.decode(id, bytes.clone());
-                if self.has_disk {
-                    self.steps.push_back(Step::Save(id, bytes));
-                }
-            }
-            Err(error @ TransferError::Damaged { .. }) => {
-                self.fail(id, &format!("{error}; the master's memory or its software is at fault"));
-            }
-            Err(error) => self.fail(id, &error.to_string()),
         }
         self.ask();
     }

@@ -14,7 +14,7 @@ use tokio::task::JoinHandle;
 
 use crate::disk_cache::DiskCache;
 use crate::disk_writer::DiskWriter;
-use crate::duty::{End, Keep, Terms, serve};
+use crate::duty::{End, Keep, Sharing, Terms, serve};
 use crate::ending::Ending;
 use crate::render_pool::RenderPool;
 use crate::renderer::{Cancelled, Counts, Renderer};
@@ -156,12 +156,17 @@ pub(crate) struct Master {
 
 impl Master {
     /// Starts a session with a worker that keeps what it has.
-    pub(crate) fn meet(mut keep: Keep<Fake>, assets: &[&[u8]]) -> Self {
+    pub(crate) fn meet(keep: Keep<Fake>, assets: &[&[u8]]) -> Self {
+        Self::meet_sharing(keep, assets, None)
+    }
+
+    /// The same with a worker that passes assets on.
+    pub(crate) fn meet_sharing(mut keep: Keep<Fake>, assets: &[&[u8]], sharing: Option<Sharing>) -> Self {
         let (ours, theirs) = tokio::io::duplex(1 << 16);
         let ending = Ending::new();
         let told = ending.clone();
         let worker = tokio::spawn(async move {
-            let terms = Terms { encoding: Encoding::Raw, uses_disk: keep.disk.is_some() };
+            let terms = Terms { encoding: Encoding::Raw, uses_disk: keep.disk.is_some(), sharing };
             let end = serve(theirs, terms, &mut keep, &told).await;
             (end, keep)
         });
@@ -191,23 +196,37 @@ impl Master {
     pub(crate) async fn hear(&mut self) -> Option<ToMaster> {
         loop {
             match self.inbox.recv().await?.unwrap() {
-                ToMaster::NeedAsset { id } => self.send_asset(id).await,
+                ToMaster::NeedAsset { id, offset, .. } => self.send_asset(id, offset).await,
                 message => return Some(message),
             }
         }
     }
 
-    async fn send_asset(&mut self, id: AssetId) {
+    /// Sends an asset from some byte on.
+    pub(crate) async fn send_asset(&mut self, id: AssetId, first: u64) {
         self.asked.push(id);
         let Some((_, bytes)) = self.assets.iter().find(|(known, _)| *known == id) else {
             self.say(ToWorker::AssetUnknown { id }).await;
             return;
         };
         self.say(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await;
-        let parts = bytes.chunks(7).enumerate();
-        let parts: Vec<_> = parts.map(|(i, part)| (i as u64 * 7, Bytes::copy_from_slice(part))).collect();
+        let piece = if bytes.len() > 1000 { 100_000 } else { 7 };
+        let parts = bytes[first as usize..].chunks(piece).enumerate();
+        let parts = parts.map(|(i, part)| (first + (i * piece) as u64, Bytes::copy_from_slice(part)));
+        let parts: Vec<_> = parts.collect();
         for (offset, bytes) in parts {
             self.say(ToWorker::AssetChunk { id, offset, bytes }).await;
+        }
+    }
+
+    /// The next wish for an asset, which is not fulfilled: which one, from where on, and whether it was let down.
+    pub(crate) async fn wish(&mut self) -> (AssetId, u64, bool) {
+        loop {
+            match self.inbox.recv().await.unwrap().unwrap() {
+                ToMaster::NeedAsset { id, offset, again } => return (id, offset, again),
+                ToMaster::Pong { .. } => {}
+                other => panic!("a wish was expected, not {other:?}"),
+            }
         }
     }
 

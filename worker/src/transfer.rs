@@ -1,6 +1,11 @@
 //! An asset on its way in: one buffer of the announced size, filled from front to back, hashed as it fills.
 
+use std::sync::Arc;
+
+use bytes::Bytes;
 use rayfarm_protocol::AssetId;
+
+use crate::growing::Growing;
 
 /// What is wrong with an incoming asset.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -15,11 +20,10 @@ pub(crate) enum TransferError {
     Damaged { id: AssetId, found: AssetId },
 }
 
-/// A buffer that fills.
+/// A buffer that fills. Dropped before it is whole, it is abandoned: nobody reads of it any more.
 pub(crate) struct Transfer {
     id: AssetId,
-    size: usize,
-    bytes: Vec<u8>,
+    bytes: Arc<Growing>,
     /// Boxed: it is two kilobytes.
     hasher: Box<blake3::Hasher>,
 }
@@ -27,36 +31,46 @@ pub(crate) struct Transfer {
 impl Transfer {
     /// Reserves the announced size, which the caller has found to be within the cache's bound.
     pub(crate) fn begin(id: AssetId, size: u64) -> Result<Self, TransferError> {
-        let no_memory = TransferError::NoMemory(size);
-        let Ok(size) = usize::try_from(size) else { return Err(no_memory) };
-        let mut bytes = Vec::new();
-        bytes.try_reserve_exact(size).map_err(|_| no_memory)?;
-        Ok(Self { id, size, bytes, hasher: Box::new(blake3::Hasher::new()) })
+        let bytes = usize::try_from(size).ok().and_then(Growing::new);
+        let bytes = bytes.ok_or(TransferError::NoMemory(size))?;
+        Ok(Self { id, bytes, hasher: Box::new(blake3::Hasher::new()) })
+    }
+
+    /// What is there of it, for others to read.
+    pub(crate) fn bytes(&self) -> &Arc<Growing> {
+        &self.bytes
     }
 
     /// Takes the next part.
     pub(crate) fn chunk(&mut self, offset: u64, part: &[u8]) -> Result<(), TransferError> {
-        let (id, expected) = (self.id, self.bytes.len() as u64);
-        if offset != expected {
-            return Err(TransferError::Order { id, offset, expected });
+        let (id, size, len) = (self.id, self.bytes.size(), self.bytes.len());
+        if offset != len as u64 {
+            return Err(TransferError::Order { id, offset, expected: len as u64 });
         }
-        if part.len() > self.size - self.bytes.len() {
-            return Err(TransferError::TooMany { id, size: self.size as u64 });
+        if part.len() > size - len {
+            return Err(TransferError::TooMany { id, size: size as u64 });
         }
-        self.bytes.extend_from_slice(part);
         self.hasher.update(part);
+        self.bytes.push(part);
         Ok(())
     }
 
     /// Whether all announced bytes are there.
     pub(crate) fn is_complete(&self) -> bool {
-        self.bytes.len() == self.size
+        self.bytes.len() == self.bytes.size()
     }
 
     /// The bytes, if they are those that were asked for.
-    pub(crate) fn finish(self) -> Result<Vec<u8>, TransferError> {
+    pub(crate) fn finish(self) -> Result<Bytes, TransferError> {
         let found = AssetId(self.hasher.finalize().into());
-        if found == self.id { Ok(self.bytes) } else { Err(TransferError::Damaged { id: self.id, found }) }
+        let whole = if found == self.id { self.bytes.finish() } else { None };
+        whole.ok_or(TransferError::Damaged { id: self.id, found })
+    }
+}
+
+impl Drop for Transfer {
+    fn drop(&mut self) {
+        self.bytes.abandon();
     }
 }
 
@@ -74,8 +88,7 @@ mod tests {
             transfer.chunk(index as u64 * 5, part).unwrap();
         }
         assert!(transfer.is_complete());
-        let bytes = transfer.finish().unwrap();
-        assert_eq!((bytes.as_slice(), bytes.capacity()), (BYTES, BYTES.len()));
+        assert_eq!(transfer.finish().unwrap(), BYTES);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 mod common;
 
 use rayfarm_protocol::{Encoding, PROTOCOL_VERSION, ToMaster, ToWorker, handshake};
-use rayfarm_worker::{Ending, WorkerError, WorkerOptions, run};
+use rayfarm_worker::{Ending, Share, WorkerError, WorkerOptions, run};
 use tokio::io::AsyncWriteExt;
 
 use common::{Link, Stage, listen};
@@ -18,6 +18,7 @@ fn options(master: &str) -> WorkerOptions {
         asset_cache_bytes: 1 << 20,
         encoding: None,
         disk_cache: None,
+        share: Share::Off,
     }
 }
 

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::values::{Size, frame_count, size};
 use crate::farm::SegmentPolicy;
-use crate::simulator::Setup;
+use crate::simulator::{PassingSetup, Setup};
 
 /// Workers that are simulated at most.
 const MAX_WORKERS: i64 = 4096;
@@ -73,6 +73,9 @@ pub(crate) struct SimulateArgs {
     /// What everything random follows from.
     #[arg(long, value_name = "N", default_value = "1")]
     pub(crate) seed: u64,
+    /// Send an asset of so many megabytes to all workers instead: from the master alone, and passed on.
+    #[arg(long, value_name = "MB", conflicts_with = "faults", value_parser = megabytes)]
+    asset: Option<f64>,
     /// Live through fault schedules instead, from --seed on: each chooses everything but the seed itself.
     #[arg(long)]
     pub(crate) faults: bool,
@@ -97,9 +100,28 @@ pub(crate) enum Profile {
 }
 
 impl SimulateArgs {
+    /// The asset to send, from the master alone and passed on, for each number of workers.
+    pub(crate) fn assets(&self) -> Vec<[PassingSetup; 2]> {
+        let Some(megabytes) = self.asset else { return Vec::new() };
+        let setup = |workers, pass_on| PassingSetup {
+            workers,
+            asset_bytes: (megabytes * 1e6) as u64,
+            pass_on,
+            link_bits: self.link,
+            round_trip: (self.rtt * 1e6) as u64,
+            deaths: 0,
+            hangs: 0,
+            seed: self.seed,
+        };
+        self.counts().into_iter().map(|workers| [setup(workers, false), setup(workers, true)]).collect()
+    }
+
+    fn counts(&self) -> Vec<u32> {
+        if self.sweep.is_empty() { vec![self.workers] } else { self.sweep.clone() }
+    }
+
     /// What to measure, but for the costs of rows: one setup for each number of workers.
     pub(crate) fn setups(&self) -> Vec<Setup> {
-        let counts = if self.sweep.is_empty() { vec![self.workers] } else { self.sweep.clone() };
         let setup = Setup {
             threads: self.threads,
             spread: self.speeds,
@@ -118,7 +140,7 @@ impl SimulateArgs {
             seed: self.seed,
             ..Setup::default()
         };
-        counts.into_iter().map(|workers| Setup { workers, ..setup.clone() }).collect()
+        self.counts().into_iter().map(|workers| Setup { workers, ..setup.clone() }).collect()
     }
 }
 
@@ -129,6 +151,10 @@ fn number(text: &str, fits: impl Fn(f64) -> bool, expected: &str) -> Result<f64,
 
 fn positive(text: &str) -> Result<f64, String> {
     number(text, |number| number > 0.0, "a number above 0")
+}
+
+fn megabytes(text: &str) -> Result<f64, String> {
+    number(text, |number| number > 0.0 && number <= 2048.0, "a number above 0, up to 2048")
 }
 
 fn share(text: &str) -> Result<f64, String> {

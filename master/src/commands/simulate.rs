@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use crate::cli::{Profile, SimulateArgs};
 use crate::error::CommandError;
-use crate::simulator::{CostProfile, Measured, Schedule, Setup, Survivor, measure, survive};
+use crate::simulator::{
+    CostProfile, Measured, Passed, PassingSetup, Schedule, Setup, Survivor, measure, pass, survive,
+};
 
 /// A line of JSON: what was simulated, and what came of it.
 #[derive(Serialize)]
@@ -19,6 +21,15 @@ struct Line<'a> {
     seed: u64,
     #[serde(flatten)]
     measured: &'a Measured,
+}
+
+/// A line of JSON about an asset that was sent to all workers.
+#[derive(Serialize)]
+struct PassedLine {
+    workers: u32,
+    seed: u64,
+    alone: Passed,
+    passed_on: Passed,
 }
 
 /// A line of JSON about fault schedules that were survived.
@@ -37,7 +48,29 @@ struct Survived {
 /// # Errors
 /// Costs of rows that cannot be read; an invariant that does not hold, with the command that shows it again.
 pub(super) fn run(args: &SimulateArgs) -> Result<(), CommandError> {
-    if args.faults { live_through(args) } else { measure_all(args) }
+    match (args.faults, args.assets()) {
+        (true, _) => live_through(args),
+        (false, assets) if assets.is_empty() => measure_all(args),
+        (false, assets) => pass_all(args, assets),
+    }
+}
+
+/// How long an asset takes to all workers, and how often the master sends it.
+fn pass_all(args: &SimulateArgs, assets: Vec<[PassingSetup; 2]>) -> Result<(), CommandError> {
+    if !args.json {
+        tell("workers  from the master alone        passed on")?;
+    }
+    for setups in assets {
+        let workers = setups[0].workers;
+        let [alone, passed_on] = setups.map(|setup| pass(&setup));
+        if args.json {
+            tell_json(&PassedLine { workers, seed: args.seed, alone, passed_on })?;
+        } else {
+            let told = |p: Passed| format!("{:8.2} s, {:6.2} copies", p.seconds, p.master_copies);
+            tell(&format!("{workers:7}  {}   {}", told(alone), told(passed_on)))?;
+        }
+    }
+    Ok(())
 }
 
 fn measure_all(args: &SimulateArgs) -> Result<(), CommandError> {

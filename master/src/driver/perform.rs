@@ -95,6 +95,6 @@ impl Driver {
 }
 
 /// Queues a message; what comes of it when it cannot be.
-fn send(inner: &mut Inner, worker: WorkerId, message: ToWorker) -> Option<Event> {
+pub(super) fn send(inner: &mut Inner, worker: WorkerId, message: ToWorker) -> Option<Event> {
     inner.roster.send(worker, message).err().map(|Unreachable| Event::WorkerLeft { worker })
 }

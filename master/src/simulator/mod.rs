@@ -14,6 +14,7 @@ mod dice;
 mod faults;
 mod link;
 mod machine;
+mod passing;
 mod pictures;
 mod post;
 mod render;
@@ -26,6 +27,7 @@ mod world;
 mod tests;
 
 pub use costs::CostProfile;
+pub use passing::{Passed, PassingSetup, pass};
 pub use survival::{Schedule, Survivor, survive};
 pub use tally::Measured;
 

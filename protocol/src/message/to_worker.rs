@@ -1,11 +1,14 @@
 //! What a master says.
 
+use std::net::SocketAddr;
+
 use bytes::{Buf, BufMut, Bytes};
 
 use super::body::{decode_control, decode_reason, encode_control, encode_reason, nothing, split_head};
 use super::{FrameAnnounce, Message};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
+use crate::passing::{ShareKey, Token};
 use crate::{AssetId, FrameId, Lease, ProtocolError};
 
 /// What a master says to a worker.
@@ -35,6 +38,22 @@ pub enum ToWorker {
         offset: u64,
         /// 1 to [`MAX_CHUNK_BYTES`] of them.
         bytes: Bytes,
+    },
+    /// Get the asset that you asked for from this worker.
+    AssetFrom {
+        /// Its name.
+        id: AssetId,
+        /// All its bytes, at most [`MAX_ASSET_BYTES`].
+        size: u64,
+        /// Where the worker listens.
+        peer: SocketAddr,
+        /// What opens the asset there.
+        token: Token,
+    },
+    /// Answers [`crate::ToMaster::Sharing`]: pass on what a token made with this key is shown for.
+    ShareKey {
+        /// The key, of this session.
+        key: ShareKey,
     },
     /// The master does not have the asset that the worker asked for.
     AssetUnknown {
@@ -67,8 +86,10 @@ impl Message for ToWorker {
         match kind {
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping | Kind::Drain | Kind::Goodbye => true,
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => true,
+            Kind::AssetFrom | Kind::ShareKey => true,
             Kind::Hello | Kind::Welcome | Kind::Refused => false,
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => false,
+            Kind::Sharing | Kind::HaveAsset | Kind::Fetch => false,
         }
     }
 
@@ -80,6 +101,10 @@ impl Message for ToWorker {
             Self::AssetBegin { id, size } => encode_control(Kind::AssetBegin, &(id, checked_size(*size)?)),
             Self::AssetChunk { id, offset, bytes } => encode_chunk(*id, *offset, bytes),
             Self::AssetUnknown { id } => encode_control(Kind::AssetUnknown, id),
+            Self::AssetFrom { id, size, peer, token } => {
+                encode_control(Kind::AssetFrom, &(id, checked_size(*size)?, peer, token))
+            }
+            Self::ShareKey { key } => encode_control(Kind::ShareKey, key),
             Self::Ping { nonce } => encode_control(Kind::Ping, nonce),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
             Self::Goodbye { reason, again } => encode_reason(Kind::Goodbye, &[u8::from(*again)], reason),
@@ -97,11 +122,17 @@ impl Message for ToWorker {
             }
             Kind::AssetChunk => decode_chunk(body)?,
             Kind::AssetUnknown => Self::AssetUnknown { id: decode_control(kind, &body)? },
+            Kind::AssetFrom => {
+                let (id, size, peer, token) = decode_control(kind, &body)?;
+                Self::AssetFrom { id, size: checked_size(size)?, peer, token }
+            }
+            Kind::ShareKey => Self::ShareKey { key: decode_control(kind, &body)? },
             Kind::Ping => Self::Ping { nonce: decode_control(kind, &body)? },
             Kind::Drain => nothing(kind, &body).map(|()| Self::Drain)?,
             Kind::Goodbye => decode_goodbye(body)?,
             Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => return Err(unexpected(kind)),
+            Kind::Sharing | Kind::HaveAsset | Kind::Fetch => return Err(unexpected(kind)),
         })
     }
 }

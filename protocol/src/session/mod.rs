@@ -106,6 +106,7 @@ fn is_bulk(kind: Kind) -> bool {
         Kind::AssetBegin | Kind::AssetChunk | Kind::Pixels | Kind::Goodbye => true,
         Kind::Hello | Kind::Welcome | Kind::Refused => false,
         Kind::Frame | Kind::Segment | Kind::Cancel | Kind::AssetUnknown => false,
+        Kind::AssetFrom | Kind::ShareKey | Kind::Sharing | Kind::HaveAsset | Kind::Fetch => false,
         Kind::NeedAsset | Kind::Failed | Kind::Ping | Kind::Pong | Kind::Drain => false,
     }
 }

@@ -152,7 +152,7 @@ impl Link {
     pub(crate) async fn hear(&mut self, stage: &Stage) -> Option<ToMaster> {
         loop {
             let id = match self.inbox.recv().await?.unwrap() {
-                ToMaster::NeedAsset { id } => id,
+                ToMaster::NeedAsset { id, .. } => id,
                 message => return Some(message),
             };
             self.asked += 1;

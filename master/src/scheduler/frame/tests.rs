@@ -1,0 +1,104 @@
+//! Rows that are leased, come back, are done, and are rejected.
+
+use super::super::forecast::Tiles;
+use super::*;
+
+const A: WorkerId = WorkerId(1);
+const B: WorkerId = WorkerId(2);
+
+fn frame(rows: u32) -> Frame {
+    let forecast = Forecast::new(vec![1.0; rows as usize], Tiles { rows: 16, share: 0.0 });
+    Frame::new(FrameId(7), (10, rows), forecast, [Run::new(0, rows)])
+}
+
+#[test]
+fn rows_that_come_back_keep_their_number_and_go_first() {
+    let mut frame = frame(30);
+    let lost = frame.take(A, 10).unwrap();
+    frame.take(B, 10).unwrap();
+    frame.give_up(lost.segment, A);
+    let again = frame.take(B, 10).unwrap();
+    assert_eq!(again, Lease { attempt: 1, ..lost });
+}
+
+#[test]
+fn pieces_of_rows_that_come_back_are_new_segments() {
+    let mut frame = frame(20);
+    let lost = frame.take(A, 20).unwrap();
+    frame.give_up(lost.segment, A);
+    let pieces = [frame.take(A, 8).unwrap(), frame.take(A, 20).unwrap()];
+    assert_eq!(
+        pieces.map(|p| (p.segment, p.attempt, p.first_row, p.row_count)),
+        [(1, 0, 0, 8), (2, 0, 8, 12)]
+    );
+}
+
+#[test]
+fn a_segment_somebody_else_renders_is_not_queued_again() {
+    let mut frame = frame(8);
+    let lease = frame.take(A, 8).unwrap();
+    let copy = frame.copy(lease.segment, B).unwrap();
+    assert_eq!(copy.attempt, 1);
+    frame.give_up(lease.segment, A);
+    assert!(frame.queue.is_empty());
+    frame.give_up(lease.segment, B);
+    assert_eq!(frame.queue.len(), 1);
+}
+
+#[test]
+fn only_the_first_result_counts() {
+    let mut frame = frame(8);
+    let lease = frame.take(A, 8).unwrap();
+    frame.copy(lease.segment, B).unwrap();
+    let cost = Cost { primary: 80, ..Cost::default() };
+    assert_eq!(frame.finish(&lease, cost), 8);
+    assert_eq!(frame.finish(&lease, cost), 0);
+    assert_eq!((frame.rows_done, frame.cost().primary), (8, 80));
+}
+
+#[test]
+fn a_late_result_settles_what_its_rows_have_become() {
+    let mut frame = frame(30);
+    let late = frame.take(A, 20).unwrap();
+    frame.give_up(late.segment, A);
+    let piece = frame.take(B, 8).unwrap();
+    let done = frame.take(B, 4).unwrap();
+    assert_eq!(frame.finish(&done, Cost { primary: 40, ..Cost::default() }), 4);
+    assert_eq!(frame.finish(&late, Cost { primary: 200, ..Cost::default() }), 16);
+    assert_eq!((frame.rows_done, frame.cost().primary), (20, 200));
+    assert_eq!(frame.finish(&piece, Cost::default()), 0);
+    assert_eq!(frame.queue.iter().map(|run| (run.first, run.count)).collect::<Vec<_>>(), [(20, 10)]);
+}
+
+#[test]
+fn rejected_rows_are_rendered_again_and_paid_once() {
+    let mut frame = frame(30);
+    let cost = Cost { primary: 100, ..Cost::default() };
+    let leases = [frame.take(A, 10).unwrap(), frame.take(B, 10).unwrap(), frame.take(A, 10).unwrap()];
+    leases[..2].iter().for_each(|lease| assert_eq!(frame.finish(lease, cost), 10));
+    frame.reject(9..11);
+    assert_eq!((frame.rows_done, frame.cost().primary), (0, 0));
+    assert_eq!(frame.take(B, 30), Some(Lease { attempt: 1, ..leases[0] }));
+    frame.finish(&leases[2], cost);
+    frame.reject(0..10);
+    assert_eq!((frame.rows_done, frame.cost().primary), (10, 100), "what is not done is not rejected");
+}
+
+#[test]
+fn refusals_count_until_somebody_can() {
+    let mut frame = frame(30);
+    let lease = frame.take(A, 20).unwrap();
+    frame.refuse(B);
+    frame.refuse(B);
+    assert_eq!((frame.refusals(A), frame.refusals(B)), (0, 2));
+    frame.finish(&lease, Cost::default());
+    assert_eq!(frame.refusals(B), 0);
+}
+
+#[test]
+fn a_single_row_is_not_halved() {
+    let mut frame = frame(1);
+    frame.halve_front();
+    assert_eq!(frame.queue.len(), 1);
+    assert!(frame.queue[0].halved && frame.queue[0].count == 1);
+}
