@@ -7,7 +7,8 @@ use std::time::Instant;
 
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, pixels};
 
-/// Frames that are held at a time. A master has two in flight; older ones give way.
+/// Frames that are held at a time. A master has two in flight; those that it spoke of longest ago give way. That need
+/// not be the oldest: while one frame takes its time, many of those after it may be replaced by newer ones.
 const MAX_FRAMES: usize = 8;
 
 /// Leases of one frame that wait for it to get ready.
@@ -27,6 +28,8 @@ enum State<F> {
 
 struct Held<F> {
     announce: FrameAnnounce,
+    /// How many announcements had come when it was announced last.
+    spoken_of: u64,
     state: State<F>,
     /// With the moment of their arrival.
     waiting: Vec<(Lease, Instant)>,
@@ -48,25 +51,33 @@ pub(crate) struct Frames<F> {
     held: BTreeMap<FrameId, Held<F>>,
     /// Nothing before this one is wanted.
     before: FrameId,
+    /// Announcements so far.
+    announcements: u64,
 }
 
 impl<F> Frames<F> {
     pub(crate) fn new() -> Self {
-        Self { held: BTreeMap::new(), before: FrameId(0) }
+        Self { held: BTreeMap::new(), before: FrameId(0), announcements: 0 }
     }
 
-    /// Takes a new frame in; `false` when it is known. At most one older frame gives way and is returned.
+    /// Takes a new frame in; `false` when it is known. At most one other frame gives way and is returned.
     /// A frame that has failed begins anew: the master announces it again when it tries this worker again. So does one that
     /// was cancelled: the master has rows of it verified.
     pub(crate) fn announce(&mut self, announce: FrameAnnounce) -> (bool, Option<FrameId>) {
         let frame = announce.frame;
-        let known = self.held.get(&frame).is_some_and(|held| !matches!(held.state, State::Failed));
-        if known {
+        self.announcements += 1;
+        let spoken_of = self.announcements;
+        let known = self.held.get_mut(&frame).filter(|held| !matches!(held.state, State::Failed));
+        if let Some(held) = known {
+            held.spoken_of = spoken_of;
             return (false, None);
         }
-        self.held.insert(frame, Held { announce, state: State::Loading, waiting: Vec::new() });
-        let dropped = if self.held.len() > MAX_FRAMES { self.held.pop_first() } else { None };
-        (true, dropped.map(|(frame, _)| frame))
+        self.held.insert(frame, Held { announce, spoken_of, state: State::Loading, waiting: Vec::new() });
+        let too_many = self.held.len() > MAX_FRAMES;
+        let longest_ago = self.held.iter().min_by_key(|(_, held)| held.spoken_of).filter(|_| too_many);
+        let dropped = longest_ago.map(|(&frame, _)| frame);
+        dropped.iter().for_each(|frame| drop(self.held.remove(frame)));
+        (true, dropped)
     }
 
     /// The scenes of all frames held.
@@ -154,5 +165,44 @@ impl<F> Held<F> {
         self.state = State::Failed;
         self.waiting.clear();
         self.announce.frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+
+    fn announce(frame: u64) -> FrameAnnounce {
+        let scene = AssetId([7; 32]);
+        FrameAnnounce { frame: FrameId(frame), scene, width: 8, height: 8, view: Bytes::new() }
+    }
+
+    fn is_refused(frames: &mut Frames<()>, frame: u64) -> bool {
+        let lease = Lease { frame: FrameId(frame), segment: 0, attempt: 0, first_row: 0, row_count: 8 };
+        matches!(frames.lease(lease, Instant::now()), Verdict::Refuse(_))
+    }
+
+    #[test]
+    fn a_frame_that_takes_its_time_outlives_many_that_were_replaced() {
+        let mut frames = Frames::new();
+        for newer in 6..60 {
+            // So does the master: it speaks of a frame again before it leases rows of it, if two others came between.
+            frames.announce(announce(5));
+            frames.announce(announce(newer));
+            frames.announce(announce(newer + 1));
+            assert!(!is_refused(&mut frames, 5) && !is_refused(&mut frames, newer + 1), "frame {newer}");
+            assert!(frames.held.len() <= MAX_FRAMES);
+        }
+    }
+
+    #[test]
+    fn what_was_not_spoken_of_for_longest_gives_way() {
+        let mut frames = Frames::<()>::new();
+        (0..MAX_FRAMES as u64).for_each(|frame| drop(frames.announce(announce(frame))));
+        assert_eq!(frames.announce(announce(0)), (false, None));
+        assert_eq!(frames.announce(announce(100)), (true, Some(FrameId(1))));
+        assert!(is_refused(&mut frames, 1) && !is_refused(&mut frames, 0));
     }
 }
