@@ -161,6 +161,13 @@ impl Driver {
         frame
     }
 
+    /// Nobody wants the frames that were asked for so far.
+    pub(crate) fn give_up(&self) {
+        let mut inner = self.lock();
+        let next = FrameId(inner.last_frame + 1);
+        self.drive(&mut inner, Event::RequestsGivenUp { next });
+    }
+
     /// A frame as the workers are told of it: serialised once, the same bytes for all.
     fn announcement(&self, frame: FrameId, view: &FrameView) -> Result<FrameAnnounce, FarmError> {
         view.validate().map_err(FarmError::View)?;

@@ -10,8 +10,7 @@
 //! A frame begins when no earlier one stands in its way. Callers that keep at most two requests open (the one being
 //! rendered and the one after it) get every frame they asked for, in order. A third open request replaces the second
 //! unless half of that one is leased already, so a moving camera never queues up, and the oldest frame is always
-//! finished. A request of another picture size gives up all earlier ones, begun or not: nobody can show them
-//! any more.
+//! finished. Frames may differ in size; one of another size than the one before begins when that is complete.
 
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -229,6 +228,11 @@ impl Farm {
     /// be rendered at all (no pixels, a camera that sees nothing) is an error of [`Farm::finished`].
     pub fn request(&self, view: FrameView) -> FrameId {
         self.driver.request(view)
+    }
+
+    /// Gives up all frames that were requested so far, begun or not: they will not be finished.
+    pub fn give_up(&self) {
+        self.driver.give_up();
     }
 
     /// The next completed frame, in the order of requests. Waits for as long as it takes. Safe to drop half-way, as

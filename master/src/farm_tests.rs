@@ -338,15 +338,35 @@ async fn two_open_requests_are_both_served_and_a_third_replaces_the_second() {
 }
 
 #[tokio::test]
-async fn another_size_is_shown_at_once() {
+async fn what_is_given_up_is_not_finished() {
     let mut farm = farm(SegmentPolicy::Static(8)).await;
     farm.request(view());
+    farm.give_up();
     let large = FrameView { width: 50, height: 70, ..view() };
     let asked = farm.request(large);
     fake_worker::start(farm.address(), Script::Honest).await;
     let frame = finished(&mut farm).await;
     assert_eq!(frame.frame, asked);
     assert!(is_picture(&large, &frame.pixels));
+}
+
+/// A size that changes with every frame starves none of them.
+#[tokio::test]
+async fn every_frame_may_have_another_size() {
+    for policy in [SegmentPolicy::Static(8), SegmentPolicy::Adaptive] {
+        let mut farm = farm(policy).await;
+        for _ in 0..2 {
+            fake_worker::start(farm.address(), Script::Honest).await;
+        }
+        let sized = |side: u32| FrameView { width: side, height: 2 * side, ..view() };
+        farm.request(sized(20));
+        for next in (3..12).map(|step| if step % 2 == 0 { 20 } else { 20 + step }) {
+            let asked = farm.request(sized(next));
+            let frame = finished(&mut farm).await;
+            assert_eq!(frame.frame.0 + 1, asked.0, "the oldest is finished, whatever comes after it");
+            assert!(is_picture(&frame.view, &frame.pixels));
+        }
+    }
 }
 
 #[tokio::test]

@@ -6,10 +6,14 @@ use std::ops::{Deref, Range};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::pixels::{BlockError, unpack};
 use rayfarm_protocol::{Encoding, FrameId, Lease};
 
 use crate::scheduler::WorkerId;
+use decode::Decoder;
+
+pub(crate) use decode::Misfit;
+
+mod decode;
 
 /// Buffers kept for the next frame: two in flight and one on the screen.
 const SPARE_BUFFERS: usize = 3;
@@ -29,6 +33,7 @@ struct Inner {
     /// Workers whose pixels are not taken any more.
     rejected: VecDeque<WorkerId>,
     spare: Vec<Vec<u8>>,
+    decoder: Decoder,
 }
 
 #[derive(Debug)]
@@ -47,17 +52,6 @@ pub(crate) enum Written {
     Kept { decode: Duration },
     /// The frame is not open any more, or its worker was rejected.
     Superseded,
-}
-
-/// Pixels that do not fit their lease.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Misfit {
-    #[error("{lease} takes {expected} bytes of pixels, {got} arrived")]
-    Bytes { lease: Lease, expected: usize, got: usize },
-    #[error("{lease}: {source}")]
-    Blocks { lease: Lease, source: BlockError },
-    #[error("{lease} lies outside of the picture of {rows} rows")]
-    Rows { lease: Lease, rows: usize },
 }
 
 impl Framebuffers {
@@ -85,13 +79,13 @@ impl Framebuffers {
         encoding: Encoding,
         bytes: &[u8],
     ) -> Result<Written, Misfit> {
-        let mut inner = self.lock();
-        if inner.rejected.contains(&from) {
+        let Inner { open, rejected, decoder, .. } = &mut *self.lock();
+        if rejected.contains(&from) {
             return Ok(Written::Superseded);
         }
-        let Some(canvas) = inner.open.get_mut(&lease.frame) else { return Ok(Written::Superseded) };
+        let Some(canvas) = open.get_mut(&lease.frame) else { return Ok(Written::Superseded) };
         let begun = Instant::now();
-        canvas.write(from, lease, encoding, bytes)?;
+        canvas.write(from, lease, |target| decoder.decode(lease, encoding, bytes, target))?;
         Ok(Written::Kept { decode: begun.elapsed() })
     }
 
@@ -142,7 +136,7 @@ impl Framebuffers {
 
 impl Inner {
     fn keep_spare(&mut self, pixels: Vec<u8>) {
-        // A picture of another size than the newest will not come back.
+        // A picture of another size than the newest is seldom wanted again.
         let size = self.open.last_key_value().map_or(pixels.len(), |(_, canvas)| canvas.pixels.len());
         self.spare.retain(|spare| spare.len() == size);
         if pixels.len() == size && self.spare.len() < SPARE_BUFFERS {
@@ -152,12 +146,12 @@ impl Inner {
 }
 
 impl Canvas {
+    /// `decode` fills the bytes of the lease's rows, all of them or none that count.
     fn write(
         &mut self,
         from: WorkerId,
         lease: Lease,
-        encoding: Encoding,
-        bytes: &[u8],
+        decode: impl FnOnce(&mut [u8]) -> Result<(), Misfit>,
     ) -> Result<(), Misfit> {
         let (first, count) = (lease.first_row as usize, lease.row_count as usize);
         let (row_bytes, rows) = (self.row_bytes, self.filled.len());
@@ -167,12 +161,12 @@ impl Canvas {
         if filled.iter().any(Option::is_some) {
             // Somebody was quicker with some of them. What is there stays, whatever these bytes are worth.
             let mut aside = vec![0; target.len()];
-            decode(lease, encoding, bytes, &mut aside)?;
+            decode(&mut aside)?;
             let rows = target.chunks_exact_mut(row_bytes.max(1)).zip(aside.chunks_exact(row_bytes.max(1)));
             let missing = rows.zip(&*filled).filter(|(_, filled)| filled.is_none());
             missing.for_each(|((target, row), _)| target.copy_from_slice(row));
         } else {
-            decode(lease, encoding, bytes, target)?;
+            decode(target)?;
         }
         for filled in filled.iter_mut().filter(|filled| filled.is_none()) {
             *filled = Some(from);
@@ -208,19 +202,8 @@ pub(crate) fn digest(
     bytes: &[u8],
 ) -> Result<blake3::Hash, Misfit> {
     let mut pixels = vec![0; row_bytes * lease.row_count as usize];
-    decode(lease, encoding, bytes, &mut pixels)?;
+    Decoder::default().decode(lease, encoding, bytes, &mut pixels)?;
     Ok(blake3::hash(&pixels))
-}
-
-/// The pixels of a lease, all of them or none that count.
-fn decode(lease: Lease, encoding: Encoding, bytes: &[u8], target: &mut [u8]) -> Result<(), Misfit> {
-    let (expected, got) = (target.len(), bytes.len());
-    match encoding {
-        Encoding::Raw if expected == got => target.copy_from_slice(bytes),
-        Encoding::Raw => return Err(Misfit::Bytes { lease, expected, got }),
-        Encoding::Lz4 => unpack(bytes, target).map_err(|source| Misfit::Blocks { lease, source })?,
-    }
-    Ok(())
 }
 
 /// The pixels of a finished frame; read them as `&[u8]`. Dropped, their memory serves a later frame.

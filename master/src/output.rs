@@ -179,11 +179,14 @@ impl FrameWriter {
     }
 
     /// Takes frame `index`, and its `picture` if there is a file for it; at most one for each time that the writer was
-    /// ready.
-    pub(crate) fn write(&mut self, index: u64, picture: impl FnOnce() -> RgbImage) {
+    /// ready. What the picture still needs is done beside the rendering.
+    pub(crate) fn write<P>(&mut self, index: u64, picture: impl FnOnce() -> P)
+    where
+        P: FnOnce() -> Result<RgbImage, image::ImageError> + Send + 'static,
+    {
         let Some(path) = self.pattern.path(index) else { return };
         let picture = picture();
-        self.pending.push_back(tokio::task::spawn_blocking(move || image::save(&path, &picture)));
+        self.pending.push_back(tokio::task::spawn_blocking(move || image::save(&path, &picture()?)));
     }
 
     /// Waits until everything taken is on the disk.
@@ -298,7 +301,7 @@ mod tests {
         for index in 0..5u8 {
             let picture = RgbImage { width: 2, height: 1, pixels: vec![index; 6] };
             writer.ready().await.unwrap();
-            writer.write(u64::from(index), || picture);
+            writer.write(u64::from(index), || move || Ok(picture));
         }
         writer.finish().await.unwrap();
         assert_eq!(writer.written(), 5);
@@ -313,7 +316,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let pattern = OutputPattern::parse(&folder.path().join("gone/f%d.ppm"), 2).unwrap();
         let mut writer = FrameWriter::new(pattern);
-        writer.write(0, || RgbImage { width: 1, height: 1, pixels: vec![0; 3] });
+        writer.write(0, || || Ok(RgbImage { width: 1, height: 1, pixels: vec![0; 3] }));
         assert!(writer.finish().await.is_err());
         assert_eq!(writer.written(), 0);
     }

@@ -31,7 +31,7 @@ fn options(master: SocketAddr, share: Share) -> WorkerOptions {
         reconnect: false,
         asset_cache_bytes: 1 << 28,
         disk_cache: None,
-        encoding: None,
+        compress: None,
         share,
     }
 }

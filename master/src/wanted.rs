@@ -1,5 +1,6 @@
 //! What is wanted to be seen, and how faithfully: the knobs as commands, window and reports know them.
 
+use rayfarm_tracer::image::{self, ImageError, RgbImage};
 use rayfarm_tracer::scene::quality::word_of;
 use rayfarm_tracer::scene::{
     ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
@@ -18,8 +19,30 @@ pub(crate) struct WantedPicture {
 impl WantedPicture {
     /// What the farm is asked for.
     pub(crate) fn rendered(&self) -> FrameView {
-        let (width, height) = (self.scale.of(self.view.width), self.scale.of(self.view.height));
+        let (width, height) = self.size();
         FrameView { width, height, ..self.view }
+    }
+
+    /// Of the rendered picture.
+    fn size(&self) -> (u32, u32) {
+        (self.scale.of(self.view.width), self.scale.of(self.view.height))
+    }
+
+    /// A rendered picture in the size in which it is wanted.
+    ///
+    /// # Errors
+    /// One whose bytes do not fit its size.
+    pub(crate) fn delivered(&self, rendered: RgbImage) -> Result<RgbImage, ImageError> {
+        image::resize(rendered, self.view.width, self.view.height)
+    }
+
+    /// This, as a finished frame shows it: the knobs may have been turned since it was asked for.
+    pub(crate) fn shown_by(&self, frame: &FrameView) -> Self {
+        let size = (frame.width, frame.height);
+        let fits = |scale: &RenderScale| Self { scale: *scale, ..*self }.size() == size;
+        // Its size is none of these while the window is being resized.
+        let scale = RenderScale::ALL.into_iter().rev().find(fits).unwrap_or_default();
+        Self { view: FrameView { quality: frame.quality, ..self.view }, scale }
     }
 
     /// The positions of all knobs, for reports.
@@ -107,5 +130,20 @@ mod tests {
         let (rendered, view) = (wanted.rendered(), wanted.view);
         assert_eq!((rendered.width, rendered.height), (view.width / 2, view.height / 2));
         assert_eq!(FrameView { width: view.width, height: view.height, ..rendered }, view);
+        let picture = RgbImage::new(rendered.width, rendered.height);
+        assert_eq!(wanted.delivered(picture).unwrap(), RgbImage::new(view.width, view.height));
+    }
+
+    #[test]
+    fn a_frame_tells_what_it_shows() {
+        let now = full();
+        for scale in RenderScale::ALL {
+            let quality = Quality { shadows: false, ..Quality::default() };
+            let then = WantedPicture { view: FrameView { quality, ..now.view }, scale };
+            assert_eq!(now.shown_by(&then.rendered()), then);
+        }
+        // The window was larger.
+        let then = FrameView { width: 1000, ..now.view };
+        assert_eq!(now.shown_by(&then), now);
     }
 }

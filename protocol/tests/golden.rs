@@ -95,10 +95,13 @@ async fn to_master() {
     ];
     golden(pixels(2, 2), &rows).await;
     let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("pixels are pixels") };
-    let packed = PixelsHeader { encoding: Encoding::Lz4, ..header };
-    let mut rows = rows;
-    rows[3] = &[1, 0, 0, 0, 0, 0, 0, 0];
-    golden(ToMaster::Pixels { header: packed, bytes }, &rows).await;
+    let codes: [&[u8]; 3] = [&[1, 0, 0, 0, 0, 0, 0, 0], &[2, 0, 0, 0, 0, 0, 0, 0], &[3, 0, 0, 0, 0, 0, 0, 0]];
+    for (encoding, code) in [Encoding::Lz4, Encoding::Narrow, Encoding::NarrowLz4].into_iter().zip(codes) {
+        let mut rows = rows;
+        rows[3] = code;
+        let (header, bytes) = (PixelsHeader { encoding, ..header }, bytes.clone());
+        golden(ToMaster::Pixels { header, bytes }, &rows).await;
+    }
     golden(ToMaster::Pong { nonce: 5 }, &[&[8, 0, 0, 0, 0x31, 0, 0, 0], &number]).await;
     let failed = ToMaster::Failed { frame: FrameId(5), reason: "no".into() };
     golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;

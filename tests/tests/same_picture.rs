@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use rayfarm_tests::{Running, Scenes, free_port, master, shared, worker};
 use rayfarm_tracer::image::RgbImage;
-use rayfarm_tracer::scene::{FrameView, load};
+use rayfarm_tracer::scene::{ColorDepth, FrameView, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 fn render(scene: &Path, output: &Path, more: &[&str]) -> serde_json::Value {
@@ -28,8 +28,14 @@ fn render(scene: &Path, output: &Path, more: &[&str]) -> serde_json::Value {
 
 /// The tracer in this process, without the farm.
 fn traced(scene: &Path) -> RgbImage {
+    traced_at(scene, |_| {})
+}
+
+/// Likewise, with another view than the scene's own.
+fn traced_at(scene: &Path, change: impl FnOnce(&mut FrameView)) -> RgbImage {
     let loaded = load(scene).unwrap();
-    let view = FrameView::of(&loaded.scene);
+    let mut view = FrameView::of(&loaded.scene);
+    change(&mut view);
     let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap());
     let mut image = RgbImage::new(view.width, view.height);
     render_rows(&PreparedFrame::new(compiled, &view).unwrap(), 0..view.height, &mut image.pixels, &|| false)
@@ -91,6 +97,73 @@ fn packed_pixels_are_the_same_pixels_in_fewer_bytes() {
     });
     let [raw, packed] = received;
     assert!(packed < raw, "{packed} bytes instead of {raw}");
+}
+
+#[test]
+fn reduced_colors_take_two_bytes_a_pixel_and_lose_nothing_on_the_way() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    let expected = traced_at(&scene, |view| view.quality.colors = ColorDepth::Reduced);
+    let expected = blake3::hash(&expected.pixels).to_string();
+    let received = ["raw", "lz4"].map(|pixels| {
+        let address = format!("127.0.0.1:{}", free_port());
+        let mut command = worker();
+        command.args(["--master", &address, "--threads", "2", "--pixels", pixels]);
+        let _worker = Running::start(&mut command);
+        let mut command = master();
+        command.arg("render").arg(&scene).args(["-o", "none", "--colors", "reduced"]);
+        command.args(["--json", "--no-local-workers", "--listen", &address]);
+        let outcome = Running::start(&mut command).finish().expect_success();
+        let report: serde_json::Value = serde_json::from_str(outcome.stdout.trim()).unwrap();
+        assert_eq!(report["blake3"], expected, "{pixels}");
+        assert_eq!(report["quality"]["colors"], "reduced");
+        report["bytes_per_frame"]["received"].as_u64().unwrap()
+    });
+    let [raw, packed] = received;
+    let pixels = 160 * 120;
+    assert!((2 * pixels..5 * pixels / 2).contains(&raw) && packed < raw, "{raw} bytes, packed {packed}");
+}
+
+#[test]
+fn knobs_of_the_file_and_of_the_command_line_are_the_tracers() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    let keys = "[render]\nshadows = false\nshading = \"diffuse\"\nexponent = \"fast\"\n";
+    let text = String::from_utf8(scenes.read("small.toml")).unwrap().replace("[render]\n", keys);
+    let reduced = scenes.write("reduced.toml", text);
+    let expected = traced(&reduced);
+    assert!(expected != traced(&scene));
+    let options = ["--shadows", "off", "--shading", "diffuse", "--exponent", "fast"];
+    for (scene, options) in [(&reduced, &[][..]), (&scene, &options)] {
+        let report = render(scene, &scenes.path("a.png"), options);
+        assert!(rayfarm_tracer::image::load(&scenes.path("a.png")).unwrap() == expected);
+        assert_eq!(report["rays_per_frame"]["shadow"], 0);
+        let quality = serde_json::json!({
+            "shadows": false, "shading": "diffuse", "filter": null, "exponent": "fast", "colors": "exact", "scale": 1.0
+        });
+        assert_eq!(report["quality"], quality);
+    }
+    render(&reduced, &scenes.path("b.png"), &["--shadows", "on", "--shading", "full", "--exponent", "exact"]);
+    assert!(rayfarm_tracer::image::load(&scenes.path("b.png")).unwrap() == traced(&scene));
+}
+
+#[test]
+fn a_smaller_scale_is_rendered_small_and_delivered_large() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    for (scale, width, height) in [("1/2", 80, 60), ("3/4", 120, 90)] {
+        let small = traced_at(&scene, |view| (view.width, view.height) = (width, height));
+        let expected = rayfarm_tracer::image::resize(small, 160, 120).unwrap();
+        let output = scenes.path("picture-%d.png");
+        let report = render(&scene, &output, &["--scale", scale, "--frames", "3"]);
+        for index in 0..3 {
+            let picture = rayfarm_tracer::image::load(&scenes.path(&format!("picture-{index}.png"))).unwrap();
+            assert!(picture == expected, "frame {index} at {scale}");
+        }
+        assert_eq!((&report["width"], &report["height"]), (&160.into(), &120.into()));
+        assert_eq!(report["rays_per_frame"]["primary"], width * height);
+        assert_eq!(report["blake3"], blake3::hash(&expected.pixels).to_string());
+    }
 }
 
 #[test]

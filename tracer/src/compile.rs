@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::bvh::{self, BuildQuality};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Filter, Material, Model, NormalMode, Scene, ValidateError, rotation};
+use crate::scene::{Filter, Material, Model, NormalMode, Quality, Scene, Shading, ValidateError, rotation};
 use crate::texture::{Texture, TextureId};
 
 /// Why a scene cannot be traced.
@@ -85,6 +85,12 @@ impl Features {
             textured: any(|material| material.texture.is_some()),
             smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
         }
+    }
+
+    /// What is left of them at this quality.
+    #[must_use]
+    pub fn at(self, quality: &Quality) -> Self {
+        Self { specular: self.specular && quality.shading == Shading::Full, ..self }
     }
 }
 

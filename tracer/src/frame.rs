@@ -15,7 +15,7 @@ use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
 use crate::render::TILE_SIZE;
-use crate::scene::{Camera, Filter, FrameView, Model, NormalMode, Scene};
+use crate::scene::{Camera, Filter, FrameView, Light, Model, NormalMode, Quality, Scene};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
 use crate::texture::Texture;
@@ -110,9 +110,9 @@ impl PreparedFrame {
             spheres: spheres(source, &to_eye, unit),
             triangles: triangles(source, &to_eye),
             planes: planes(source, &to_eye),
-            lights: source.lights.iter().map(|light| EyeLight::new(light, to_eye, unit)).collect(),
+            lights: lights(source, &view.quality, &to_eye, unit),
             nodes: Vec::new(),
-            features: Features::of(source),
+            features: Features::of(source).at(&view.quality),
             level: simd::best(),
             scene,
         };
@@ -222,6 +222,11 @@ fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
     }
     let (_, exponent) = libm::frexp(reach);
     libm::exp2(f64::from(exponent))
+}
+
+fn lights(scene: &Scene, quality: &Quality, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<EyeLight> {
+    let cast = |light: &Light| Light { shadows: light.shadows && quality.shadows, ..*light };
+    scene.lights.iter().map(|light| EyeLight::new(&cast(light), to_eye, unit)).collect()
 }
 
 fn spheres(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<EyeSphere> {

@@ -1,5 +1,7 @@
 //! The oracle: the shading equations in `f64`, every ray against every primitive, no tree, no SIMD, no shortcuts.
 //!
+//! Of a frame's quality it knows what to leave out (shadows, highlights) and the filter; it is exact where a knob trades precision.
+//!
 //! It shares with the fast path only the scene, the cleaned triangles and the sRGB encoding: whatever
 //! else it computes, it computes from the equations of the model of light, to be read against them.
 
@@ -10,7 +12,8 @@ use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use crate::image::RgbImage;
 use crate::mesh::{CompiledMesh, MeshId};
 use crate::scene::{
-    Attenuation, Background, Filter, FrameView, Light, LightKind, Material, NormalMode, Scene, TextureMap,
+    Attenuation, Background, Filter, FrameView, Light, LightKind, Material, NormalMode, Scene, Shading,
+    TextureMap,
 };
 use crate::srgb;
 use crate::texture::Texture;
@@ -174,7 +177,7 @@ impl Oracle {
             DVec3::from_array(bytes.map(srgb::decode))
         };
         let (x, y) = (uv.x * width, uv.y * height);
-        match map.filter {
+        match self.view.quality.filter.unwrap_or(map.filter) {
             Filter::Nearest => color_of(x.floor(), y.floor()),
             Filter::Bilinear => {
                 let (left, bottom) = ((x - 0.5).floor(), (y - 0.5).floor());
@@ -219,12 +222,16 @@ impl Oracle {
             }
         };
         let strength = attenuation * beam(&light.kind, l);
-        if strength == 0.0 || (light.shadows && self.occluded(point, to_light, reach, primitive)) {
+        let shadows = light.shadows && self.view.quality.shadows;
+        if strength == 0.0 || (shadows && self.occluded(point, to_light, reach, primitive)) {
             return DVec3::ZERO;
         }
         let h = (l + v).normalize();
         let highlight = libm::pow(n.dot(h).max(0.0), f64::from(material.exponent));
-        let reflected = material.diffuse.as_dvec3() * n.dot(l) + material.specular.as_dvec3() * highlight;
+        let mut reflected = material.diffuse.as_dvec3() * n.dot(l);
+        if self.view.quality.shading == Shading::Full {
+            reflected += material.specular.as_dvec3() * highlight;
+        }
         light.color.as_dvec3() * reflected * strength
     }
 

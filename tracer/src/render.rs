@@ -3,6 +3,8 @@
 use std::ops::{AddAssign, Range};
 
 use crate::frame::PreparedFrame;
+use crate::image;
+use crate::scene::ColorDepth;
 use crate::shade::{self, Colors};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, dispatch, each_bit, splat, three};
@@ -84,6 +86,9 @@ pub fn render_rows_watched<W: Watch>(
         let start = (top - rows.start) as usize * row_bytes;
         let band = &mut out[start..start + (bottom - top) as usize * row_bytes];
         let done = dispatch!(frame.level, simd => render_band(simd, frame, top..bottom, band, &mut *watch));
+        if frame.view().quality.colors == ColorDepth::Reduced {
+            image::reduce_colors(band);
+        }
         counts += done;
         top = bottom;
     }

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
-use rayfarm_protocol::Encoding;
 use tracing_subscriber::EnvFilter;
 
 use crate::client::{DiskCacheOptions, Share, WorkerOptions, run};
@@ -100,10 +99,10 @@ impl WorkerArgs {
             asset_cache_bytes: self.asset_cache << 20,
             disk_cache: self.disk_cache(),
             share: self.share.unwrap_or_default(),
-            encoding: match self.pixels {
+            compress: match self.pixels {
                 PixelEncoding::Auto => None,
-                PixelEncoding::Raw => Some(Encoding::Raw),
-                PixelEncoding::Lz4 => Some(Encoding::Lz4),
+                PixelEncoding::Raw => Some(false),
+                PixelEncoding::Lz4 => Some(true),
             },
         }
     }

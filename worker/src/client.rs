@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::{Encoding, Hello, Welcome, handshake, tcp};
+use rayfarm_protocol::{Hello, Welcome, handshake, tcp};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
 
@@ -44,9 +44,8 @@ pub struct WorkerOptions {
     pub asset_cache_bytes: u64,
     /// Where assets outlive the worker, if anywhere.
     pub disk_cache: Option<DiskCacheOptions>,
-    /// How pixels are sent; `None`: in fewer bytes to another machine, and as they are within this one, where that is
-    /// quicker than to encode them.
-    pub encoding: Option<Encoding>,
+    /// Whether pixels are compressed; `None`: to another machine, and not within this one, where that is quicker.
+    pub compress: Option<bool>,
     /// Where scenes and meshes are passed on to other workers, if they are.
     pub share: Share,
 }
@@ -179,7 +178,6 @@ async fn attend<R: Renderer>(
 /// Memory is quicker than LZ4, and than most disks.
 async fn terms(options: &WorkerOptions, stream: &TcpStream, sharers: &mut JoinSet<()>) -> Terms {
     let within_machine = tcp::is_within_machine(stream);
-    let usual = if within_machine { Encoding::Raw } else { Encoding::Lz4 };
     let uses_disk = options.disk_cache.as_ref().is_some_and(|disk| disk.within_machine || !within_machine);
     let ours = stream.local_addr().ok().filter(|_| !within_machine);
     let at = match options.share {
@@ -191,7 +189,7 @@ async fn terms(options: &WorkerOptions, stream: &TcpStream, sharers: &mut JoinSe
         Some(at) => begin_to_share(at, sharers).await,
         None => None,
     };
-    Terms { encoding: options.encoding.unwrap_or(usual), uses_disk, sharing }
+    Terms { compress: options.compress.unwrap_or(!within_machine), uses_disk, sharing }
 }
 
 /// Listens for other workers. Where that cannot be, nothing is passed on, and all is well but slower.

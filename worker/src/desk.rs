@@ -50,7 +50,7 @@ pub(crate) enum Work<R: Renderer> {
 /// What became of it.
 pub(crate) enum Done<R: Renderer> {
     Scene(SceneDone<R>),
-    Prepared { frame: FrameId, width: u32, result: Result<R::Frame, String> },
+    Prepared { frame: FrameId, result: Result<ReadyFrame<R::Frame>, String> },
 }
 
 /// The state of one session. Drain [`poll_effect`](Self::poll_effect) after every call.
@@ -110,12 +110,12 @@ impl<'a, R: Renderer> Desk<'a, R> {
     pub(crate) fn done(&mut self, done: Done<R>) {
         match done {
             Done::Scene(done) => self.loader.done(done),
-            Done::Prepared { frame, width, result: Ok(ready) } => {
-                for (lease, arrived) in self.frames.ready(frame, ReadyFrame { frame: ready, width }) {
+            Done::Prepared { frame, result: Ok(ready) } => {
+                for (lease, arrived) in self.frames.ready(frame, ready) {
                     self.leased(lease, arrived);
                 }
             }
-            Done::Prepared { frame, result: Err(reason), .. } => self.frame_failed(frame, reason),
+            Done::Prepared { frame, result: Err(reason) } => self.frame_failed(frame, reason),
         }
         self.take_steps();
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender, Traffic};
-use rayfarm_protocol::{Encoding, ToMaster, ToWorker};
+use rayfarm_protocol::{ToMaster, ToWorker};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
@@ -17,7 +17,7 @@ use crate::disk_writer::DiskWriter;
 use crate::ending::Ending;
 use crate::fetch::{FromPeer, fetch};
 use crate::guard::guarded;
-use crate::render_pool::{Answers, PoolJob, RenderPool};
+use crate::render_pool::{Answers, PoolJob, ReadyFrame, RenderPool};
 use crate::renderer::Renderer;
 use crate::scene_loader::{SceneDone, SceneLoader, SceneWork};
 use crate::shelf::Shelf;
@@ -49,8 +49,8 @@ pub(crate) struct Keep<R: Renderer> {
 /// What depends on where the master is.
 #[derive(Clone, Debug)]
 pub(crate) struct Terms {
-    /// How pixels are written where that makes them fewer bytes.
-    pub(crate) encoding: Encoding,
+    /// Whether pixels are compressed where that makes them fewer bytes.
+    pub(crate) compress: bool,
     /// Whether assets are kept on the disk.
     pub(crate) uses_disk: bool,
     /// Where assets are passed on, if they are.
@@ -96,7 +96,7 @@ where
         work: JoinSet::new(),
         fetches: JoinSet::new(),
         sharing: terms.sharing,
-        encoding: terms.encoding,
+        compress: terms.compress,
         ending,
         traffic,
     };
@@ -134,7 +134,7 @@ struct Duty<'a, R: Renderer> {
     /// Assets that other workers pass on.
     fetches: JoinSet<()>,
     sharing: Option<Sharing>,
-    encoding: Encoding,
+    compress: bool,
     ending: &'a Ending,
     traffic: Arc<Traffic>,
 }
@@ -144,7 +144,7 @@ impl<R: Renderer> Duty<'_, R> {
         let (pixels, finished) = mpsc::channel(UNSENT_SEGMENTS);
         let (failures, mut failed) = mpsc::unbounded_channel();
         // Dropped when draining: the mailman ends when the last lease has been answered.
-        let mut answers = Some(Answers { pixels, failures, encoding: self.encoding });
+        let mut answers = Some(Answers { pixels, failures, compress: self.compress });
         let mut mailman = JoinSet::new();
         mailman.spawn(send_finished(finished, self.sender.clone()));
         let (from_peers, mut passed) = mpsc::channel(UNREAD_CHUNKS);
@@ -298,7 +298,9 @@ fn do_work<R: Renderer>(renderer: &R, disk: Option<&DiskCache>, work: Work<R>) -
         }
         Work::Prepare { announce, scene } => {
             let result = guarded(|| renderer.prepare(scene, &announce)).flatten();
-            Done::Prepared { frame: announce.frame, width: announce.width, result }
+            let ready =
+                |frame| ReadyFrame { narrow: renderer.is_narrow(&frame), width: announce.width, frame };
+            Done::Prepared { frame: announce.frame, result: result.map(ready) }
         }
     }
 }

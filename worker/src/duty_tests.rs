@@ -1,6 +1,6 @@
 //! Sessions with a master at the other end of a pipe.
 
-use rayfarm_protocol::{Encoding, FrameId, ToMaster, ToWorker};
+use rayfarm_protocol::{FrameId, ToMaster, ToWorker};
 
 use crate::duty::{End, Terms};
 use crate::ending::Ending;
@@ -138,6 +138,7 @@ async fn bytes_that_are_no_scene_no_mesh_or_no_view_are_reported() {
         ),
         (scene(1, &[]), MESH, b"unpreparable", "this view cannot be"),
         (scene(1, &[]), MESH, b"panic", "a bug in this worker: row 16 is unlucky"),
+        (scene(1, &[]), MESH, b"narrow", "none of the reduced colours"),
     ] {
         let mut master = Master::meet(keep(1, PLENTY).0, &[&body, mesh]);
         master.announce(0, &body, view).await;
@@ -281,7 +282,7 @@ async fn a_master_that_vanishes_or_babbles_is_lost_with_the_reason() {
     use tokio::io::AsyncWriteExt;
     let (mut ours, theirs) = tokio::io::duplex(1 << 10);
     ours.write_all(b"HTTP/1.1 200 OK\r\n\r\n").await.unwrap();
-    let terms = Terms { encoding: Encoding::Raw, uses_disk: false, sharing: None };
+    let terms = Terms { compress: false, uses_disk: false, sharing: None };
     let end = crate::duty::serve(theirs, terms, &mut keep(1, PLENTY).0, &Ending::new()).await;
     assert!(matches!(&end, End::Lost(why) if why.contains("unknown type")), "{end:?}");
 }

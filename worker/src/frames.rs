@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn what_was_not_spoken_of_for_longest_gives_way() {
         let mut frames = Frames::<()>::new();
-        (0..MAX_FRAMES as u64).for_each(|frame| drop(frames.announce(announce(frame))));
+        (0..MAX_FRAMES as u64).for_each(|frame| assert!(frames.announce(announce(frame)).0));
         assert_eq!(frames.announce(announce(0)), (false, None));
         assert_eq!(frames.announce(announce(100)), (true, Some(FrameId(1))));
         assert!(is_refused(&mut frames, 1) && !is_refused(&mut frames, 0));

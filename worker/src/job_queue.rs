@@ -37,10 +37,11 @@ struct Progress {
     cost: Cost,
 }
 
-/// The pixels of a band: as they are, and as a block where blocks are wanted.
+/// The pixels of a band: as they are, at three bytes each or two where they are narrow, and as a block where blocks are wanted.
 #[derive(Debug)]
 pub(crate) struct Pixels {
     pub(crate) raw: BytesMut,
+    pub(crate) narrow: bool,
     pub(crate) block: Option<Vec<u8>>,
 }
 
@@ -134,14 +135,17 @@ impl<F, A> Job<F, A> {
 /// All bands from top to bottom: as blocks if every one has its own and together they are fewer bytes.
 fn whole(bands: BTreeMap<u32, Pixels>) -> (Encoding, Bytes) {
     let raw_bytes: usize = bands.values().map(|band| band.raw.len()).sum();
+    // The bands of one frame are all alike.
+    let narrow = bands.values().any(|band| band.narrow);
     let blocks: Option<Vec<&[u8]>> = bands.values().map(|band| band.block.as_deref()).collect();
     match blocks.map(|blocks| blocks.concat()).filter(|packed| packed.len() < raw_bytes) {
+        Some(packed) if narrow => (Encoding::NarrowLz4, packed.into()),
         Some(packed) => (Encoding::Lz4, packed.into()),
         None => {
             let mut whole = BytesMut::new();
-            // Neighbours in one buffer: joining them moves no byte.
+            // Neighbours in one buffer, unless they are narrow: joining them moves no byte.
             bands.into_values().for_each(|band| whole.unsplit(band.raw));
-            (Encoding::Raw, whole.freeze())
+            (if narrow { Encoding::Narrow } else { Encoding::Raw }, whole.freeze())
         }
     }
 }
@@ -259,7 +263,9 @@ mod tests {
         for (index, Band { job, rows, bytes }) in bands.into_iter().enumerate() {
             let counts = Counts { primary: 2, shadow: 3, secondary: 4 };
             let cost = BandCost { counts, trace: Duration::from_nanos(5), encode: Duration::from_nanos(1) };
-            let Some(rendered) = job.finish_band(rows, Pixels { raw: bytes, block: None }, cost) else {
+            let Some(rendered) =
+                job.finish_band(rows, Pixels { raw: bytes, narrow: false, block: None }, cost)
+            else {
                 assert!(index < last);
                 continue;
             };
@@ -284,7 +290,11 @@ mod tests {
                 // A block of one's own for each row makes them more than the rows.
                 let part = if first_row == 0 { bytes.len() } else { 3 };
                 let block = bytes.chunks(part).flat_map(|part| packer.block(part).unwrap()).collect();
-                job.finish_band(rows, Pixels { raw: bytes, block: Some(block) }, BandCost::default())
+                job.finish_band(
+                    rows,
+                    Pixels { raw: bytes, narrow: false, block: Some(block) },
+                    BandCost::default(),
+                )
             });
             let Rendered { encoding: chosen, bytes, .. } = rendered.unwrap();
             let expected = expected(first_row..24);
@@ -293,6 +303,7 @@ mod tests {
             match chosen {
                 Encoding::Lz4 => unpack(&bytes, &mut rows).unwrap(),
                 Encoding::Raw => rows.copy_from_slice(&bytes),
+                Encoding::Narrow | Encoding::NarrowLz4 => panic!("these bands are not narrow"),
             }
             assert_eq!(rows, expected);
         }
@@ -307,7 +318,7 @@ mod tests {
         assert_eq!(take(&queue).unwrap().0, 2);
         assert_eq!(queue.len(), 1);
         let single = Band { rows: 0..16, ..running };
-        let pixels = Pixels { raw: single.bytes, block: None };
+        let pixels = Pixels { raw: single.bytes, narrow: false, block: None };
         assert!(single.job.finish_band(single.rows, pixels, BandCost::default()).is_none());
     }
 

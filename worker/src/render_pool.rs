@@ -4,7 +4,7 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use rayfarm_protocol::pixels::Packer;
+use rayfarm_protocol::pixels::{self, Packer};
 use rayfarm_protocol::{Encoding, FrameId, PixelsHeader, ToMaster};
 use tokio::sync::mpsc;
 
@@ -20,8 +20,8 @@ pub(crate) struct Answers {
     pub(crate) pixels: mpsc::Sender<ToMaster>,
     /// Frames that a bug made fail, and the reason.
     pub(crate) failures: mpsc::UnboundedSender<(FrameId, String)>,
-    /// How pixels are written where that makes them fewer bytes.
-    pub(crate) encoding: Encoding,
+    /// Whether pixels are compressed where that makes them fewer bytes.
+    pub(crate) compress: bool,
 }
 
 /// A frame as a lease refers to it.
@@ -29,6 +29,8 @@ pub(crate) struct Answers {
 pub(crate) struct ReadyFrame<F> {
     pub(crate) frame: F,
     pub(crate) width: u32,
+    /// Whether its pixels take two bytes each on the wire.
+    pub(crate) narrow: bool,
 }
 
 pub(crate) type PoolJob<R> = Job<ReadyFrame<<R as Renderer>::Frame>, Answers>;
@@ -140,17 +142,20 @@ impl<R: Renderer> Shared<R> {
 
     /// Encodes a band while its pixels are warm, and gives it back.
     fn finish(&self, band: PoolBand<R>, mut cost: BandCost, packer: &mut Packer) {
-        let Band { job, rows, bytes: raw } = band;
-        let block = match job.answer.encoding {
-            Encoding::Raw => None,
-            Encoding::Lz4 => {
-                let begun = Instant::now();
-                let block = packer.block(&raw);
-                cost.encode = begun.elapsed();
-                block
-            }
-        };
-        if let Some(rendered) = job.finish_band(rows, Pixels { raw, block }, cost) {
+        let Band { job, rows, bytes: mut raw } = band;
+        let begun = Instant::now();
+        let narrow = job.frame.narrow;
+        if narrow {
+            let Some(bytes) = pixels::narrow(&mut raw) else {
+                return self.fail(&job, "a pixel has none of the reduced colours".to_owned());
+            };
+            raw.truncate(bytes);
+        }
+        let block = if job.answer.compress { packer.block(&raw) } else { None };
+        if narrow || block.is_some() {
+            cost.encode = begun.elapsed();
+        }
+        if let Some(rendered) = job.finish_band(rows, Pixels { raw, narrow, block }, cost) {
             self.state().queue.remove(&job);
             if rendered.encoding == Encoding::Raw {
                 self.buffers.lend(&rendered.bytes);

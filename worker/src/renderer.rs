@@ -64,6 +64,9 @@ pub trait Renderer: Send + Sync + 'static {
     /// A view that cannot be rendered.
     fn prepare(&self, scene: Arc<Self::Scene>, announce: &FrameAnnounce) -> Result<Self::Frame, String>;
 
+    /// Whether every pixel of this frame has one of the colours that take two bytes on the wire.
+    fn is_narrow(&self, frame: &Self::Frame) -> bool;
+
     /// Renders rows into `out`: `rows.len() * width * 3` bytes, RGB8, sRGB.
     ///
     /// # Errors

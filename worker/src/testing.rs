@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{self, Receiver, Sender};
-use rayfarm_protocol::{AssetId, Encoding, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
 use tokio::task::JoinHandle;
 
 use crate::disk_cache::DiskCache;
@@ -98,6 +98,11 @@ impl Renderer for Fake {
         }
     }
 
+    /// With a shade that is seldom such a colour, this is a promise that it breaks.
+    fn is_narrow(&self, frame: &FakeFrame) -> bool {
+        frame.view.as_ref() == b"narrow"
+    }
+
     fn render(
         &self,
         frame: &FakeFrame,
@@ -166,7 +171,7 @@ impl Master {
         let ending = Ending::new();
         let told = ending.clone();
         let worker = tokio::spawn(async move {
-            let terms = Terms { encoding: Encoding::Raw, uses_disk: keep.disk.is_some(), sharing };
+            let terms = Terms { compress: false, uses_disk: keep.disk.is_some(), sharing };
             let end = serve(theirs, terms, &mut keep, &told).await;
             (end, keep)
         });

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayfarm_protocol::limits::{MAX_DECODE_BYTES, MAX_VIEW_BYTES};
 use rayfarm_protocol::{AssetId, FrameAnnounce, codec};
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{FrameView, Scene};
+use rayfarm_tracer::scene::{ColorDepth, FrameView, Scene};
 use rayfarm_tracer::texture::{self, Texture};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
@@ -82,6 +82,10 @@ impl Renderer for TracerRenderer {
             return Err(format!("the frame is announced as {width} x {height}, its view says {w} x {h}"));
         }
         PreparedFrame::new(scene, &view).map_err(|error| format!("the frame cannot be prepared: {error}"))
+    }
+
+    fn is_narrow(&self, frame: &PreparedFrame) -> bool {
+        frame.view().quality.colors == ColorDepth::Reduced
     }
 
     fn render(

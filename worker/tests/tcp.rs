@@ -3,7 +3,7 @@
 
 mod common;
 
-use rayfarm_protocol::{Encoding, PROTOCOL_VERSION, ToMaster, ToWorker, handshake};
+use rayfarm_protocol::{PROTOCOL_VERSION, ToMaster, ToWorker, handshake};
 use rayfarm_worker::{Ending, Share, WorkerError, WorkerOptions, run};
 use tokio::io::AsyncWriteExt;
 
@@ -16,7 +16,7 @@ fn options(master: &str) -> WorkerOptions {
         name: "attic".to_owned(),
         reconnect: false,
         asset_cache_bytes: 1 << 20,
-        encoding: None,
+        compress: None,
         disk_cache: None,
         share: Share::Off,
     }
@@ -41,13 +41,13 @@ async fn a_worker_renders_the_same_pixels_as_this_process() {
 #[tokio::test]
 async fn pixels_come_packed_where_that_is_asked_for_and_raw_within_a_machine() {
     let stage = Stage::new();
-    for (encoding, packed) in [(None, 0), (Some(Encoding::Raw), 0), (Some(Encoding::Lz4), 5)] {
+    for (compress, packed) in [(None, 0), (Some(false), 0), (Some(true), 5)] {
         let (listener, address) = listen().await;
-        let options = WorkerOptions { encoding, ..options(&address) };
+        let options = WorkerOptions { compress, ..options(&address) };
         let worker = tokio::spawn(run(options, Ending::new()));
         let mut link = Link::accept(&listener).await;
         link.check_frame(&stage, 0, 3.0).await;
-        assert_eq!(link.packed, packed, "{encoding:?}");
+        assert_eq!(link.packed, packed, "{compress:?}");
         link.out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
         worker.await.unwrap().unwrap();
     }

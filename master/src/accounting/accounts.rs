@@ -166,6 +166,7 @@ impl Accounts {
             Event::PauseRequested { worker } => self.pause(now, worker, true),
             Event::ResumeRequested { worker } => self.pause(now, worker, false),
             Event::FrameRequested { .. }
+            | Event::RequestsGivenUp { .. }
             | Event::WorkerDrains { .. }
             | Event::DrainRequested { .. }
             | Event::Pong { .. }

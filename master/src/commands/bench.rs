@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
 
@@ -29,37 +30,45 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
     let threads = args.threads.unwrap_or_else(all_cores);
     let animation = animation(&args.picture, args.frames);
 
-    let mut bench = Bench::new(scene, &view, threads);
+    let mut bench = Bench::new(scene, wanted, threads);
     bench.frame(&view)?; // warms caches and page tables
     bench.forget();
     for index in 0..u64::from(args.frames) {
         bench.frame(&animation.view(&view, index))?;
     }
-    let report = bench.report(&wanted, load);
+    let report = bench.report(load);
     if args.json { print_json(&report) } else { print_table(&report) }
 }
 
 struct Bench {
     scene: Arc<CompiledScene>,
+    wanted: WantedPicture,
     threads: usize,
-    pixels: Vec<u8>,
+    /// The newest frame, in the size in which it is wanted.
+    picture: RgbImage,
     times: Vec<Duration>,
     rays: RayCounts,
 }
 
 impl Bench {
-    fn new(scene: Arc<CompiledScene>, view: &FrameView, threads: usize) -> Self {
-        let pixels = vec![0; view.width as usize * view.height as usize * 3];
-        Self { scene, threads, pixels, times: Vec::new(), rays: RayCounts::default() }
+    fn new(scene: Arc<CompiledScene>, wanted: WantedPicture, threads: usize) -> Self {
+        let picture = RgbImage::new(0, 0);
+        Self { scene, wanted, threads, picture, times: Vec::new(), rays: RayCounts::default() }
     }
 
-    /// One frame, with all that belongs to it: preparing it for its camera and tracing it.
+    /// One frame, with all that belongs to it: preparing it for its camera, tracing it, and enlarging it where it is traced at a
+    /// smaller scale.
     fn frame(&mut self, view: &FrameView) -> Result<(), CommandError> {
+        let mut picture = std::mem::replace(&mut self.picture, RgbImage::new(0, 0));
+        if (picture.width, picture.height) != (view.width, view.height) {
+            picture = RgbImage::new(view.width, view.height);
+        }
         let started = Instant::now();
         let frame = PreparedFrame::new(Arc::clone(&self.scene), view).map_err(CommandError::failed)?;
-        let rays = trace(&frame, &mut self.pixels, self.threads, &|| false, &|_| ()).map_err(|_| {
+        let rays = trace(&frame, &mut picture.pixels, self.threads, &|| false, &|_| ()).map_err(|_| {
             CommandError::Failed("the tracer stopped although nobody cancelled it".to_owned())
         })?;
+        self.picture = self.wanted.delivered(picture).map_err(CommandError::failed)?;
         self.times.push(started.elapsed());
         self.rays += rays;
         Ok(())
@@ -70,8 +79,8 @@ impl Bench {
         self.rays = RayCounts::default();
     }
 
-    fn report(&self, wanted: &WantedPicture, load: Duration) -> BenchReport {
-        let view = &wanted.view;
+    fn report(&self, load: Duration) -> BenchReport {
+        let view = &self.wanted.view;
         let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
         let RayCounts { primary, shadow, secondary, .. } = self.rays;
         let rays = RaysPerFrame { primary, shadow, secondary };
@@ -81,14 +90,14 @@ impl Bench {
             width: view.width,
             height: view.height,
             samples: view.samples,
-            quality: wanted.knobs(),
+            quality: self.wanted.knobs(),
             threads: self.threads,
             triangles: self.scene.triangle_count(),
             load_ms: round_to_us(load),
             rays_per_frame: rays.mean(frames),
             ms_per_frame: MsPerFrame::of(&self.times),
             rays_per_second: if seconds > 0.0 { rays.total() as f64 / seconds } else { 0.0 },
-            blake3: blake3::hash(&self.pixels).to_hex().to_string(),
+            blake3: blake3::hash(&self.picture.pixels).to_hex().to_string(),
         }
     }
 }

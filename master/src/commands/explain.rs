@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use bytes::Bytes;
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{ColorDepth, FrameView};
 use rayfarm_tracer::{CompiledScene, simd_level};
 use serde::Serialize;
 
@@ -233,14 +233,23 @@ fn travel(source: &Source, view: &FrameView) -> Result<Travel, CommandError> {
         scene_body,
         once: assets.total_bytes(),
         per_frame: envelope.wire_bytes(),
-        pixels_per_frame: 3 * u64::from(view.width) * u64::from(view.height),
+        pixels_per_frame: pixel_bytes(view) * u64::from(view.width) * u64::from(view.height),
     })
+}
+
+/// Of one pixel on the wire, before compression.
+fn pixel_bytes(view: &FrameView) -> u64 {
+    match view.quality.colors {
+        ColorDepth::Exact => 3,
+        ColorDepth::Reduced => 2,
+    }
 }
 
 fn rays(things: &Things, view: &FrameView) -> Rays {
     let primary = u64::from(view.width) * u64::from(view.height) * u64::from(view.samples);
     // No material reflects or transmits yet.
-    Rays { primary, shadow: primary * things.lights_with_shadows as u64, secondary: 0 }
+    let shadow = if view.quality.shadows { primary * things.lights_with_shadows as u64 } else { 0 };
+    Rays { primary, shadow, secondary: 0 }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::io::BufWriter;
 use std::time::{Duration, Instant};
 
 use rayfarm_tracer::image::RgbImage;
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{FrameView, RenderScale};
 use tokio_util::sync::CancellationToken;
 
 use super::interrupt::cancelled_by_signals;
@@ -194,17 +194,32 @@ impl Run {
     fn take(&mut self, index: u64, frame: FinishedFrame) -> Result<(), CommandError> {
         self.totals.add(&frame)?;
         if index + 1 == self.frames {
-            self.totals.hash = blake3::hash(&frame.pixels);
+            self.totals.hash = self.hash(&frame)?;
         }
         self.unwritten.push_back((index, frame));
         Ok(())
+    }
+
+    /// Of the pixels as they are delivered.
+    fn hash(&self, frame: &FinishedFrame) -> Result<blake3::Hash, CommandError> {
+        if self.wanted.scale == RenderScale::Full {
+            return Ok(blake3::hash(&frame.pixels));
+        }
+        let FrameView { width, height, .. } = frame.view;
+        let rendered = RgbImage { width, height, pixels: frame.pixels.to_vec() };
+        let delivered = self.wanted.delivered(rendered).map_err(CommandError::failed)?;
+        Ok(blake3::hash(&delivered.pixels))
     }
 
     fn write_next(&mut self) {
         if let Some((index, frame)) = self.unwritten.pop_front() {
             // A frame without a file keeps its memory, which serves a later frame.
             let FrameView { width, height, .. } = frame.view;
-            self.writer.write(index, || RgbImage { width, height, pixels: frame.pixels.into_vec() });
+            let wanted = self.wanted;
+            self.writer.write(index, || {
+                let rendered = RgbImage { width, height, pixels: frame.pixels.into_vec() };
+                move || wanted.delivered(rendered)
+            });
         }
     }
 

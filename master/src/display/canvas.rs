@@ -1,6 +1,7 @@
 //! The pixels of a window: pictures, darkened panels and text. Everything is clipped; nothing outside is touched.
 
 use font8x8::UnicodeFonts;
+use rayfarm_tracer::image::Resizer;
 
 /// Pixels per side of a glyph at scale 1.
 pub(super) const GLYPH: usize = 8;
@@ -79,8 +80,8 @@ impl Canvas {
         self.pixels.fill(color);
     }
 
-    /// Shows a picture over the whole canvas. One of another size (the window has just been resized) is stretched
-    /// without smoothing until the right one arrives.
+    /// Shows a picture over the whole canvas. One of another size (it is rendered at a smaller scale, or the window has just been
+    /// resized) is stretched.
     pub(super) fn show(&mut self, picture: Picture<'_>) {
         if picture.rgb.len() != picture.width * picture.height * 3 || picture.rgb.is_empty() {
             return;
@@ -91,12 +92,14 @@ impl Canvas {
             }
             return;
         }
-        for (y, row) in self.pixels.chunks_exact_mut(self.width.max(1)).enumerate() {
-            let source = y * picture.height / self.height;
-            let rgb_row = &picture.rgb[source * picture.width * 3..(source + 1) * picture.width * 3];
-            for (x, pixel) in row.iter_mut().enumerate() {
-                let source = x * picture.width / self.width * 3;
-                *pixel = packed(&rgb_row[source..source + 3]);
+        let size = |width: usize, height: usize| (side(width), side(height));
+        let (from, to) = (size(picture.width, picture.height), size(self.width, self.height));
+        let Some(mut resizer) = Resizer::new(from, to) else { return };
+        let mut rgb_row = vec![0; self.width * 3];
+        for (y, row) in self.pixels.chunks_exact_mut(self.width).enumerate() {
+            resizer.row(picture.rgb, y, &mut rgb_row);
+            for (pixel, rgb) in row.iter_mut().zip(rgb_row.chunks_exact(3)) {
+                *pixel = packed(rgb);
             }
         }
     }
@@ -172,6 +175,11 @@ impl Canvas {
     }
 }
 
+/// No window and no picture has so many pixels a side that they would not fit.
+fn side(pixels: usize) -> u32 {
+    u32::try_from(pixels).unwrap_or(u32::MAX)
+}
+
 /// Rows of dots, the lowest bit leftmost; characters that the font lacks are question marks.
 fn glyph(character: char) -> [u8; GLYPH] {
     let fonts = || font8x8::BASIC_FONTS.get(character).or_else(|| font8x8::LATIN_FONTS.get(character));
@@ -224,8 +232,10 @@ mod tests {
         let (one, two) = (0x0001_0101, 0x0002_0202);
         assert_eq!(canvas.pixels(), [one, one, two, two, one, one, two, two]);
         canvas.resize(1, 1);
-        canvas.show(Picture { width: 2, height: 1, rgb: &[1, 1, 1, 2, 2, 2] });
-        assert_eq!(canvas.pixels(), [one]);
+        canvas.show(Picture { width: 2, height: 1, rgb: &[1, 1, 1, 3, 3, 3] });
+        assert_eq!(canvas.pixels(), [two]);
+        canvas.resize(0, 0);
+        canvas.show(Picture { width: 2, height: 1, rgb: &[1, 1, 1, 3, 3, 3] });
     }
 
     #[test]

@@ -213,6 +213,8 @@ struct Requests {
     /// The number, within the animation, of the next frame to ask for.
     next: u64,
     open: VecDeque<Open>,
+    /// In which a picture was wanted last.
+    size: Option<(u32, u32)>,
     /// When the camera moved last, until a frame that shows it is finished.
     moved_at: Option<Instant>,
 }
@@ -220,14 +222,13 @@ struct Requests {
 /// A frame that was asked for.
 struct Open {
     frame: FrameId,
-    size: (u32, u32),
     /// When what it shows was first wanted.
     asked_at: Instant,
 }
 
 impl Requests {
     fn new(animation: Animation, limit: Option<u64>) -> Self {
-        Self { animation, limit, next: 0, open: VecDeque::new(), moved_at: None }
+        Self { animation, limit, next: 0, open: VecDeque::new(), size: None, moved_at: None }
     }
 
     /// Asks until two are open.
@@ -264,13 +265,16 @@ impl Requests {
         if self.limit.is_some_and(|limit| self.next >= limit) && !self.open.is_empty() {
             return false;
         }
+        let size = (base.view.width, base.view.height);
+        if self.size.replace(size).is_some_and(|before| before != size) {
+            // The window has another size: what is on the way was for the one before. Another scale alone changes nothing about that.
+            farm.give_up();
+            self.open.clear();
+        }
         let view = self.animation.view(&base.rendered(), self.next);
-        let size = (view.width, view.height);
-        // The farm gives up all requests of another size.
-        self.open.retain(|open| open.size == size);
         // A request that is asked for again, because the one before was replaced, is as old as the camera it shows.
         let asked_at = self.moved_at.unwrap_or_else(Instant::now);
-        self.open.push_back(Open { frame: farm.request(view), size, asked_at });
+        self.open.push_back(Open { frame: farm.request(view), asked_at });
         self.next += 1;
         true
     }

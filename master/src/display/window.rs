@@ -222,6 +222,7 @@ impl Display {
         let (fps, frame_time) = link.desk.rate();
         let wanted = *link.wanted.borrow();
         let view = wanted.view;
+        let shown = self.picture.as_ref().map_or(wanted, |frame| wanted.shown_by(&frame.view));
         let slow = frame_time.max(link.desk.since_last_frame()) > PATIENCE && !status.workers.is_empty();
         Figures {
             fps,
@@ -229,7 +230,7 @@ impl Display {
             latency: link.desk.latency(),
             size: (view.width, view.height),
             samples: view.samples,
-            reductions: wanted.reductions(),
+            reductions: shown.reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),
             triangles: self.about.triangles,

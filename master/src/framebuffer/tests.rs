@@ -142,6 +142,39 @@ fn a_digest_is_of_one_workers_rows_alone() {
     assert!(digest(lease(0, 2), 3, Encoding::Raw, &[1; 5]).is_err());
 }
 
+/// Three pixels of reduced colours, and what they take at two bytes each.
+const FEW_COLORS: [u8; 9] = [0xff, 0x82, 0x08, 0, 0, 0, 0x10, 0xff, 0xff];
+const NARROW: [u8; 6] = [0x01, 0xfc, 0, 0, 0xff, 0x17];
+
+#[test]
+fn narrow_pixels_are_widened_into_their_rows() {
+    for (encoding, bytes) in [(Encoding::Narrow, NARROW.to_vec()), (Encoding::NarrowLz4, packed(&NARROW, 4))]
+    {
+        let framebuffers = opened(1, 4);
+        write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
+        framebuffers.write(B, lease(0, 3), encoding, &bytes).unwrap();
+        write(&framebuffers, lease(3, 1), &[9; 3]).unwrap();
+        let expected = [&FEW_COLORS[..3], &[1; 3], &FEW_COLORS[6..], &[9; 3]].concat();
+        assert_eq!(*framebuffers.finish(FRAME).unwrap(), expected[..], "{encoding:?}");
+        assert_eq!(digest(lease(0, 3), 3, encoding, &bytes), Ok(blake3::hash(&FEW_COLORS)));
+    }
+}
+
+#[test]
+fn narrow_pixels_of_another_length_are_refused() {
+    let framebuffers = opened(1, 3);
+    for got in [0, 5, 7, 9] {
+        let refused = framebuffers.write(A, lease(0, 3), Encoding::Narrow, &vec![0; got]).unwrap_err();
+        assert_eq!(refused, Misfit::Bytes { lease: lease(0, 3), expected: 6, got });
+    }
+    for broken in [packed(&NARROW[..5], 6), packed(&FEW_COLORS, 9), vec![0xff; 40]] {
+        let refused = framebuffers.write(A, lease(0, 3), Encoding::NarrowLz4, &broken).unwrap_err();
+        assert!(matches!(refused, Misfit::Blocks { .. }), "{refused}");
+    }
+    write(&framebuffers, lease(0, 3), &[7; 9]).unwrap();
+    assert_eq!(*framebuffers.finish(FRAME).unwrap(), [7; 9]);
+}
+
 proptest! {
     #[test]
     fn broken_blocks_fill_no_row_and_spoil_none(

@@ -117,7 +117,7 @@ impl Scheduler {
     fn frame_from(&mut self, index: usize) -> Option<usize> {
         let queued = |frames: &VecDeque<Frame>| (index..frames.len()).find(|&n| !frames[n].queue.is_empty());
         queued(&self.frames).or_else(|| {
-            if self.frames.len() < self.max_frames() {
+            if self.may_begin_beside() {
                 self.begin_waiting();
             }
             queued(&self.frames)

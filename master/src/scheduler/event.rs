@@ -29,6 +29,11 @@ pub enum Event {
         /// Rows that workers trace together, from multiples of it on: cuts elsewhere cost them.
         tile_rows: u32,
     },
+    /// Nothing that was requested before a frame is wanted any more.
+    RequestsGivenUp {
+        /// That frame's number; it need not be requested yet.
+        next: FrameId,
+    },
     /// A session is ready for leases.
     WorkerJoined {
         /// The new worker.

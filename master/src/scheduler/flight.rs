@@ -7,9 +7,6 @@ use super::{Action, FrameId, Request, Scheduler};
 impl Scheduler {
     /// A request waits for its turn, in place of the one that waited before.
     pub(super) fn request(&mut self, request: Request) {
-        if self.newest().is_some_and(|(width, height)| (width, height) != (request.width, request.height)) {
-            self.drop_frames(request.frame);
-        }
         self.supersede_newest();
         if let Some(replaced) = self.waiting.replace(request) {
             self.actions.push_back(Action::FrameDropped { frame: replaced.frame });
@@ -52,30 +49,41 @@ impl Scheduler {
         }
     }
 
-    /// Picture size of the newest request that is not finished.
-    fn newest(&self) -> Option<(u32, u32)> {
-        let begun = self.frames.back().map(|frame| (frame.width, frame.height));
-        self.waiting.map(|waiting| (waiting.width, waiting.height)).or(begun)
-    }
-
-    /// Gives up all that was requested before `next`: pictures of a size that nobody shows any more.
-    fn drop_frames(&mut self, next: FrameId) {
-        let begun = std::mem::take(&mut self.frames);
-        for frame in begun {
-            self.actions.push_back(Action::FrameDropped { frame: frame.id });
-        }
+    /// Gives up all that was requested before `next`: nobody wants it any more.
+    pub(super) fn give_up(&mut self, next: FrameId) {
+        let begun = std::mem::take(&mut self.frames).into_iter().map(|frame| frame.id);
+        let waiting = self.waiting.take().map(|request| request.frame);
+        self.actions.extend(begun.chain(waiting).map(|frame| Action::FrameDropped { frame }));
         self.forget_audits(|_| true);
         self.cancel_leases(next);
+    }
+
+    /// Whether the request that waits may begin beside the frames in flight. One of another size waits until they are
+    /// complete: what is known of rows and of speeds is of one size at a time.
+    pub(super) fn may_begin_beside(&self) -> bool {
+        let size = self.waiting.map(|request| (request.width, request.height));
+        let same_size = self.frames.iter().all(|frame| Some((frame.width, frame.height)) == size);
+        self.frames.len() < self.max_frames() && same_size
     }
 
     /// Begins the request that waits, if there is one.
     pub(super) fn begin_waiting(&mut self) {
         let Some(Request { frame, width, height, tile_rows }) = self.waiting.take() else { return };
+        self.take_width(width);
         let runs = self.policy.runs(height, self.max_rows(width));
         let tiles = Tiles { rows: tile_rows, share: self.tile_share };
         let forecast = self.costs.forecast(height, self.frames.len() + 1, tiles);
         self.frames.push_back(Frame::new(frame, (width, height), forecast, runs));
         self.actions.push_back(Action::BeginFrame { frame });
+    }
+
+    /// Speeds are told in rows, and rows of another width take another time.
+    fn take_width(&mut self, width: u32) {
+        let before = std::mem::replace(&mut self.width, width);
+        if before != width && before > 0 && width > 0 {
+            let factor = f64::from(before) / f64::from(width);
+            self.workers.values_mut().for_each(|worker| worker.speed.rescale(factor));
+        }
     }
 
     /// The most rows that one lease may have.

@@ -84,6 +84,8 @@ pub struct Scheduler {
     waiting: Option<Request>,
     costs: CostMap,
     audits: Audits,
+    /// Pixels per row of the frame that began last.
+    width: u32,
     actions: VecDeque<Action>,
     next_nonce: u64,
     /// How long a worker may owe something without giving anything.
@@ -119,6 +121,7 @@ impl Scheduler {
             waiting: None,
             costs: CostMap::default(),
             audits: Audits::default(),
+            width: 0,
             actions: VecDeque::new(),
             next_nonce: 0,
             patience: FIRST_PATIENCE,
@@ -155,6 +158,7 @@ impl Scheduler {
             Event::FrameRequested { frame, width, height, tile_rows } => {
                 self.request(Request { frame, width, height, tile_rows });
             }
+            Event::RequestsGivenUp { next } => self.give_up(next),
             Event::WorkerJoined { worker, threads } => {
                 self.lose(worker);
                 self.workers.insert(worker, Worker::new(threads, now));

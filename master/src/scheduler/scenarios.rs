@@ -273,11 +273,12 @@ fn the_latest_request_replaces_the_one_that_waits() {
 }
 
 #[test]
-fn another_size_gives_up_what_came_before() {
+fn what_is_given_up_is_cancelled_at_once() {
     let script = "
         0 join 1 1
         0 frame 1 10x10
         0 frame 2 10x10
+        1 give-up 3
         1 frame 3 20x10
         5 done 1 1.0
         9 done 1 3.0";
@@ -291,10 +292,11 @@ fn another_size_gives_up_what_came_before() {
         1: frame 1
         1: render 1.0, rows 0+10
         > 0 frame 2 10x10
-        > 1 frame 3 20x10
+        > 1 give-up 3
         forget 1
-        1: cancel before 3
         forget 2
+        1: cancel before 3
+        > 1 frame 3 20x10
         begin 3
         1: frame 3
         1: render 3.0, rows 0+10

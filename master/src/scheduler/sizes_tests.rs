@@ -1,5 +1,6 @@
-//! How many rows whom: in proportion to speed, on tile boundaries, within what a message holds.
+//! How many rows whom: in proportion to speed, on tile boundaries, within what a message holds; and pictures of several sizes.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::{Action, Cost, Event, FrameId, Lease, Scheduler, SegmentPolicy, WorkerId};
@@ -70,4 +71,57 @@ fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
             }
         }
     }
+}
+
+/// What begins and what is complete, in turn, when frames 4 and 5 are asked for at once.
+fn begun_and_done(second: (u32, u32)) -> Vec<Action> {
+    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
+    drive_two(&mut scheduler, [1, 2], 3);
+    let mut now = scheduler.handled_at;
+    for (frame, (width, height)) in [(4, (64, 512)), (5, second)] {
+        scheduler.handle(now, Event::FrameRequested { frame: FrameId(frame), width, height, tile_rows: 16 });
+    }
+    let (mut held, mut log) = (VecDeque::new(), Vec::new());
+    loop {
+        while let Some(action) = scheduler.poll_action() {
+            match action {
+                Action::Grant { worker, lease } => held.push_back((worker, lease)),
+                Action::BeginFrame { .. } => log.push(action),
+                Action::FrameDone { frame, .. } => {
+                    log.push(Action::FrameDone { frame, cost: Cost::default(), elapsed: Duration::ZERO });
+                }
+                _ => {}
+            }
+        }
+        let Some((worker, lease)) = held.pop_front() else { return log };
+        now += Duration::from_millis(lease.row_count.into());
+        let cost = Cost { trace_ns: u64::from(lease.row_count) * 1_000_000, ..Cost::default() };
+        scheduler.handle(now, Event::SegmentDone { worker, lease, cost });
+    }
+}
+
+/// The size may change from frame to frame: the frame on the way is completed, and the next begins after it.
+#[test]
+fn another_size_begins_after_the_frame_on_the_way_and_not_beside_it() {
+    let begun = |frame| Action::BeginFrame { frame: FrameId(frame) };
+    let done =
+        |frame| Action::FrameDone { frame: FrameId(frame), cost: Cost::default(), elapsed: Duration::ZERO };
+    for other in [(32, 256), (32, 512), (128, 512), (64, 700)] {
+        assert_eq!(begun_and_done(other), [begun(4), done(4), begun(5), done(5)], "{other:?}");
+    }
+    assert_eq!(begun_and_done((64, 512)), [begun(4), begun(5), done(4), done(5)]);
+}
+
+/// Half as wide a row is half the work: a worker's speed is known in the rows of the next frame before it has rendered one.
+#[test]
+fn speeds_follow_the_width() {
+    let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
+    drive_two(&mut scheduler, [1, 4], 3);
+    let speeds = |scheduler: &Scheduler| -> Vec<f64> {
+        scheduler.workers.values().map(|worker| worker.speed.value().unwrap()).collect()
+    };
+    let before = speeds(&scheduler);
+    let now = scheduler.handled_at;
+    scheduler.handle(now, Event::FrameRequested { frame: FrameId(9), width: 32, height: 256, tile_rows: 16 });
+    assert_eq!(speeds(&scheduler), before.iter().map(|speed| 2.0 * speed).collect::<Vec<_>>());
 }

@@ -73,6 +73,13 @@ impl Speed {
         self.delivered.observe(seen.work, seen.busy.unwrap_or(0.0), half_life);
     }
 
+    /// The same work is called so many times as much from now on.
+    pub(super) fn rescale(&mut self, factor: f64) {
+        for rate in [&mut self.traced, &mut self.delivered] {
+            rate.work *= factor;
+        }
+    }
+
     /// It had so long for this work and has not done it.
     pub(super) fn miss(&mut self, work: f64, seconds: f64) {
         if self.value().is_some_and(|known| work / seconds < known) {

@@ -43,6 +43,7 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             let (width, height) = pair(size, 'x');
             Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height, tile_rows: 8 }
         }
+        ["give-up", next] => Event::RequestsGivenUp { next: FrameId(number(next)) },
         ["join", _, threads] => Event::WorkerJoined { worker, threads: number(threads) as u32 },
         ["leave", _] => Event::WorkerLeft { worker },
         ["drain", _] => Event::WorkerDrains { worker },

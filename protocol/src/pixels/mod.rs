@@ -8,6 +8,7 @@
 //! ```
 
 mod blocks;
+mod narrow;
 
 use bytes::{Buf, BufMut};
 
@@ -16,6 +17,7 @@ use crate::ids::{FrameId, Lease};
 use crate::{ProtocolError, limits};
 
 pub use blocks::{BlockError, Packer, unpack};
+pub use narrow::{narrow, narrow_bytes, widen};
 
 /// Bytes of [`PixelsHeader`] on the wire.
 pub(crate) const PIXELS_HEAD_BYTES: usize = 88;
@@ -27,6 +29,10 @@ pub enum Encoding {
     Raw,
     /// The same in blocks of LZ4: see [`unpack`].
     Lz4,
+    /// Two bytes a pixel: see [`narrow`].
+    Narrow,
+    /// These in blocks of LZ4.
+    NarrowLz4,
 }
 
 /// What a segment cost the worker. Times are the worker's own: no two clocks are compared.
@@ -75,6 +81,8 @@ impl PixelsHeader {
         rest.put_u32_le(match encoding {
             Encoding::Raw => 0,
             Encoding::Lz4 => 1,
+            Encoding::Narrow => 2,
+            Encoding::NarrowLz4 => 3,
         });
         rest.put_u32_le(0);
         cost.put(&mut rest);
@@ -93,6 +101,8 @@ impl PixelsHeader {
         let encoding = match (rest.get_u32_le(), rest.get_u32_le()) {
             (0, 0) => Encoding::Raw,
             (1, 0) => Encoding::Lz4,
+            (2, 0) => Encoding::Narrow,
+            (3, 0) => Encoding::NarrowLz4,
             (other, _) => {
                 return Err(ProtocolError::malformed(Kind::Pixels, format!("encoding {other} is not known")));
             }

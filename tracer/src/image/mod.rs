@@ -3,6 +3,8 @@
 mod compare;
 mod flip;
 mod load;
+mod reduced;
+mod resize;
 mod save;
 mod ssim;
 
@@ -11,6 +13,8 @@ use std::path::PathBuf;
 pub use compare::{Difference, compare};
 pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip};
 pub use load::{load, size};
+pub(crate) use reduced::reduce_colors;
+pub use resize::{Resizer, resize};
 pub use save::{KNOWN_EXTENSIONS, save};
 
 /// Pixels per row, and rows, that a picture has at most.

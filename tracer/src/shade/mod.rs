@@ -10,6 +10,7 @@
 //! [`crate::tile::shadow`].
 
 mod background;
+mod binomial;
 mod facet;
 mod group;
 mod material;
@@ -161,8 +162,8 @@ fn add_light<S: Simd, W: Watch>(
     }
 }
 
-/// What a light adds to the points of a block if nothing is in its way, and the points, lifted off their surfaces on the
-/// side that the light is on. Returns the bits of those that it adds something to.
+/// What a light adds to the points of a block if nothing is in its way, and, if anything may be, the points, lifted off their
+/// surfaces on the side that the light is on. Returns the bits of those that it adds something to.
 #[inline(always)]
 fn unshadowed<S: Simd>(
     simd: S,
@@ -185,19 +186,22 @@ fn unshadowed<S: Simd>(
     }
     let materials = Materials::gather(simd, frame.scene(), surfaces, block);
     let mut reflectance = materials.diffuse.scale(n_dot_l);
-    if materials.any_specular {
+    if frame.features.specular && materials.any_specular {
         let to_viewer = Vec3x16::load(simd, &surfaces.to_viewer[block]);
-        let highlight =
-            specular::highlight(simd, normals, incidence.direction, to_viewer, materials.exponent);
+        let (to_light, exponents) = (incidence.direction, materials.exponent);
+        let precision = frame.view().quality.exponent;
+        let highlight = specular::highlight(simd, normals, to_light, to_viewer, exponents, precision);
         reflectance = reflectance.add(materials.specular.scale(highlight));
     }
     let contribution = incidence.radiance.mul(reflectance);
     contribution.store(contributions);
     let [r, g, b] = contribution.0;
     let enough = r.max(g).max(b).simd_ge(splat(simd, LEAST_CONTRIBUTION));
-    let lift = surfaces.lift[block].load(simd);
-    let side = select(geometric.dot(incidence.direction).simd_lt(zero), -lift, lift);
-    points.add(geometric.scale(side)).store(lifted);
+    if light.shadows {
+        let lift = surfaces.lift[block].load(simd);
+        let side = select(geometric.dot(incidence.direction).simd_lt(zero), -lift, lift);
+        points.add(geometric.scale(side)).store(lifted);
+    }
     facing & bits(enough)
 }
 

@@ -106,7 +106,7 @@ impl Texels {
             rest &= !same;
             let Some(map) = frame.scene().materials[material as usize].texture else { continue };
             let (texture, filter) = &frame.textures()[map as usize];
-            let color = match filter {
+            let color = match frame.view().quality.filter.unwrap_or(*filter) {
                 Filter::Nearest => nearest(simd, texture, uv, same),
                 Filter::Bilinear => bilinear(simd, texture, uv, same),
             };

@@ -2,7 +2,7 @@
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::MeshMemory;
-use rayfarm_tracer::scene::{Filter, FrameView};
+use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Shading};
 use serde::Serialize;
 
 use super::super::source::Source;
@@ -35,33 +35,46 @@ pub(super) struct FeatureFacts {
 /// All features, those that the scene asks for and those that it does not.
 pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<FeatureFacts> {
     vec![
-        shadows(source),
-        specular(source, compiled),
+        shadows(source, view),
+        specular(source, compiled, view),
         smooth(source, compiled),
-        textures(source, compiled),
+        textures(source, compiled, view),
         samples(view),
     ]
 }
 
-fn shadows(source: &Source) -> FeatureFacts {
+fn shadows(source: &Source, view: &FrameView) -> FeatureFacts {
     let lights = &source.scene.lights;
     let casting = lights.iter().filter(|light| light.shadows).count();
     FeatureFacts {
         name: "shadows",
-        asked_for: casting > 0,
-        why: format!("{casting} of {} cast them", counted(lights.len() as u64, "light")),
+        asked_for: casting > 0 && view.quality.shadows,
+        why: format!(
+            "{casting} of {} cast them{}",
+            counted(lights.len() as u64, "light"),
+            turned_off(!view.quality.shadows)
+        ),
         measured_percent: SHADOWS,
         bytes: 0,
     }
 }
 
-fn specular(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
+/// What a knob does to what the scene asks for.
+fn turned_off(off: bool) -> &'static str {
+    if off { "; turned off" } else { "" }
+}
+
+fn specular(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
     let materials = &source.scene.materials;
     let specular = materials.iter().filter(|material| material.is_specular()).count();
     FeatureFacts {
         name: "specular term",
-        asked_for: compiled.features().specular,
-        why: format!("{specular} of {} have it", counted(materials.len() as u64, "material")),
+        asked_for: compiled.features().at(&view.quality).specular,
+        why: format!(
+            "{specular} of {} have it{}",
+            counted(materials.len() as u64, "material"),
+            turned_off(view.quality.shading == Shading::Diffuse)
+        ),
         measured_percent: SPECULAR,
         bytes: 0,
     }
@@ -86,9 +99,10 @@ fn smooth(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
     }
 }
 
-fn textures(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
+fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
     let maps = &source.scene.textures;
-    let nearest = maps.iter().filter(|map| map.filter == Filter::Nearest).count();
+    let filter = |own: Filter| view.quality.filter.unwrap_or(own);
+    let nearest = maps.iter().filter(|map| filter(map.filter) == Filter::Nearest).count();
     let asked_for = compiled.features().textured;
     let pictures: usize = source.textures.iter().map(|texture| texture.bytes().len()).sum();
     let uvs = taken_or_saved(source, asked_for, |memory| memory.uv_bytes, MeshMemory::full_uv_bytes);
@@ -129,7 +143,7 @@ fn taken_or_saved(
 
 /// The parts of the tracer that frames of this scene go through, in the order of the data.
 pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<String> {
-    let (scene, features) = (&source.scene, compiled.features());
+    let (scene, features) = (&source.scene, compiled.features().at(&view.quality));
     let mut kernels =
         vec!["what the eye sees: tiles of 16 x 16 rays, down trees of 16 children a node".to_owned()];
     if !scene.spheres.is_empty() {
@@ -156,12 +170,16 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
         "diffuse alone: no vectors to the eye, no powers"
     };
     kernels.push(format!("shading: {terms}, {}", counted(scene.lights.len() as u64, "light")));
-    if scene.lights.iter().any(|light| light.shadows) {
+    if view.quality.shadows && scene.lights.iter().any(|light| light.shadows) {
         kernels.push(
             "shadows: the tile's points again, seen from each light that reaches one of them".to_owned(),
         );
     }
     let averaged = if view.samples > 1 { "means in linear light, then " } else { "" };
-    kernels.push(format!("encoding: {averaged}8-bit sRGB"));
+    let rounded = match view.quality.colors {
+        ColorDepth::Exact => "",
+        ColorDepth::Reduced => ", rounded to 5, 6 and 5 bits",
+    };
+    kernels.push(format!("encoding: {averaged}8-bit sRGB{rounded}"));
     kernels
 }

@@ -70,6 +70,25 @@ fn textures_are_told_with_their_bytes() {
 }
 
 #[test]
+fn what_is_turned_off_is_not_asked_for() {
+    let more = BARE.replace("shadows = false", "shadows = true");
+    let more = more.replace("specular = [0, 0, 0]", "specular = [0.1, 0, 0]");
+    assert_eq!(asked_for(&explained(&more)), ["shadows", "specular term"]);
+    let keys = "height = 48, shadows = false, shading = 'diffuse', pixels = 'reduced', scale = 0.5";
+    let less = explained(&more.replace("height = 48", keys));
+    assert_eq!(asked_for(&less), Vec::<&str>::new());
+    assert_eq!((less.width, less.height), (64, 48));
+    assert_eq!(less.rays_per_frame_at_most, Rays { primary: 32 * 24, shadow: 0, secondary: 0 });
+    assert_eq!(less.travel.pixels_per_frame, 32 * 24 * 2);
+    let text = text::text(&less);
+    for words in
+        ["turned off", "scale 1/2, no shadows, diffuse only, 16-bit colours", "rounded to 5, 6 and 5"]
+    {
+        assert!(text.contains(words), "{words} is missing in:\n{text}");
+    }
+}
+
+#[test]
 fn what_travels_is_what_is_sent() {
     let bare = explained(BARE);
     let assets = bare.meshes.iter().map(|mesh| mesh.bytes).sum::<usize>();
