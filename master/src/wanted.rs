@@ -47,7 +47,7 @@ impl WantedPicture {
 
     /// The positions of all knobs, for reports.
     pub(crate) fn knobs(&self) -> Knobs {
-        let Quality { shadows, shading, filter, exponent, colors } = self.view.quality;
+        let Quality { adaptive, shadows, shading, filter, exponent, colors } = self.view.quality;
         Knobs {
             shadows,
             shading: word_of(&Shading::WORDS, &shading),
@@ -55,12 +55,13 @@ impl WantedPicture {
             exponent: word_of(&ExponentPrecision::WORDS, &exponent),
             colors: word_of(&ColorDepth::WORDS, &colors),
             scale: self.scale.factor(),
+            adaptive,
         }
     }
 
     /// Each knob that is not at full quality, in a few words.
     pub(crate) fn reductions(&self) -> Vec<String> {
-        let Quality { shadows, shading, filter, exponent, colors } = self.view.quality;
+        let Quality { adaptive: _, shadows, shading, filter, exponent, colors } = self.view.quality;
         let mut reductions = Vec::new();
         let mut name = |reduced: bool, words: &str| {
             if reduced {
@@ -68,6 +69,7 @@ impl WantedPicture {
             }
         };
         name(self.scale != RenderScale::Full, &format!("scale {}", self.scale.word()));
+        name(self.view.is_adaptive(), "adaptive samples");
         name(!shadows, "no shadows");
         name(shading == Shading::Diffuse, "diffuse only");
         name(filter == Some(Filter::Nearest), "nearest texels");
@@ -89,6 +91,7 @@ pub(crate) struct Knobs {
     colors: &'static str,
     /// Rendered pixels per pixel along a side.
     scale: f64,
+    adaptive: bool,
 }
 
 #[cfg(test)]
@@ -106,26 +109,35 @@ mod tests {
         assert_eq!(full().rendered(), test_scene::view());
         assert_eq!(
             serde_json::to_string(&full().knobs()).unwrap(),
-            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0}"#
+            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false}"#
         );
     }
 
     #[test]
     fn every_reduction_is_named_and_reported() {
         let mut wanted = WantedPicture { scale: RenderScale::Half, ..full() };
+        wanted.view.samples = 4;
         wanted.view.quality = Quality {
+            adaptive: true,
             shadows: false,
             shading: Shading::Diffuse,
             filter: Some(Filter::Nearest),
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
         };
-        let expected =
-            ["scale 1/2", "no shadows", "diffuse only", "nearest texels", "fast exponent", "16-bit colours"];
+        let expected = [
+            "scale 1/2",
+            "adaptive samples",
+            "no shadows",
+            "diffuse only",
+            "nearest texels",
+            "fast exponent",
+            "16-bit colours",
+        ];
         assert_eq!(wanted.reductions(), expected);
         assert_eq!(
             serde_json::to_string(&wanted.knobs()).unwrap(),
-            r#"{"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","scale":0.5}"#
+            r#"{"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","scale":0.5,"adaptive":true}"#
         );
         let (rendered, view) = (wanted.rendered(), wanted.view);
         assert_eq!((rendered.width, rendered.height), (view.width / 2, view.height / 2));

@@ -77,6 +77,7 @@ fn wrong_use_of_the_command_line_is_status_2() {
         (&["--size", "0x10"][..], &["size"][..]),
         (&["--size", "axb"], &["size"]),
         (&["--samples", "3"], &["samples"]),
+        (&["--samples", "1", "--adaptive"], &["--adaptive", "--samples 4"]),
         (&["--segment", "static:0"], &["segment"]),
         (&["--segment", "fast"], &["segment"]),
         (&["--frames", "5"], &["%0"]),

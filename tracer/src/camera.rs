@@ -40,7 +40,7 @@ impl PinholeRays {
 
     /// Direction of a sample, counted over the whole picture: its depth along the view axis is 1. Sample i of n along a
     /// side of its pixel stands at (i + 0.5) / n, so samples are a regular grid over the picture.
-    #[inline(always)]
+    #[cfg(test)]
     pub(crate) fn of_sample(&self, column: u32, row: u32) -> DVec3 {
         let n = f64::from(self.grid);
         self.through((f64::from(column) + 0.5) / n, (f64::from(row) + 0.5) / n)
@@ -53,13 +53,14 @@ impl PinholeRays {
 
     /// Where eye space is seen: (a, b, g) with depth g, and (a / g, b / g) counts samples from the top left corner.
     pub(crate) fn projection(&self) -> Affine {
-        let [right, down] = self.steps();
+        let [right, down] = self.steps(self.grid);
         Affine::new(DMat3::from_cols(right, down, self.corner).inverse(), DVec3::ZERO)
     }
 
-    /// From one sample to the next in its row, and from one row of samples to the next.
-    pub(crate) fn steps(&self) -> [DVec3; 2] {
-        [self.right, self.down].map(|step| step / f64::from(self.grid))
+    /// From one sample to the next in its row, and from one row of samples to the next, with `grid` samples along a side of
+    /// a pixel.
+    pub(crate) fn steps(&self, grid: u32) -> [DVec3; 2] {
+        [self.right, self.down].map(|step| step / f64::from(grid))
     }
 }
 

@@ -25,9 +25,10 @@ use crate::tile::Affine;
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
 
 /// Rows of a band of tiles in frames with this view. Rows that begin and end on multiples of it waste nothing: a tile
-/// has as many rays however many samples a pixel has, so with more samples it is fewer rows high.
+/// has as many rays however many samples a pixel has, so with more samples it is fewer rows high. Adaptive
+/// frames have bands of [`TILE_SIZE`] rows.
 pub fn tile_rows(view: &FrameView) -> u32 {
-    (TILE_SIZE / view.samples.isqrt().max(1)).max(1)
+    if view.is_adaptive() { TILE_SIZE } else { (TILE_SIZE / view.samples.isqrt().max(1)).max(1) }
 }
 
 /// One frame of a scene. Share it between render threads.

@@ -63,10 +63,16 @@ const WITHOUT_FOURTH: [u8; 64] = {
 
 #[inline(always)]
 fn code<S: Simd>(simd: S, linear: f32x16<S>) -> u32x16<S> {
+    simd.cvt_u32_f32x16(unrounded(simd, linear).round_ties_even())
+}
+
+/// What [`encode_lanes`] rounds: in steps of the encoding, from 0 to 255.
+#[inline(always)]
+pub(crate) fn unrounded<S: Simd>(simd: S, linear: f32x16<S>) -> f32x16<S> {
     let zero = splat(simd, 0.0);
     // False for NaN.
     let positive = select(linear.simd_gt(zero), linear, zero);
-    simd.cvt_u32_f32x16(srgb255(simd, positive.min(splat(simd, 1.0))).round_ties_even())
+    srgb255(simd, positive.min(splat(simd, 1.0)))
 }
 
 /// The linear values of all 8-bit sRGB codes: textures are made of them.

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use rayfarm_tracer::scene::{FrameView, load};
+use rayfarm_tracer::scene::{FrameView, Quality, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 const SCENES: [&str; 5] = ["room.toml", "lights.toml", "textured.toml", "instances.toml", "product.toml"];
@@ -54,12 +54,15 @@ fn a_frame_cut_into_rows_is_the_same_frame_at_any_width_and_number_of_samples() 
         for (i, width) in WIDTHS.into_iter().enumerate() {
             for grid in [1 + i as u32 % 4, 4 - i as u32 % 4] {
                 let height = 1 + next(&mut state) % 70;
-                let view = FrameView { width, height, samples: grid * grid, ..FrameView::of(scene.scene()) };
+                let quality = Quality { adaptive: next(&mut state) % 2 == 0, ..Quality::default() };
+                let samples = grid * grid;
+                let view = FrameView { width, height, samples, quality, ..FrameView::of(scene.scene()) };
                 let frame = PreparedFrame::new(Arc::clone(&scene), &view).unwrap();
                 let whole = rendered(&frame, 0..height);
                 let cuts = cuts(height, &mut state);
                 let pieces = cuts.windows(2).flat_map(|cut| rendered(&frame, cut[0]..cut[1]));
-                assert!(pieces.eq(whole), "{name}, {width} x {height}, grid {grid}, cut at {cuts:?}");
+                let same = pieces.eq(whole);
+                assert!(same, "{name}, {width} x {height}, grid {grid}, {quality:?}, cut at {cuts:?}");
             }
         }
     }
@@ -70,7 +73,9 @@ fn pieces_rendered_by_several_threads_are_the_same_frame() {
     for (name, grid) in SCENES.into_iter().zip([1, 3, 2, 4, 1]) {
         let scene = compiled(name);
         let (width, height) = (150, 61);
-        let view = FrameView { width, height, samples: grid * grid, ..FrameView::of(scene.scene()) };
+        let quality = Quality { adaptive: grid > 2, ..Quality::default() };
+        let samples = grid * grid;
+        let view = FrameView { width, height, samples, quality, ..FrameView::of(scene.scene()) };
         let frame = PreparedFrame::new(scene, &view).unwrap();
         let whole = rendered(&frame, 0..height);
         // Each thread takes every fourth piece of five rows, the last ones first.

@@ -28,6 +28,10 @@ pub(crate) struct PictureArgs {
 /// What may be left out or done more roughly; each wins over the scene file.
 #[derive(Clone, Copy, Debug, Default, Args)]
 pub(crate) struct QualityArgs {
+    /// All samples only where neighbours differ, few elsewhere.
+    #[arg(long, value_name = "on|off", num_args = 0..=1, require_equals = true, default_missing_value = "on",
+        value_parser = one_of(&SWITCH))]
+    adaptive: Option<bool>,
     /// Whether lights cast shadows.
     #[arg(long, value_name = "on|off", value_parser = one_of(&SWITCH))]
     shadows: Option<bool>,
@@ -52,12 +56,18 @@ impl QualityArgs {
     /// The knobs that the tracer knows, over those of the scene file.
     pub(crate) fn over(&self, scene: Quality) -> Quality {
         Quality {
+            adaptive: self.adaptive.unwrap_or(scene.adaptive),
             shadows: self.shadows.unwrap_or(scene.shadows),
             shading: self.shading.unwrap_or(scene.shading),
             filter: self.filter.or(scene.filter),
             exponent: self.exponent.unwrap_or(scene.exponent),
             colors: self.colors.unwrap_or(scene.colors),
         }
+    }
+
+    /// Whether it is said here that samples may be left out.
+    pub(crate) fn asks_to_adapt(&self) -> bool {
+        self.adaptive == Some(true)
     }
 
     /// The scale, over that of the scene file.

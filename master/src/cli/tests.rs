@@ -206,9 +206,10 @@ fn a_run_is_watched_and_steered() {
 fn knobs_are_read_and_win_over_the_scene() {
     use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
 
-    let all = "--shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4";
+    let all = "--adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4";
     let full = Quality::default();
     let reduced = Quality {
+        adaptive: true,
         shadows: false,
         shading: Shading::Diffuse,
         filter: Some(Filter::Nearest),
@@ -219,16 +220,19 @@ fn knobs_are_read_and_win_over_the_scene() {
     assert_eq!((args.over(full), args.scale_over(RenderScale::Half)), (reduced, RenderScale::ThreeQuarters));
     let none = view("rayfarm-master a.toml").picture.quality;
     assert_eq!((none.over(reduced), none.scale_over(RenderScale::Half)), (reduced, RenderScale::Half));
-    let back = "--shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1";
+    let back = "--adaptive=off --shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1";
     let back = view(&format!("rayfarm-master {back} a.toml")).picture.quality;
     assert_eq!(back.over(reduced), Quality { filter: Some(Filter::Bilinear), ..full });
     assert_eq!(back.scale_over(RenderScale::Half), RenderScale::Full);
     for command in ["bench", "explain"] {
         parse(&format!("rayfarm-master {command} a.toml {all}")).unwrap();
     }
-    for (wrong, known) in
-        [("--shadows yes", "on, off"), ("--scale 0.6", "1, 3/4"), ("--colors 565", "reduced")]
-    {
+    for (wrong, known) in [
+        ("--shadows yes", "on, off"),
+        ("--adaptive=yes", "on, off"),
+        ("--scale 0.6", "1, 3/4"),
+        ("--colors 565", "reduced"),
+    ] {
         let message = refused(&format!("rayfarm-master bench a.toml {wrong}"));
         assert!(message.contains(known), "{message}");
     }

@@ -70,6 +70,11 @@ impl Source {
         view.samples = samples.unwrap_or(view.samples);
         view.quality = quality.over(view.quality);
         view.validate().map_err(CommandError::wrong_input)?;
+        if quality.asks_to_adapt() && view.samples == 1 {
+            let message = "--adaptive leaves out samples, but there is only one a pixel: \
+                           ask for more with --samples 4, 9, 16, ..., or leave --adaptive out";
+            return Err(CommandError::WrongInput(message.into()));
+        }
         Ok(WantedPicture { view, scale: quality.scale_over(self.scene.render.scale) })
     }
 

@@ -296,6 +296,11 @@ pub struct FrameView {
 }
 
 impl FrameView {
+    /// Whether samples are left out where neighbours do not differ.
+    pub fn is_adaptive(&self) -> bool {
+        self.quality.adaptive && self.samples > 1
+    }
+
     /// The frame that the scene file itself asks for, at full scale.
     pub fn of(scene: &Scene) -> Self {
         let RenderSettings { width, height, samples, quality, .. } = scene.render;

@@ -11,6 +11,8 @@ use super::Filter;
 pub struct Quality {
     /// Whether lights that cast shadows do. Without, no shadow ray is traced.
     pub shadows: bool,
+    /// Whether pixels without edges get by with few samples.
+    pub adaptive: bool,
     /// The terms of the shading equation.
     pub shading: Shading,
     /// How every texture is looked up; `None` leaves it to each texture.
@@ -25,6 +27,7 @@ impl Default for Quality {
     fn default() -> Self {
         Self {
             shadows: true,
+            adaptive: false,
             shading: Shading::Full,
             filter: None,
             exponent: ExponentPrecision::Exact,

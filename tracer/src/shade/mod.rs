@@ -224,5 +224,24 @@ fn dark<S: Simd>(
     };
     let (item, triangle) = (&visible.item, &visible.triangle);
     let shadow = ShadowTile { frame: tile.frame, light, t_light, grid: tile.rays, points, item, triangle };
-    shadow.dark(simd, lit, tiles)
+    // Of a tile that sees the edge of a thing, the thing first and then what is behind it: all together would be far apart,
+    // and the light would have to look at all that lies between.
+    let Some(first) = lit.iter().position(|&lanes| lanes != 0) else { return [0; BLOCKS] };
+    let item = visible.item[first].0[lit[first].trailing_zeros() as usize];
+    let mut of_item = [0; BLOCKS];
+    let mut of_others = [0; BLOCKS];
+    for block in first..BLOCKS {
+        of_item[block] = lit[block] & visible.item[block].equal(simd, item);
+        of_others[block] = lit[block] & !of_item[block];
+    }
+    let mut dark = [0; BLOCKS];
+    for asked in [of_item, of_others] {
+        if asked != [0; BLOCKS] {
+            let found = shadow.dark(simd, asked, tiles);
+            for block in 0..BLOCKS {
+                dark[block] |= found[block];
+            }
+        }
+    }
+    dark
 }

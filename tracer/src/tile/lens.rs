@@ -44,6 +44,17 @@ impl Affine {
         Affine(rows)
     }
 
+    /// Of a map to (a, b, g): the same picture, so many times as large.
+    #[inline(always)]
+    pub(crate) fn enlarged(&self, by: f64) -> Affine {
+        let [mut a, mut b, g] = self.0;
+        for column in 0..4 {
+            a[column] *= by;
+            b[column] *= by;
+        }
+        Affine([a, b, g])
+    }
+
     /// Of a map to (a, b, g): the same with the place (x, y) of the picture in its middle.
     #[inline(always)]
     pub(crate) fn centered(&self, x: f64, y: f64) -> Affine {

@@ -34,7 +34,7 @@ mod tests;
 pub(crate) mod visible;
 mod walk;
 
-use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, mask_of, select, splat};
 
 pub(crate) use lens::Affine;
 use points::Points;
@@ -107,6 +107,16 @@ impl Rays {
         };
         let mut rays = Self { x: lanes(|(column, _)| column), y: lanes(|(_, row)| row), ..Self::empty() };
         rays.bound(simd, &[0xffff; BLOCKS]);
+        rays
+    }
+
+    /// Rays of the eye in one row with step 1, half a step above the tile's centre.
+    pub(crate) fn row<S: Simd>(simd: S, live: &[u32; BLOCKS]) -> Self {
+        let position = |index: usize| index as f32 - ((BLOCKS * LANES) as f32 - 1.0) / 2.0;
+        let x =
+            std::array::from_fn(|block| Lanes(std::array::from_fn(|lane| position(block * LANES + lane))));
+        let mut rays = Self { x, y: [Lanes([-0.5; LANES]); BLOCKS], ..Self::empty() };
+        rays.bound(simd, live);
         rays
     }
 

@@ -193,7 +193,9 @@ fn find_visible<S: Simd>(
     visible: &mut Visible,
 ) {
     let rays = Rays::grid(simd);
-    EyeTile::new(frame, &rays, live, corner).find_visible(simd, visible, &mut Scratch::new());
+    let center = [corner.0, corner.1].map(|corner| f64::from(corner + SIDE as u32 / 2));
+    let tile = EyeTile::new(frame, &rays, live, center, frame.rays.grid());
+    tile.find_visible(simd, visible, &mut Scratch::new());
 }
 
 #[test]

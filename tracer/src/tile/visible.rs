@@ -6,7 +6,7 @@ use super::cover::{Question, cover_nearest_first, cover_set_up};
 use super::lens::{Lens, ROUNDING};
 use super::setup::{At, Flats};
 use super::walk::{Interest, Walk};
-use super::{ALL_BLOCKS, BLOCKS, Rays, SIDE, Scratch};
+use super::{ALL_BLOCKS, BLOCKS, Rays, Scratch};
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
@@ -110,9 +110,11 @@ pub(crate) struct EyeTile<'a> {
     pub lens: Lens,
     /// Which rays count.
     pub live: [u32; BLOCKS],
-    /// Column and row of sample (0, 0) of the tile.
-    pub corner: (u32, u32),
-    /// The tile's centre, in samples from the corner of the picture.
+    /// Samples along a side of a pixel, as this tile counts them.
+    grid: f64,
+    /// How much larger its picture is than that of the frame.
+    enlarged: f64,
+    /// The tile's centre, in its samples from the corner of the picture.
     center: [f64; 2],
     /// Direction through the tile's centre, and what a step right and a step down add.
     pub steps: [DVec3; 3],
@@ -120,34 +122,36 @@ pub(crate) struct EyeTile<'a> {
 }
 
 impl<'a> EyeTile<'a> {
+    /// Rays around `center`, which is told in samples from the corner of the picture, `grid` of them along a side of a pixel.
     pub(crate) fn new(
         frame: &'a PreparedFrame,
         rays: &'a Rays,
         live: [u32; BLOCKS],
-        corner: (u32, u32),
+        center: [f64; 2],
+        grid: u32,
     ) -> Self {
-        let half = SIDE as f64 / 2.0;
-        let n = f64::from(frame.rays.grid());
-        let center = [f64::from(corner.0) + half, f64::from(corner.1) + half];
-        let [right, down] = frame.rays.steps();
-        let steps = [frame.rays.through(center[0] / n, center[1] / n), right, down];
+        let [right, down] = frame.rays.steps(grid);
+        let enlarged = f64::from(grid) / f64::from(frame.rays.grid());
+        let grid = f64::from(grid);
+        let steps = [frame.rays.through(center[0] / grid, center[1] / grid), right, down];
         let rounded_steps = three!(i => steps[i].as_vec3().to_array());
-        let lens = Lens::new(frame.projection.centered(center[0], center[1]), 1.0, false);
-        Self { frame, rays, lens, center, live, corner, steps, rounded_steps }
+        let picture = frame.projection.enlarged(enlarged).centered(center[0], center[1]);
+        let lens = Lens::new(picture, 1.0, false);
+        Self { frame, rays, lens, grid, enlarged, center, live, steps, rounded_steps }
     }
 
     /// How the tile sees a mesh.
     #[inline(always)]
     fn lens_of(&self, instance: &Instance) -> Lens {
         let [x, y] = self.center;
-        Lens::new(instance.projection.centered(x, y), 1.0, false)
+        Lens::new(instance.projection.enlarged(self.enlarged).centered(x, y), 1.0, false)
     }
 
     /// The ray of a lane, exactly.
     pub(crate) fn ray(&self, block: usize, lane: usize) -> Ray {
-        let (column, row) = super::place(block, lane);
-        let direction = self.frame.rays.of_sample(self.corner.0 + column as u32, self.corner.1 + row as u32);
-        Ray { origin: DVec3::ZERO, direction }
+        let x = self.center[0] + f64::from(self.rays.x[block].0[lane]);
+        let y = self.center[1] + f64::from(self.rays.y[block].0[lane]);
+        Ray { origin: DVec3::ZERO, direction: self.frame.rays.through(x / self.grid, y / self.grid) }
     }
 
     /// Directions of the rays of a block in eye space, rounded.

@@ -117,10 +117,12 @@ fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
 }
 
 fn samples(view: &FrameView) -> FeatureFacts {
+    let rays = counted(view.samples.into(), "ray");
+    let pixels = if view.is_adaptive() { "a pixel with an edge, about one elsewhere" } else { "a pixel" };
     FeatureFacts {
         name: "several samples a pixel",
         asked_for: view.samples > 1,
-        why: format!("{} a pixel; measured with 4", counted(view.samples.into(), "ray")),
+        why: format!("{rays} {pixels}; measured with 4 a pixel"),
         measured_percent: FOUR_SAMPLES,
         bytes: 0,
     }
@@ -174,6 +176,12 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
         kernels.push(
             "shadows: the tile's points again, seen from each light that reaches one of them".to_owned(),
         );
+    }
+    if view.is_adaptive() {
+        kernels.push(format!(
+            "samples: one at each corner of a pixel, one at the centre where those differ, all {} where they differ much",
+            view.samples
+        ));
     }
     let averaged = if view.samples > 1 { "means in linear light, then " } else { "" };
     let rounded = match view.quality.colors {

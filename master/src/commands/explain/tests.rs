@@ -58,6 +58,16 @@ fn each_key_that_asks_for_more_is_told() {
 }
 
 #[test]
+fn left_out_samples_are_told() {
+    let regular = explained(&BARE.replace("height = 48", "height = 48, samples = 4"));
+    let adaptive = explained(&BARE.replace("height = 48", "height = 48, samples = 4, adaptive = true"));
+    let told = |explanation: &Explanation| explanation.kernels.iter().any(|kernel| kernel.contains("corner"));
+    assert_eq!((told(&regular), told(&adaptive)), (false, true));
+    assert_eq!(asked_for(&regular), asked_for(&adaptive));
+    assert!(text::text(&adaptive).contains("adaptive samples"));
+}
+
+#[test]
 fn textures_are_told_with_their_bytes() {
     let textured = of_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/textured.toml"));
     assert!(asked_for(&textured).contains(&"textures"));

@@ -10,6 +10,7 @@ pub(super) fn quality(table: Table<'_>) -> Read<Quality> {
     let full = Quality::default();
     Ok(Quality {
         shadows: table.read("shadows", |value| value.boolean())?.unwrap_or(full.shadows),
+        adaptive: table.read("adaptive", |value| value.boolean())?.unwrap_or(full.adaptive),
         shading: table.read("shading", |value| value.word(&Shading::WORDS))?.unwrap_or(full.shading),
         filter: table.read("filter", |value| value.word(&Filter::WORDS))?,
         exponent: table
@@ -43,10 +44,11 @@ mod tests {
 
     #[test]
     fn every_knob_is_read() {
-        let all = "shadows = false\nshading = \"diffuse\"\nfilter = \"nearest\"\nexponent = \"fast\"\n\
+        let all = "samples = 4\nadaptive = true\nshadows = false\nshading = \"diffuse\"\nfilter = \"nearest\"\nexponent = \"fast\"\n\
                    pixels = \"reduced\"\nscale = 0.75";
         let reduced = Quality {
             shadows: false,
+            adaptive: true,
             shading: Shading::Diffuse,
             filter: Some(Filter::Nearest),
             exponent: ExponentPrecision::Fast,
@@ -54,7 +56,7 @@ mod tests {
         };
         let render_all = render(all).unwrap();
         assert_eq!((render_all.quality, render_all.scale), (reduced, RenderScale::ThreeQuarters));
-        let full = "shadows = true\nshading = \"full\"\nexponent = \"exact\"\npixels = \"exact\"\nscale = 1";
+        let full = "adaptive = false\nshadows = true\nshading = \"full\"\nexponent = \"exact\"\npixels = \"exact\"\nscale = 1";
         assert_eq!(render(full), render(""));
         assert_eq!(render("").unwrap().quality, Quality::default());
         assert_eq!(render("scale = 0.5").unwrap().scale, RenderScale::Half);
@@ -64,6 +66,8 @@ mod tests {
     #[test]
     fn other_positions_are_refused_with_their_place() {
         for (key, place, words) in [
+            ("adaptive = true", "2:12 ", "set `samples` to 4, 9"),
+            ("adaptive = 4", "2:12 ", "true or false, but is 4"),
             ("shadows = \"off\"", "2:11 ", "true or false, but is \"off\""),
             ("shading = \"difuse\"", "2:11 ", "did you mean `diffuse`?"),
             ("filter = \"linear\"", "2:10 ", "did you mean `bilinear`?"),

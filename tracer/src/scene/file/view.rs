@@ -15,6 +15,7 @@ pub(super) const RENDER_KEYS: &[&str] = &[
     "width",
     "height",
     "samples",
+    "adaptive",
     "max_depth",
     "min_contribution",
     "shadows",
@@ -56,7 +57,7 @@ pub(super) fn render(table: Table<'_>) -> Read<RenderSettings> {
     let default = RenderSettings::default();
     let side = |value: Value<'_>| value.whole("of pixels from 1 to 16384", 1..=MAX_SIDE);
     let share = |value: Value<'_>| value.number("from 0 to 1", |n| (0.0..=1.0).contains(&n));
-    Ok(RenderSettings {
+    let settings = RenderSettings {
         width: table.read("width", side)?.unwrap_or(default.width),
         height: table.read("height", side)?.unwrap_or(default.height),
         samples: table.read("samples", samples)?.unwrap_or(default.samples),
@@ -68,7 +69,16 @@ pub(super) fn render(table: Table<'_>) -> Read<RenderSettings> {
             .map_or(default.min_contribution, |share| share as f32),
         quality: quality(table)?,
         scale: table.read("scale", scale)?.unwrap_or_default(),
-    })
+    };
+    let idle = settings.quality.adaptive && settings.samples == 1;
+    table.read("adaptive", |value| if idle { Err(nothing_to_adapt(&value)) } else { Ok(()) })?;
+    Ok(settings)
+}
+
+fn nothing_to_adapt(value: &Value<'_>) -> Fault {
+    value.fault(
+        "`adaptive = true` leaves out samples, but there is only one a pixel: set `samples` to 4, 9, 16, ...",
+    )
 }
 
 fn samples(value: Value<'_>) -> Read<u32> {

@@ -1,0 +1,35 @@
+//! Rows are the same bytes whoever renders them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::*;
+use crate::scene::{FrameView, Quality};
+use crate::{CompiledScene, simd};
+
+/// Every kind of light, primitive, normal, exponent and texture, on every level that this machine has.
+#[test]
+fn all_levels_of_simd_render_the_same_bytes() {
+    for scene in ["lights.toml", "room.toml", "textured.toml"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(scene);
+        let loaded = crate::scene::load(&path).unwrap();
+        let own = FrameView::of(&loaded.scene);
+        let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap());
+        for (samples, adaptive) in [(4, false), (9, true)] {
+            let quality = Quality { adaptive, ..own.quality };
+            let view = FrameView { width: 150, height: 110, samples, quality, ..own };
+            let mut frame = PreparedFrame::new(Arc::clone(&compiled), &view).unwrap();
+            let mut bytes_at = |level| {
+                frame.level = level;
+                let mut bytes = vec![0; 150 * 110 * 3];
+                render_rows(&frame, 0..110, &mut bytes, &|| false).unwrap();
+                bytes
+            };
+            let first = bytes_at(simd::best());
+            for level in simd::all() {
+                let same = bytes_at(level) == first;
+                assert!(same, "{scene}, {samples} samples, adaptive {adaptive}, with {}", simd::name(level));
+            }
+        }
+    }
+}

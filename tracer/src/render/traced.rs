@@ -1,0 +1,47 @@
+//! A tile of rays, from what they see to their colours.
+
+use super::RayCounts;
+use crate::frame::PreparedFrame;
+use crate::shade::{self, Colors};
+use crate::simd::Simd;
+use crate::stage::{Stage, Watch};
+use crate::tile;
+use crate::tile::visible::{EyeTile, Visible};
+
+/// Room for a tile, kept from tile to tile.
+pub(super) struct Scratch {
+    visible: Visible,
+    tile: tile::Scratch,
+    shade: shade::Scratch,
+}
+
+impl Scratch {
+    pub(super) fn new(frame: &PreparedFrame) -> Self {
+        Self { visible: Visible::empty(), tile: tile::Scratch::new(), shade: shade::Scratch::new(frame) }
+    }
+}
+
+/// Colours of the rays of a tile, in linear light. A function of its own on each level: whoever renders tiles calls the same
+/// one, because it takes long to compile.
+#[inline(never)]
+pub(super) fn trace<'a, S: Simd, W: Watch>(
+    simd: S,
+    tile: &EyeTile<'_>,
+    scratch: &'a mut Scratch,
+    counts: &mut RayCounts,
+    watch: &mut W,
+) -> &'a Colors {
+    watch.enter(Stage::Visible);
+    for lanes in tile.live {
+        counts.primary += u64::from(lanes.count_ones());
+    }
+    let Scratch { visible, tile: room, shade: shading } = scratch;
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            tile.find_visible(simd, visible, room);
+            shade::shade(simd, tile, visible, shading, room, counts, watch);
+        },
+    );
+    &shading.colors
+}
