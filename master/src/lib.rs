@@ -11,6 +11,7 @@ mod chains;
 mod cli;
 mod commands;
 mod control;
+mod dial;
 mod display;
 mod driver;
 mod error;

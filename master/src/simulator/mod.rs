@@ -28,6 +28,8 @@ mod tests;
 
 pub use costs::CostProfile;
 pub use passing::{Passed, PassingSetup, pass};
+#[cfg(test)]
+pub(crate) use dice::Dice;
 pub use survival::{Schedule, Survivor, survive};
 pub use tally::Measured;
 
