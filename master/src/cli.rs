@@ -15,6 +15,7 @@ use crate::control::Place;
 pub(crate) use values::Size;
 use values::{frame_count, ray_count, sample_count, size, thread_count, worker_count};
 
+mod dial;
 mod farm;
 mod picture;
 mod plot;
@@ -22,6 +23,7 @@ mod simulate;
 mod tradeoff;
 mod values;
 
+pub(crate) use dial::{DialArgs, ErrorArgs};
 pub(crate) use farm::FarmArgs;
 pub(crate) use picture::{PictureArgs, QualityArgs};
 pub(crate) use plot::PlotArgs;
@@ -119,6 +121,8 @@ pub(crate) struct ViewArgs {
     pub(crate) farm: FarmArgs,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
+    #[command(flatten)]
+    pub(crate) dial: DialArgs,
     /// End after N frames; without it, the window stays until Esc.
     #[arg(long, value_name = "N", value_parser = frame_count)]
     pub(crate) frames: Option<u32>,
@@ -141,6 +145,8 @@ pub(crate) struct RenderArgs {
     pub(crate) farm: FarmArgs,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
+    #[command(flatten)]
+    pub(crate) error: ErrorArgs,
     /// Frames to render.
     #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
     pub(crate) frames: u32,

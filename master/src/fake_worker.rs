@@ -23,6 +23,8 @@ pub(crate) enum Script {
     VanishAt(usize),
     /// Answers its first lease only when it is told to.
     Late(oneshot::Receiver<()>),
+    /// Answers no lease of a frame that is as wide as that, or wider.
+    OnlyNarrowerThan(u32),
     /// Sends a byte too few.
     Short,
     /// Answers every lease twice.
@@ -121,10 +123,12 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
     let misdeed = match script {
         Script::VanishAt(_) => Script::Honest,
         Script::Lie => Script::Lie,
+        Script::OnlyNarrowerThan(width) if view.width >= *width => return,
+        Script::OnlyNarrowerThan(_) => Script::Honest,
         _ => std::mem::replace(script, Script::Honest),
     };
     let answers = match misdeed {
-        Script::Honest | Script::VanishAt(_) | Script::Babble => 1,
+        Script::Honest | Script::VanishAt(_) | Script::OnlyNarrowerThan(_) | Script::Babble => 1,
         Script::Late(go) => {
             let sender = sender.clone();
             tokio::spawn(async move {

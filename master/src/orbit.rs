@@ -18,6 +18,11 @@ pub(crate) struct Animation {
 }
 
 impl Animation {
+    /// Whether frames differ without anybody's doing.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.orbit != 0.0 || self.spin != 0.0
+    }
+
     /// What frame `index` (from 0) shows: frame 0 is `base` itself, bit for bit.
     pub(crate) fn view(&self, base: &FrameView, index: u64) -> FrameView {
         let frames = f64::from(self.frames.max(1));

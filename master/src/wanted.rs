@@ -42,7 +42,8 @@ impl WantedPicture {
         let fits = |scale: &RenderScale| Self { scale: *scale, ..*self }.size() == size;
         // Its size is none of these while the window is being resized.
         let scale = RenderScale::ALL.into_iter().rev().find(fits).unwrap_or_default();
-        Self { view: FrameView { quality: frame.quality, ..self.view }, scale }
+        let view = FrameView { samples: frame.samples, quality: frame.quality, ..self.view };
+        Self { view, scale }
     }
 
     /// The positions of all knobs, for reports.

@@ -237,3 +237,16 @@ fn knobs_are_read_and_win_over_the_scene() {
         assert!(message.contains(known), "{message}");
     }
 }
+
+#[test]
+fn a_rate_and_an_error_are_numbers_in_their_range() {
+    let args = view("rayfarm-master --target-fps 60 --max-error 0.05").dial;
+    assert_eq!((args.target_fps, args.error.max_error), (Some(60.0), Some(0.05)));
+    assert_eq!(render("rayfarm-master render a.toml -o b.png --max-error 0").error.max_error, Some(0.0));
+    for wrong in
+        ["--target-fps 0", "--target-fps fast", "--target-fps nan", "--max-error=-1", "--max-error 2"]
+    {
+        let message = refused(&format!("rayfarm-master {wrong}"));
+        assert!(message.contains("such as"), "{message}");
+    }
+}

@@ -10,6 +10,8 @@ const MAX_LOCAL_WORKERS: u32 = 64;
 const MAX_THREADS: usize = 1_024;
 const MAX_REPEATS: u32 = 1_000;
 const MAX_RAYS: u64 = 1_000_000_000_000;
+const MIN_RATE: f64 = 0.1;
+const MAX_RATE: f64 = 1000.0;
 
 /// Picture size in pixels; neither side is zero or above [`MAX_SIDE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +64,18 @@ pub(super) fn repeat_count(text: &str) -> Result<u32, String> {
 /// One ray or more.
 pub(super) fn ray_count(text: &str) -> Result<u64, String> {
     whole_number(text, 1, MAX_RAYS)
+}
+
+/// Frames a second that somebody may want.
+pub(super) fn frame_rate(text: &str) -> Result<f64, String> {
+    let in_range = text.parse().ok().filter(|rate| (MIN_RATE..=MAX_RATE).contains(rate));
+    in_range.ok_or_else(|| format!("expected frames a second from {MIN_RATE} to {MAX_RATE}, such as 60"))
+}
+
+/// A mean FLIP error.
+pub(super) fn error_limit(text: &str) -> Result<f64, String> {
+    let in_range = text.parse().ok().filter(|error| (0.0..=1.0).contains(error));
+    in_range.ok_or_else(|| "expected a mean FLIP error from 0 to 1, such as 0.05".to_owned())
 }
 
 /// A finite angle.

@@ -5,6 +5,7 @@ mod check_numerics;
 mod compile;
 mod explain;
 mod interrupt;
+mod ladder;
 mod oversight;
 mod plot;
 mod render;

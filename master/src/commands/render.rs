@@ -10,6 +10,7 @@ use rayfarm_tracer::scene::{FrameView, RenderScale};
 use tokio_util::sync::CancellationToken;
 
 use super::interrupt::cancelled_by_signals;
+use super::ladder::within;
 use super::oversight::Oversight;
 use super::source::{Source, animation};
 use crate::accounting::RunAccount;
@@ -47,7 +48,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let pattern = OutputPattern::parse(&args.output, args.frames)?;
     pattern.path(0).as_deref().map(check_writable).transpose()?;
     let source = Source::load(&args.scene)?;
-    let wanted = source.wanted(&args.picture)?;
+    let wanted = within(&args.error, &source.scene, source.wanted(&args.picture)?);
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
     let oversight = Oversight::new(&args.oversight)?;

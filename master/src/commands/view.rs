@@ -5,6 +5,7 @@ use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::interrupt::cancelled_by_signals;
+use super::ladder::turned;
 use super::oversight::Oversight;
 use super::source::{Source, animation, default_scene};
 use crate::camera_control::CameraControl;
@@ -26,7 +27,9 @@ const FRAMES_PER_ORBIT: u32 = 360;
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
     let source = Source::load(&path)?;
-    let picture = source.wanted(&args.picture)?;
+    let asked = source.wanted(&args.picture)?;
+    let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
+    let (picture, dial) = turned(&args.dial, &source.scene, asked, animation.is_moving());
     let view = picture.view;
     let compiled = source.compiled()?;
     let about = About {
@@ -47,12 +50,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
 
     let runtime = super::runtime()?;
     let (wanted, wishes) = watch::channel(picture);
-    let orders = Orders {
-        wanted: wishes,
-        animation: animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT)),
-        limit: args.frames.map(u64::from),
-        log,
-    };
+    let orders = Orders { wanted: wishes, animation, limit: args.frames.map(u64::from), log, dial };
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
     let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, &oversight, stop))?;

@@ -3,7 +3,6 @@
 //! Always two frames are asked for: the one being rendered and the one after it, so that workers which have nothing
 //! left to do in the first begin the second. A moved camera replaces the second as long as it has not begun.
 
-use std::collections::VecDeque;
 use std::fs::File;
 use std::io::BufWriter;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,17 +13,17 @@ use tokio_util::sync::CancellationToken;
 
 use super::frame_rate::FrameRate;
 use super::latency::Latency;
+use super::requests::{Answered, Requests};
 use crate::accounting::Fading;
+use crate::dial::Dial;
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame, FrameId};
+use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame};
 use crate::orbit::Animation;
 use crate::report::{FpsLog, FrameLine};
 use crate::wanted::WantedPicture;
 
 /// How often the window learns of workers that come and go.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
-/// The frame being rendered and the one after it.
-const OPEN_REQUESTS: usize = 2;
 
 /// What is asked of the farm.
 pub(crate) struct Orders {
@@ -36,14 +35,27 @@ pub(crate) struct Orders {
     pub(crate) limit: Option<u64>,
     /// Where each frame is noted.
     pub(crate) log: Option<FpsLog<BufWriter<File>>>,
+    /// What holds a rate, if one is to be held.
+    pub(crate) dial: Option<Dial>,
+}
+
+/// A picture for the window.
+#[derive(Debug)]
+pub(crate) struct Arrival {
+    /// The picture and what it took.
+    pub(crate) frame: FinishedFrame,
+    /// When what it shows was first wanted.
+    pub(crate) asked_at: Instant,
+    /// What the dial says of it.
+    pub(crate) dial: Vec<String>,
 }
 
 /// What the window may know at any moment.
 #[derive(Debug)]
 pub(crate) struct News {
     started: Instant,
-    /// The newest picture that the window has not taken yet, and when it was asked for.
-    latest: Option<(FinishedFrame, Instant)>,
+    /// The newest picture that the window has not taken yet.
+    latest: Option<Arrival>,
     status: FarmStatus,
     rate: FrameRate,
     latency: Latency,
@@ -73,8 +85,8 @@ impl NewsDesk {
         })))
     }
 
-    /// The newest picture, once, and when it was asked for.
-    pub(crate) fn take_picture(&self) -> Option<(FinishedFrame, Instant)> {
+    /// The newest picture, once.
+    pub(crate) fn take_picture(&self) -> Option<Arrival> {
         self.lock().latest.take()
     }
 
@@ -135,7 +147,7 @@ impl NewsDesk {
     }
 
     /// Notes a finished frame and returns its line for the log.
-    fn completed_frame(&self, frame: FinishedFrame, asked_at: Instant) -> FrameLine {
+    fn completed_frame(&self, frame: FinishedFrame, answered: Answered) -> FrameLine {
         let mut news = self.lock();
         let at = news.started.elapsed();
         news.rate.completed(at, frame.elapsed);
@@ -143,7 +155,8 @@ impl NewsDesk {
         let line = FrameLine::of(&frame, news.completed, at, frame.elapsed, news.rate.fps(at));
         news.completed += 1;
         news.last_completed = at;
-        news.latest = Some((frame, asked_at));
+        let Answered { asked_at, dial } = answered;
+        news.latest = Some(Arrival { frame, asked_at, dial });
         line
     }
 
@@ -176,8 +189,8 @@ async fn drive(
     desk: &NewsDesk,
     stop: &CancellationToken,
 ) -> Result<(), CommandError> {
-    let Orders { mut wanted, animation, limit, mut log } = orders;
-    let mut requests = Requests::new(animation, limit);
+    let Orders { mut wanted, animation, limit, mut log, dial } = orders;
+    let mut requests = Requests::new(animation, limit, dial);
     let mut look = tokio::time::interval(STATUS_EVERY);
     let mut window_is_there = true;
     requests.fill(farm, &wanted.borrow_and_update().clone());
@@ -187,8 +200,8 @@ async fn drive(
             () = stop.cancelled() => return Ok(()),
             frame = farm.finished() => {
                 let Some(frame) = desk.frame_or_trouble(frame)? else { continue };
-                let asked_at = requests.finished(frame.frame);
-                let line = desk.completed_frame(frame, asked_at);
+                let answered = requests.finished(&frame);
+                let line = desk.completed_frame(frame, answered);
                 if let Some(log) = &mut log {
                     log.add(&line)?;
                 }
@@ -201,81 +214,19 @@ async fn drive(
                 window_is_there = changed.is_ok();
                 requests.replace(farm, &wanted.borrow_and_update().clone());
             }
+            () = until(requests.rests_at()) => requests.rest(farm, &wanted.borrow_and_update().clone()),
             _ = look.tick() => desk.lock().status = farm.status(),
         }
     }
 }
 
-/// Which frames have been asked for and are not here yet.
-struct Requests {
-    animation: Animation,
-    limit: Option<u64>,
-    /// The number, within the animation, of the next frame to ask for.
-    next: u64,
-    open: VecDeque<Open>,
-    /// In which a picture was wanted last.
-    size: Option<(u32, u32)>,
-    /// When the camera moved last, until a frame that shows it is finished.
-    moved_at: Option<Instant>,
-}
-
-/// A frame that was asked for.
-struct Open {
-    frame: FrameId,
-    /// When what it shows was first wanted.
-    asked_at: Instant,
-}
-
-impl Requests {
-    fn new(animation: Animation, limit: Option<u64>) -> Self {
-        Self { animation, limit, next: 0, open: VecDeque::new(), size: None, moved_at: None }
-    }
-
-    /// Asks until two are open.
-    fn fill(&mut self, farm: &Farm, base: &WantedPicture) {
-        while self.open.len() < OPEN_REQUESTS && self.ask(farm, base) {}
-    }
-
-    /// Frames come in order: all up to `frame` are done, or were replaced and will never come. When this one was
-    /// asked for.
-    fn finished(&mut self, frame: FrameId) -> Instant {
-        let asked_at =
-            self.open.iter().find(|open| open.frame == frame).map_or_else(Instant::now, |open| open.asked_at);
-        self.open.retain(|open| open.frame > frame);
-        self.moved_at = self.moved_at.filter(|&moved_at| moved_at > asked_at);
-        asked_at
-    }
-
-    /// The next one is due. Asking even when two seem open costs nothing: one of them was replaced, or this replaces
-    /// a request that has not begun by one for a newer camera.
-    fn after_finish(&mut self, farm: &Farm, base: &WantedPicture) {
-        self.ask(farm, base);
-        self.fill(farm, base);
-    }
-
-    /// The camera has moved: the last request shall show what it sees now.
-    fn replace(&mut self, farm: &Farm, base: &WantedPicture) {
-        self.moved_at = Some(Instant::now());
-        self.next = self.next.saturating_sub(1);
-        self.ask(farm, base);
-        self.fill(farm, base);
-    }
-
-    fn ask(&mut self, farm: &Farm, base: &WantedPicture) -> bool {
-        if self.limit.is_some_and(|limit| self.next >= limit) && !self.open.is_empty() {
-            return false;
-        }
-        let size = (base.view.width, base.view.height);
-        if self.size.replace(size).is_some_and(|before| before != size) {
-            // The window has another size: what is on the way was for the one before. Another scale alone changes nothing about that.
-            farm.give_up();
-            self.open.clear();
-        }
-        let view = self.animation.view(&base.rendered(), self.next);
-        // A request that is asked for again, because the one before was replaced, is as old as the camera it shows.
-        let asked_at = self.moved_at.unwrap_or_else(Instant::now);
-        self.open.push_back(Open { frame: farm.request(view), asked_at });
-        self.next += 1;
-        true
+/// Waits until then; for ever where there is no such moment.
+async fn until(at: Option<Instant>) {
+    match at {
+        Some(at) => tokio::time::sleep_until(at.into()).await,
+        None => std::future::pending().await,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,6 +10,7 @@ pub(crate) mod frame_rate;
 mod input;
 mod latency;
 pub(crate) mod overlay;
+mod requests;
 mod screen;
 mod steering;
 mod tint;

@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use super::canvas::{Canvas, Picture};
-use super::feed::NewsDesk;
+use super::feed::{Arrival, NewsDesk};
 use super::input::{Controls, Happened};
 use super::overlay::{self, Figures, accounts, legend};
 use super::screen;
@@ -49,6 +49,8 @@ pub(crate) struct Display {
     about: About,
     canvas: Canvas,
     picture: Option<FinishedFrame>,
+    /// What the dial says of it.
+    dial: Vec<String>,
     /// When the picture was asked for, until it is on the screen.
     asked_at: Option<Instant>,
     show_help: bool,
@@ -85,6 +87,7 @@ impl Display {
             about,
             canvas: Canvas::default(),
             picture: None,
+            dial: Vec::new(),
             asked_at: None,
             show_help: false,
             show_figures: true,
@@ -146,8 +149,8 @@ impl Display {
         self.show_figures ^= happened.toggle_figures;
         (0..happened.next_coloring).for_each(|_| self.coloring = self.coloring.next());
         let mut fresh = happened.toggle_help || happened.toggle_figures || happened.next_coloring > 0;
-        if let Some((picture, asked_at)) = link.desk.take_picture() {
-            (self.picture, self.asked_at) = (Some(picture), Some(asked_at));
+        if let Some(Arrival { frame, asked_at, dial }) = link.desk.take_picture() {
+            (self.picture, self.asked_at, self.dial) = (Some(frame), Some(asked_at), dial);
             fresh = true;
         }
         fresh
@@ -229,7 +232,8 @@ impl Display {
             frame_time,
             latency: link.desk.latency(),
             size: (view.width, view.height),
-            samples: view.samples,
+            samples: shown.view.samples,
+            dial: self.dial.clone(),
             reductions: shown.reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),

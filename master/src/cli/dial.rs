@@ -1,0 +1,25 @@
+//! The options that trade accuracy for speed by what it costs.
+
+use clap::Args;
+
+use super::values::{error_limit, frame_rate};
+
+/// How fast a window shall be.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct DialArgs {
+    /// Hold N frames a second while the picture moves, at the least loss of quality that this takes; a picture at rest is
+    /// the full one.
+    #[arg(long, value_name = "N", value_parser = frame_rate)]
+    pub(crate) target_fps: Option<f64>,
+    #[command(flatten)]
+    pub(crate) error: ErrorArgs,
+}
+
+/// How much may be lost.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ErrorArgs {
+    /// The fastest setting whose mean FLIP error is at most E: 0 is none, 1 is white for black. With --target-fps, the most
+    /// that a moving picture may lose.
+    #[arg(long, value_name = "E", value_parser = error_limit)]
+    pub(crate) max_error: Option<f64>,
+}

@@ -1,0 +1,63 @@
+//! What a rung does to a picture: some knobs turned down, the others left where they are.
+
+use rayfarm_tracer::scene::{ExponentPrecision, RenderScale, Scene, Shading};
+
+use crate::wanted::WantedPicture;
+
+/// Positions that no knob stands above.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Setting {
+    /// Rays per pixel at most.
+    pub(crate) samples: u32,
+    /// The largest scale.
+    pub(crate) scale: RenderScale,
+    /// Whether shadows may be cast.
+    pub(crate) shadows: bool,
+    /// The most terms.
+    pub(crate) shading: Shading,
+    /// The best precision of the highlight's power.
+    pub(crate) exponent: ExponentPrecision,
+}
+
+impl Setting {
+    /// Leaves every picture as it is.
+    pub(crate) const FULL: Self = Self {
+        samples: u32::MAX,
+        scale: RenderScale::Full,
+        shadows: true,
+        shading: Shading::Full,
+        exponent: ExponentPrecision::Exact,
+    };
+
+    /// The picture at this setting. No knob is turned up.
+    pub(crate) fn applied(&self, wanted: &WantedPicture) -> WantedPicture {
+        let mut picture = *wanted;
+        picture.scale = wanted.scale.min(self.scale);
+        picture.view.samples = wanted.view.samples.min(self.samples);
+        let quality = &mut picture.view.quality;
+        quality.shadows &= self.shadows;
+        if self.shading == Shading::Diffuse {
+            quality.shading = Shading::Diffuse;
+        }
+        if self.exponent == ExponentPrecision::Fast {
+            quality.exponent = ExponentPrecision::Fast;
+        }
+        picture
+    }
+
+    /// This without what makes no difference to pictures of a scene: the same pixels would come, and no sooner.
+    pub(crate) fn for_scene(&self, scene: &Scene) -> Self {
+        let shadows = scene.lights.iter().any(|light| light.shadows);
+        let specular = scene.materials.iter().any(|material| material.is_specular());
+        let mut setting = *self;
+        setting.shadows |= !shadows;
+        // Without the term, its precision is nobody's business.
+        if !specular {
+            setting.shading = Shading::Full;
+        }
+        if !specular || setting.shading == Shading::Diffuse {
+            setting.exponent = ExponentPrecision::Exact;
+        }
+        setting
+    }
+}

@@ -1,0 +1,142 @@
+//! The feed with a dial, over a farm with workers that follow a script.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use rayfarm_tracer::scene::{FrameView, RenderScale};
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use super::{Arrival, NewsDesk, Orders, run};
+use crate::dial::{Dial, Shown, prior_ladder};
+use crate::error::CommandError;
+use crate::fake_worker::{self, Script, is_picture};
+use crate::farm::{Farm, FarmOptions, FarmScene};
+use crate::orbit::Animation;
+use crate::test_scene::{scene, view};
+use crate::wanted::WantedPicture;
+
+/// Far beyond what any of these tests takes.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// A rate that no setting reaches, so that the cheapest one is chosen.
+const TOO_FAST: f64 = 1e7;
+const STILL: Animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };
+
+struct Feed {
+    wanted: watch::Sender<WantedPicture>,
+    desk: NewsDesk,
+    stop: CancellationToken,
+    task: JoinHandle<Result<(), CommandError>>,
+}
+
+impl Feed {
+    async fn start(script: Script, animation: Animation, dial: Option<Dial>) -> Self {
+        let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
+        let options = FarmOptions { listen, ..FarmOptions::default() };
+        let scene = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
+        let farm = Farm::start(options, scene).await.unwrap();
+        fake_worker::start(farm.address(), script).await;
+        let (wanted, wishes) = watch::channel(turned(0));
+        let (desk, stop) = (NewsDesk::new(), CancellationToken::new());
+        let orders = Orders { wanted: wishes, animation, limit: None, log: None, dial };
+        let task = tokio::spawn(run(farm, orders, desk.clone(), stop.clone()));
+        Self { wanted, desk, stop, task }
+    }
+
+    /// The next picture that is like that, doing something meanwhile.
+    async fn picture(&self, mut meanwhile: impl FnMut(), like: impl Fn(&Arrival) -> bool) -> Arrival {
+        let wait = async {
+            loop {
+                meanwhile();
+                if let Some(arrival) = self.desk.take_picture().filter(&like) {
+                    return arrival;
+                }
+                tokio::time::sleep(Duration::from_millis(1)).await;
+            }
+        };
+        tokio::time::timeout(PATIENCE, wait).await.expect("such a picture never comes")
+    }
+
+    async fn end(self) {
+        self.stop.cancel();
+        self.task.await.unwrap().unwrap();
+    }
+}
+
+fn turned(spin: u32) -> WantedPicture {
+    WantedPicture { view: FrameView { spin: f64::from(spin), ..view() }, scale: RenderScale::Full }
+}
+
+/// One that has seen what full pictures take.
+fn dial(animated: bool) -> Dial {
+    let mut dial = Dial::new(prior_ladder(&scene(), &turned(0)), TOO_FAST, animated);
+    let ms = |ms| Duration::from_millis(ms);
+    (1..20).for_each(|frame| dial.finished(ms(10 * frame), ms(10), Shown::Resting, Duration::ZERO));
+    dial
+}
+
+fn is_at_rest(arrival: &Arrival) -> bool {
+    arrival.dial.first().is_some_and(|line| line.starts_with("at rest"))
+}
+
+fn is_reduced(arrival: &Arrival) -> bool {
+    arrival.frame.view.width < view().width
+}
+
+#[tokio::test]
+async fn what_moves_is_reduced_and_what_rests_is_the_full_picture_to_the_last_bit() {
+    let plain = Feed::start(Script::Honest, STILL, None).await;
+    let feed = Feed::start(Script::Honest, STILL, Some(dial(false))).await;
+    let first = feed.picture(|| (), |_| true).await;
+    assert!(is_at_rest(&first) && is_picture(&turned(0).view, &first.frame.pixels));
+
+    let mut spin = 0;
+    let turn = || {
+        spin += 1;
+        feed.wanted.send_replace(turned(spin));
+    };
+    let moving = feed.picture(turn, is_reduced).await;
+    assert!(moving.dial[0].starts_with("moving: loses FLIP 0."), "{:?}", moving.dial);
+    assert!(is_picture(&moving.frame.view, &moving.frame.pixels));
+
+    let last = turned(spin).view;
+    let rests = feed.picture(|| (), |it| is_at_rest(it) && it.frame.view.spin == last.spin).await;
+    assert_eq!(rests.frame.view, last);
+    assert!(is_picture(&last, &rests.frame.pixels));
+    plain.wanted.send_replace(turned(spin));
+    let without = plain.picture(|| (), |arrival| arrival.frame.view.spin == last.spin).await;
+    assert_eq!(*rests.frame.pixels, *without.frame.pixels);
+    assert!(without.dial.is_empty());
+    feed.end().await;
+    plain.end().await;
+}
+
+#[tokio::test]
+async fn a_full_picture_on_the_way_gives_way_to_a_moving_one() {
+    let feed = Feed::start(Script::OnlyNarrowerThan(view().width), STILL, Some(dial(false))).await;
+    // Nobody finishes the full one.
+    tokio::time::timeout(PATIENCE, async {
+        while feed.desk.status().frame.is_none() {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    })
+    .await
+    .unwrap();
+    feed.wanted.send_replace(turned(1));
+    let moving = feed.picture(|| (), |_| true).await;
+    assert!(is_reduced(&moving));
+    assert_eq!(moving.frame.view.spin, 1.0);
+    feed.end().await;
+}
+
+#[tokio::test]
+async fn an_animation_never_rests() {
+    let spinning = Animation { spin: 1.0, ..STILL };
+    let feed = Feed::start(Script::Honest, spinning, Some(dial(true))).await;
+    for _ in 0..20 {
+        let frame = feed.picture(|| (), |_| true).await;
+        assert!(!is_at_rest(&frame) && is_reduced(&frame));
+    }
+    feed.end().await;
+}
