@@ -121,9 +121,11 @@ fn to_worker(random: &mut Random, n: u64) -> ToWorker {
 fn to_master(random: &mut Random, n: u64) -> ToMaster {
     match random.below(3) {
         0 => ToMaster::Pong { nonce: n },
-        1 => {
-            ToMaster::NeedAsset { id: AssetId([n as u8; 32]), offset: u64::from(n as u8), again: n % 2 == 0 }
-        }
+        1 => ToMaster::NeedAsset {
+            id: AssetId([n as u8; 32]),
+            offset: u64::from(n as u8),
+            again: n.is_multiple_of(2),
+        },
         _ => pixels(n as u32, random.below(9000) as usize),
     }
 }

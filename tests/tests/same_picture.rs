@@ -139,7 +139,7 @@ fn knobs_of_the_file_and_of_the_command_line_are_the_tracers() {
         assert!(rayfarm_tracer::image::load(&scenes.path("a.png")).unwrap() == expected);
         assert_eq!(report["rays_per_frame"]["shadow"], 0);
         let quality = serde_json::json!({
-            "shadows": false, "shading": "diffuse", "filter": null, "exponent": "fast", "colors": "exact", "scale": 1.0
+            "adaptive": false, "shadows": false, "shading": "diffuse", "filter": null, "exponent": "fast", "colors": "exact", "scale": 1.0
         });
         assert_eq!(report["quality"], quality);
     }

@@ -61,7 +61,7 @@ fn wrong_use_leaves_nothing() {
     scenes.write("file", "");
     let before = scenes.names();
     for (args, word) in [
-        ("tradeoff", "--saved"),
+        ("tradeoff", "<SCENE>"),
         ("tradeoff nowhere.toml", "nowhere.toml"),
         ("tradeoff small.toml -o file", "file"),
         ("tradeoff small.toml --repeats 0", "from 1 to 1000"),

@@ -165,7 +165,12 @@ impl<R: Renderer> Duty<'_, R> {
                         return End::Lost(format!("it ends this session: {reason}"));
                     }
                     Effect::End { reason, .. } => return End::Goodbye(reason),
-                    Effect::Say(message) => self.say(message).await,
+                    Effect::Say(message) => {
+                        if let (ToMaster::NeedAsset { id, .. }, Some(sharing)) = (&message, &self.sharing) {
+                            sharing.shelf.expect(*id);
+                        }
+                        self.say(message).await;
+                    }
                     effect => {
                         if let Err(why) = self.perform(effect, answers.as_ref(), &from_peers) {
                             return End::Lost(why);

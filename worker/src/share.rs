@@ -4,8 +4,8 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, MAX_FOLLOWERS, PEER_PULSE};
-use rayfarm_protocol::passing::{Passed, hear, pass};
+use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, MAX_FOLLOWERS, MAX_PULSES, PEER_PULSE};
+use rayfarm_protocol::passing::{Fetch, Passed, hear, pass};
 use rayfarm_protocol::{AssetId, ProtocolError};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
@@ -13,7 +13,7 @@ use tokio::sync::Semaphore;
 use tokio::task::JoinSet;
 
 use crate::growing::Growing;
-use crate::shelf::Shelf;
+use crate::shelf::{Opened, Shelf};
 
 /// After a failed accept, so that it does not fail as fast as it can.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -55,7 +55,7 @@ pub(crate) async fn answer(
     shelf: &Shelf,
 ) -> Result<(), ProtocolError> {
     let fetch = hear(stream).await?;
-    match shelf.open(&fetch) {
+    match wait_for(stream, &fetch, shelf).await? {
         Some(bytes) => {
             pass(stream, fetch.id, Passed::Begin { size: bytes.size() as u64 }).await?;
             pass_on(stream, fetch.id, &bytes, usize::try_from(fetch.offset).unwrap_or(usize::MAX)).await?;
@@ -63,6 +63,26 @@ pub(crate) async fn answer(
         None => pass(stream, fetch.id, Passed::Unknown).await?,
     }
     stream.shutdown().await.map_err(|source| ProtocolError::Io { doing: "sending", source })
+}
+
+/// What is asked for, when its first byte is about to come.
+async fn wait_for(
+    stream: &mut (impl AsyncWrite + Unpin),
+    fetch: &Fetch,
+    shelf: &Shelf,
+) -> Result<Option<Arc<Growing>>, ProtocolError> {
+    for _ in 0..MAX_PULSES {
+        let filled = shelf.filled();
+        match shelf.open(fetch) {
+            Opened::Here(bytes) => return Ok(Some(bytes)),
+            Opened::Closed => return Ok(None),
+            Opened::Expected => {}
+        }
+        if tokio::time::timeout(PEER_PULSE, filled).await.is_err() {
+            pass(stream, fetch.id, Passed::Waits).await?;
+        }
+    }
+    Ok(None)
 }
 
 async fn pass_on(

@@ -28,7 +28,7 @@ async fn patiently<T>(what: impl Future<Output = T>) -> T {
 
 /// A mesh of several chunks.
 fn mesh() -> Vec<u8> {
-    b"mesh".iter().copied().chain((0..3 * MAX_CHUNK_BYTES + 1234).map(|n| (n * n >> 3) as u8)).collect()
+    b"mesh".iter().copied().chain((0..3 * MAX_CHUNK_BYTES + 1234).map(|n| ((n * n) >> 3) as u8)).collect()
 }
 
 /// A place where a worker passes on what it has, until the task is aborted.
@@ -89,10 +89,13 @@ async fn begun(address: SocketAddr, id: AssetId) -> TcpStream {
     loop {
         let mut stream = TcpStream::connect(address).await.unwrap();
         ask(&mut stream, &Fetch { id, token: token(&KEY, id), offset: 0 }).await.unwrap();
-        match patiently(next(&mut stream, id)).await.unwrap() {
-            Passed::Begin { .. } => return stream,
-            Passed::Unknown => {}
-            other => panic!("{other:?}"),
+        loop {
+            match patiently(next(&mut stream, id)).await.unwrap() {
+                Passed::Begin { .. } => return stream,
+                Passed::Waits => {}
+                Passed::Unknown => break,
+                other => panic!("{other:?}"),
+            }
         }
     }
 }
@@ -131,6 +134,23 @@ async fn chunks_are_passed_on_while_more_are_still_to_come() {
     send(&first, &mesh, 2 * MAX_CHUNK_BYTES + 5..mesh.len()).await;
     read(&mut stream, id, &mut got, mesh.len()).await;
     assert!(got == mesh);
+    for master in [&mut first, &mut second] {
+        assert_eq!(patiently(master.hear()).await, Some(ToMaster::HaveAsset { id }));
+        renders(master, &body).await;
+    }
+}
+
+#[tokio::test]
+async fn who_comes_before_the_first_byte_waits_for_it() {
+    let mesh = mesh();
+    let body = scene(1, &[&mesh]);
+    let id = AssetId::of(&mesh);
+    let (mut first, address, _first) = sharer(&body, &mesh).await;
+    let mut stream = TcpStream::connect(address).await.unwrap();
+    ask(&mut stream, &Fetch { id, token: token(&KEY, id), offset: 0 }).await.unwrap();
+    assert_eq!(patiently(next(&mut stream, id)).await.unwrap(), Passed::Waits);
+    let (mut second, ..) = follower(&body, &mesh, address, &KEY).await;
+    first.send_asset(id, 0).await;
     for master in [&mut first, &mut second] {
         assert_eq!(patiently(master.hear()).await, Some(ToMaster::HaveAsset { id }));
         renders(master, &body).await;

@@ -1,23 +1,41 @@
 //! What a worker passes on: assets that its master has given it or is giving it, to whoever shows the master's token.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use rayfarm_protocol::AssetId;
 use rayfarm_protocol::limits::{MAX_SHELF_BYTES, SHELF_TIME};
 use rayfarm_protocol::passing::{Fetch, ShareKey, token};
+use tokio::sync::Notify;
+use tokio::sync::futures::Notified;
 
 use crate::growing::Growing;
 
 /// Assets by name, for as long as somebody may ask for them.
 #[derive(Debug, Default)]
-pub(crate) struct Shelf(Mutex<Inner>);
+pub(crate) struct Shelf {
+    inner: Mutex<Inner>,
+    /// Something was put there.
+    filled: Notify,
+}
+
+/// What is behind a token.
+#[derive(Clone, Debug)]
+pub(crate) enum Opened {
+    /// This asset, or what is there of it.
+    Here(Arc<Growing>),
+    /// An asset that the master has been asked for: others may come for it sooner than its first byte.
+    Expected,
+    /// Nothing.
+    Closed,
+}
 
 #[derive(Debug, Default)]
 struct Inner {
     /// Of the present session with the master.
     key: Option<ShareKey>,
+    expected: BTreeSet<AssetId>,
     assets: BTreeMap<AssetId, Shelved>,
 }
 
@@ -39,18 +57,40 @@ impl Shelf {
         self.lock().key = Some(key);
     }
 
+    /// The master is asked for an asset.
+    pub(crate) fn expect(&self, id: AssetId) {
+        self.lock().expected.insert(id);
+    }
+
     /// An asset comes in.
     pub(crate) fn put(&self, id: AssetId, bytes: Arc<Growing>) {
-        self.lock().assets.insert(id, Shelved { bytes, wanted_at: Instant::now() });
+        let mut inner = self.lock();
+        inner.expected.remove(&id);
+        inner.assets.insert(id, Shelved { bytes, wanted_at: Instant::now() });
+        drop(inner);
+        self.filled.notify_waiters();
+    }
+
+    /// Waits until something is put there. Made before a look, it misses nothing that comes after it.
+    pub(crate) fn filled(&self) -> Notified<'_> {
+        self.filled.notified()
     }
 
     /// What somebody asks for, if the token opens it.
-    pub(crate) fn open(&self, fetch: &Fetch) -> Option<Arc<Growing>> {
+    pub(crate) fn open(&self, fetch: &Fetch) -> Opened {
         let mut inner = self.lock();
-        let key = inner.key?;
-        let shelved = inner.assets.get_mut(&fetch.id).filter(|_| token(&key, fetch.id) == fetch.token)?;
-        shelved.wanted_at = Instant::now();
-        Some(Arc::clone(&shelved.bytes))
+        if inner.key.is_none_or(|key| token(&key, fetch.id) != fetch.token) {
+            return Opened::Closed;
+        }
+        let is_expected = inner.expected.contains(&fetch.id);
+        match inner.assets.get_mut(&fetch.id) {
+            Some(shelved) => {
+                shelved.wanted_at = Instant::now();
+                Opened::Here(Arc::clone(&shelved.bytes))
+            }
+            None if is_expected => Opened::Expected,
+            None => Opened::Closed,
+        }
     }
 
     /// Forgets what nobody has asked for lately, and the longest unasked of what is too much. Whoever reads it goes on.
@@ -72,7 +112,7 @@ impl Shelf {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -98,7 +138,7 @@ mod tests {
     }
 
     fn opens(shelf: &Shelf, key: &ShareKey, id: AssetId) -> bool {
-        shelf.open(&Fetch { id, token: token(key, id), offset: 0 }).is_some()
+        matches!(shelf.open(&Fetch { id, token: token(key, id), offset: 0 }), Opened::Here(_))
     }
 
     #[test]
@@ -111,8 +151,14 @@ mod tests {
         shelf.set_key(KEY);
         assert!(opens(&shelf, &KEY, a) && opens(&shelf, &KEY, b));
         assert!(!opens(&shelf, &ShareKey([4; 32]), a));
-        assert!(shelf.open(&Fetch { id: a, token: token(&KEY, b), offset: 0 }).is_none());
-        assert!(!opens(&shelf, &KEY, AssetId([9; 32])));
+        let wrong = Fetch { id: a, token: token(&KEY, b), offset: 0 };
+        assert!(matches!(shelf.open(&wrong), Opened::Closed));
+        let c = AssetId([9; 32]);
+        let fetch = Fetch { id: c, token: token(&KEY, c), offset: 0 };
+        assert!(matches!(shelf.open(&fetch), Opened::Closed));
+        shelf.expect(c);
+        assert!(matches!(shelf.open(&fetch), Opened::Expected));
+        assert!(matches!(shelf.open(&Fetch { token: wrong.token, ..fetch }), Opened::Closed));
         shelf.clear();
         assert!(!opens(&shelf, &KEY, a));
     }

@@ -27,9 +27,9 @@ mod world;
 mod tests;
 
 pub use costs::CostProfile;
-pub use passing::{Passed, PassingSetup, pass};
 #[cfg(test)]
 pub(crate) use dice::Dice;
+pub use passing::{Passed, PassingSetup, pass};
 pub use survival::{Schedule, Survivor, survive};
 pub use tally::Measured;
 
