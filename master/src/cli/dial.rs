@@ -1,5 +1,7 @@
 //! The options that trade accuracy for speed by what it costs.
 
+use std::path::PathBuf;
+
 use clap::Args;
 
 use super::values::{error_limit, frame_rate};
@@ -22,4 +24,8 @@ pub(crate) struct ErrorArgs {
     /// that a moving picture may lose.
     #[arg(long, value_name = "E", value_parser = error_limit)]
     pub(crate) max_error: Option<f64>,
+    /// What settings cost and lose, as tradeoff has measured it on this scene: its tradeoff.csv. Without it, as they do on
+    /// other scenes.
+    #[arg(long, value_name = "CSV")]
+    pub(crate) front: Option<PathBuf>,
 }

@@ -3,35 +3,58 @@
 use rayfarm_tracer::scene::Scene;
 
 use crate::cli::{DialArgs, ErrorArgs};
-use crate::dial::{Dial, Ladder, prior_ladder};
+use crate::dial::{Dial, Ladder, measured_ladder, prior_ladder};
+use crate::error::CommandError;
+use crate::tradeoff::table::Table;
 use crate::wanted::WantedPicture;
 
 /// What a window shall show when it rests, and the dial for when it moves. With a rate to hold, the largest error is for
 /// moving pictures; without one, for all.
+///
+/// # Errors
+/// A table that cannot be used.
 pub(super) fn turned(
     args: &DialArgs,
     scene: &Scene,
     wanted: WantedPicture,
     animated: bool,
-) -> (WantedPicture, Option<Dial>) {
-    match args.target_fps {
-        Some(rate) => (wanted, Some(Dial::new(ladder(&args.error, scene, &wanted), rate, animated))),
-        None => (within(&args.error, scene, wanted), None),
-    }
+) -> Result<(WantedPicture, Option<Dial>), CommandError> {
+    Ok(match args.target_fps {
+        Some(rate) => (wanted, Some(Dial::new(ladder(&args.error, scene, &wanted)?, rate, animated))),
+        None => (within(&args.error, scene, wanted)?, None),
+    })
 }
 
 /// The picture at the fastest setting that loses no more than is allowed.
-pub(super) fn within(args: &ErrorArgs, scene: &Scene, wanted: WantedPicture) -> WantedPicture {
-    match args.max_error {
-        Some(_) => ladder(args, scene, &wanted).cheapest().applied(&wanted),
+///
+/// # Errors
+/// A table that cannot be used.
+pub(super) fn within(
+    args: &ErrorArgs,
+    scene: &Scene,
+    wanted: WantedPicture,
+) -> Result<WantedPicture, CommandError> {
+    Ok(match args.max_error {
+        Some(_) => ladder(args, scene, &wanted)?.cheapest().applied(&wanted),
+        None if args.front.is_some() => {
+            let what = "--front is for --max-error, and in view for --target-fps; give one of them as well";
+            return Err(CommandError::WrongInput(what.to_owned()));
+        }
         None => wanted,
-    }
+    })
 }
 
-fn ladder(args: &ErrorArgs, scene: &Scene, wanted: &WantedPicture) -> Ladder {
-    let ladder = prior_ladder(scene, wanted);
-    match args.max_error {
+fn ladder(args: &ErrorArgs, scene: &Scene, wanted: &WantedPicture) -> Result<Ladder, CommandError> {
+    let ladder = match &args.front {
+        Some(path) => {
+            let table = Table::read(path).map_err(CommandError::wrong_input)?;
+            let told = |problem| CommandError::WrongInput(format!("{}: {problem}", path.display()));
+            measured_ladder(&table, wanted).map_err(told)?
+        }
+        None => prior_ladder(scene, wanted),
+    };
+    Ok(match args.max_error {
         Some(most) => ladder.up_to(most),
         None => ladder,
-    }
+    })
 }

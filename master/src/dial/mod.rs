@@ -9,6 +9,7 @@
 mod costs;
 mod governor;
 mod ladder;
+mod measured;
 mod prior;
 mod setting;
 mod stillness;
@@ -23,6 +24,7 @@ use std::time::Duration;
 use governor::Governor;
 pub(crate) use ladder::Ladder;
 use ladder::Loss;
+pub(crate) use measured::ladder as measured_ladder;
 pub(crate) use prior::ladder as prior_ladder;
 use stillness::{Motion, Stillness};
 
@@ -132,8 +134,8 @@ impl Dial {
     /// What the overlay says of a frame.
     pub(crate) fn told(&self, shown: Shown) -> Vec<String> {
         let first = match shown {
-            Shown::Resting => "at rest: full quality".to_owned(),
-            Shown::Moving(0) => "moving: full quality".to_owned(),
+            Shown::Resting => "at rest: all that was asked for".to_owned(),
+            Shown::Moving(0) => "moving: all that was asked for".to_owned(),
             Shown::Moving(rung) => {
                 let loss = self.ladder.rungs().get(rung).map_or(0.0, |rung| rung.loss);
                 format!("moving: loses {}", Loss(loss))

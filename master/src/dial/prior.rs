@@ -45,7 +45,14 @@ pub(crate) fn ladder(scene: &Scene, wanted: &WantedPicture) -> Ladder {
                     (Shading::Full, ExponentPrecision::Fast),
                     (Shading::Diffuse, ExponentPrecision::Exact),
                 ];
-                terms.map(|(shading, exponent)| Setting { samples, scale, shadows, shading, exponent })
+                terms.map(|(shading, exponent)| Setting {
+                    samples,
+                    scale,
+                    shadows,
+                    shading,
+                    exponent,
+                    ..Setting::FULL
+                })
             })
         })
     });

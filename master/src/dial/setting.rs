@@ -1,6 +1,6 @@
 //! What a rung does to a picture: some knobs turned down, the others left where they are.
 
-use rayfarm_tracer::scene::{ExponentPrecision, RenderScale, Scene, Shading};
+use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Scene, Shading};
 
 use crate::wanted::WantedPicture;
 
@@ -17,6 +17,12 @@ pub(crate) struct Setting {
     pub(crate) shading: Shading,
     /// The best precision of the highlight's power.
     pub(crate) exponent: ExponentPrecision,
+    /// Whether all samples are traced only where neighbours differ.
+    pub(crate) adaptive: bool,
+    /// Whether textures are looked up at the nearest texel.
+    pub(crate) nearest: bool,
+    /// The most colours.
+    pub(crate) colors: ColorDepth,
 }
 
 impl Setting {
@@ -27,7 +33,18 @@ impl Setting {
         shadows: true,
         shading: Shading::Full,
         exponent: ExponentPrecision::Exact,
+        adaptive: false,
+        nearest: false,
+        colors: ColorDepth::Exact,
     };
+
+    /// The one that makes this of the full picture.
+    pub(crate) fn of(picture: &WantedPicture) -> Self {
+        let Quality { adaptive, shadows, shading, filter, exponent, colors } = picture.view.quality;
+        let (samples, scale) = (picture.view.samples, picture.scale);
+        let nearest = filter == Some(Filter::Nearest);
+        Self { samples, scale, shadows, shading, exponent, adaptive, nearest, colors }
+    }
 
     /// The picture at this setting. No knob is turned up.
     pub(crate) fn applied(&self, wanted: &WantedPicture) -> WantedPicture {
@@ -41,6 +58,13 @@ impl Setting {
         }
         if self.exponent == ExponentPrecision::Fast {
             quality.exponent = ExponentPrecision::Fast;
+        }
+        quality.adaptive |= self.adaptive;
+        if self.nearest {
+            quality.filter = Some(Filter::Nearest);
+        }
+        if self.colors == ColorDepth::Reduced {
+            quality.colors = ColorDepth::Reduced;
         }
         picture
     }

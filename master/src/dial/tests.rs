@@ -28,7 +28,7 @@ fn the_picture_at_rest_is_the_one_that_is_wanted() {
     assert_eq!(dial.next(MS), Shown::Resting);
     assert_eq!(dial.picture(&wanted(4), Shown::Resting), wanted(4));
     assert_eq!(dial.picture(&wanted(4), Shown::Moving(0)), wanted(4));
-    assert_eq!(dial.told(Shown::Resting), ["at rest: full quality"]);
+    assert_eq!(dial.told(Shown::Resting), ["at rest: all that was asked for"]);
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn a_rate_that_is_out_of_reach_is_told() {
     let mut dial = dial(1000.0);
     rest(&mut dial, 20);
     assert_eq!(dial.told(Shown::Moving(2)), ["moving: loses FLIP 0.050", "1000 FPS: out of reach"]);
-    assert_eq!(dial.told(Shown::Resting), ["at rest: full quality"]);
+    assert_eq!(dial.told(Shown::Resting), ["at rest: all that was asked for"]);
 }
 
 #[test]
@@ -82,6 +82,7 @@ fn no_knob_is_turned_up() {
         shadows: false,
         shading: Shading::Diffuse,
         exponent: ExponentPrecision::Fast,
+        ..Setting::FULL
     };
     assert_eq!(lowest.applied(&wanted(4)).view.samples, 1);
     assert_eq!(lowest.applied(&low), WantedPicture { view: FrameView { samples: 1, ..low.view }, ..low });

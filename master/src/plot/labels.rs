@@ -82,6 +82,9 @@ pub(super) fn place(labels: &[Label], drawn: &Drawn, room: Area) -> Vec<Area> {
         let best = candidates(label, steps).min_by_key(cost);
         let (_, area) = best.unwrap_or((0, beside(label, 1, -1, 0)));
         taken.push(area);
+        if area.is_away_from(label.at) {
+            taken.extend(along(&[label.at, area.nearest_to(label.at)]));
+        }
         found.push(area);
     }
     found

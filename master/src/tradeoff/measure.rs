@@ -38,7 +38,7 @@ pub(crate) struct Compared {
 impl Studio<'_> {
     /// What the reference is rendered as: full quality, with as many samples as there can be.
     pub(crate) fn reference_view(&self) -> FrameView {
-        FrameView { samples: MAX_SAMPLES, ..Setting::plain().applied_to(&self.view) }
+        FrameView { samples: MAX_SAMPLES, ..Setting::plain().applied_to(&self.view).view }
     }
 
     /// The picture that all settings are held against. `done` is told how many rows are rendered.
@@ -85,7 +85,8 @@ impl Studio<'_> {
 
     /// The picture under a setting, in its full size.
     fn picture(&self, setting: &Setting) -> Result<RgbImage, CommandError> {
-        self.render(&setting.applied_to(&self.view), &|_| ())
+        let wanted = setting.applied_to(&self.view);
+        wanted.delivered(self.render(&wanted.rendered(), &|_| ())?).map_err(CommandError::failed)
     }
 
     fn render(&self, view: &FrameView, done: &(dyn Fn(u32) + Sync)) -> Result<RgbImage, CommandError> {

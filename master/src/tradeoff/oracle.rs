@@ -8,7 +8,7 @@ use rayfarm_tracer::reference::Oracle;
 use serde::Serialize;
 
 /// Tests of a ray against a primitive that may be spent: some ten seconds of a core.
-const WORK: u64 = 4_000_000_000;
+const WORK: u64 = 2_000_000_000;
 /// So many pixels at least, whatever they cost, and at most.
 const PIXELS: std::ops::RangeInclusive<u64> = 4..=64;
 

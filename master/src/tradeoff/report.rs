@@ -97,7 +97,12 @@ pub(crate) fn chart(report: &Report) -> Chart {
     Chart {
         title: format!("{scene}, {width} x {height}, {threads} threads"),
         x: Axis { label: "milliseconds per frame".to_owned(), logarithmic: true, from_zero: false },
-        y: Axis { label: "mean FLIP against the reference".to_owned(), logarithmic: false, from_zero: true },
+        // Good settings lie close to zero, where only ratios tell them apart; zero itself has no place there.
+        y: Axis {
+            label: "mean FLIP against the reference".to_owned(),
+            logarithmic: rows.iter().all(|row| row.flip > 0.0),
+            from_zero: true,
+        },
         series: all,
     }
 }
@@ -165,5 +170,9 @@ mod tests {
             (Line::Solid, vec!["samples-1".into(), "samples-4".into()])
         );
         assert_eq!((chart.series[1].line, names(1)), (Line::None, vec!["worse".to_owned()]));
+        assert!(chart.y.logarithmic);
+        let mut exact = report();
+        exact.table.rows[0].flip = 0.0;
+        assert!(!super::chart(&exact).y.logarithmic, "zero has no logarithm");
     }
 }

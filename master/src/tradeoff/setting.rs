@@ -3,15 +3,19 @@
 //! A new knob is a line among the knobs, and a line for each setting that turns it.
 
 use rayfarm_tracer::CompiledScene;
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{
+    ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
+};
+
+use crate::wanted::WantedPicture;
 
 /// What a scene asks for: whatever it does not, no knob needs to leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Asked {
     /// Something has a highlight.
     pub(crate) specular: bool,
-    /// Something has a texture.
-    pub(crate) textured: bool,
+    /// Something has a texture that is not looked up at the nearest texel.
+    pub(crate) filtered: bool,
     /// A light casts shadows.
     pub(crate) shadows: bool,
 }
@@ -19,11 +23,11 @@ pub(crate) struct Asked {
 impl Asked {
     /// What this scene asks for.
     pub(crate) fn of(scene: &CompiledScene) -> Self {
-        let features = scene.features();
+        let (features, data) = (scene.features(), scene.scene());
         Self {
             specular: features.specular,
-            textured: features.textured,
-            shadows: scene.scene().lights.iter().any(|light| light.shadows),
+            filtered: features.textured && data.textures.iter().any(|map| map.filter != Filter::Nearest),
+            shadows: data.lights.iter().any(|light| light.shadows),
         }
     }
 }
@@ -34,7 +38,7 @@ struct Knob {
     name: &'static str,
     /// Whether the picture can change by it.
     matters: fn(Asked) -> bool,
-    turn: fn(&mut FrameView),
+    turn: fn(&mut WantedPicture),
 }
 
 /// A way to render: some knobs turned, the others left.
@@ -43,16 +47,64 @@ pub(crate) struct Setting {
     knobs: &'static [Knob],
 }
 
-const SAMPLES_4: Knob = Knob { name: "samples-4", matters: |_| true, turn: |view| view.samples = 4 };
-const SAMPLES_9: Knob = Knob { name: "samples-9", matters: |_| true, turn: |view| view.samples = 9 };
-const SAMPLES_16: Knob = Knob { name: "samples-16", matters: |_| true, turn: |view| view.samples = 16 };
+/// A knob that every picture can differ by.
+const fn always(_: Asked) -> bool {
+    true
+}
 
-/// All settings worth having of some scene.
+const SAMPLES_4: Knob = Knob { name: "samples-4", matters: always, turn: |p| p.view.samples = 4 };
+const SAMPLES_9: Knob = Knob { name: "samples-9", matters: always, turn: |p| p.view.samples = 9 };
+const SAMPLES_16: Knob = Knob { name: "samples-16", matters: always, turn: |p| p.view.samples = 16 };
+const ADAPTIVE: Knob = Knob { name: "adaptive", matters: always, turn: |p| p.view.quality.adaptive = true };
+const HALF: Knob = Knob { name: "scale-1-2", matters: always, turn: |p| p.scale = RenderScale::Half };
+const THREE_QUARTERS: Knob =
+    Knob { name: "scale-3-4", matters: always, turn: |p| p.scale = RenderScale::ThreeQuarters };
+const NO_SHADOWS: Knob =
+    Knob { name: "no-shadows", matters: |asked| asked.shadows, turn: |p| p.view.quality.shadows = false };
+const DIFFUSE: Knob = Knob {
+    name: "diffuse",
+    matters: |asked| asked.specular,
+    turn: |p| p.view.quality.shading = Shading::Diffuse,
+};
+const FAST: Knob = Knob {
+    name: "fast-exponent",
+    matters: |asked| asked.specular,
+    turn: |p| p.view.quality.exponent = ExponentPrecision::Fast,
+};
+const NEAREST: Knob = Knob {
+    name: "nearest",
+    matters: |asked| asked.filtered,
+    turn: |p| p.view.quality.filter = Some(Filter::Nearest),
+};
+const REDUCED: Knob =
+    Knob { name: "reduced-colors", matters: always, turn: |p| p.view.quality.colors = ColorDepth::Reduced };
+
+/// All settings worth having of some scene: each knob alone, towards cheap, towards good.
 const SETTINGS: &[Setting] = &[
     Setting::plain(),
+    Setting { knobs: &[FAST] },
+    Setting { knobs: &[DIFFUSE] },
+    Setting { knobs: &[NEAREST] },
+    Setting { knobs: &[NO_SHADOWS] },
+    Setting { knobs: &[REDUCED] },
+    Setting { knobs: &[DIFFUSE, NO_SHADOWS] },
+    Setting { knobs: &[THREE_QUARTERS] },
+    Setting { knobs: &[THREE_QUARTERS, NO_SHADOWS] },
+    Setting { knobs: &[THREE_QUARTERS, DIFFUSE] },
+    Setting { knobs: &[THREE_QUARTERS, DIFFUSE, NO_SHADOWS] },
+    Setting { knobs: &[HALF] },
+    Setting { knobs: &[HALF, NO_SHADOWS] },
+    Setting { knobs: &[HALF, DIFFUSE] },
+    Setting { knobs: &[HALF, DIFFUSE, NO_SHADOWS] },
+    Setting { knobs: &[HALF, SAMPLES_4] },
+    Setting { knobs: &[THREE_QUARTERS, SAMPLES_4] },
     Setting { knobs: &[SAMPLES_4] },
+    Setting { knobs: &[SAMPLES_4, FAST] },
+    Setting { knobs: &[SAMPLES_4, ADAPTIVE] },
     Setting { knobs: &[SAMPLES_9] },
+    Setting { knobs: &[SAMPLES_9, ADAPTIVE] },
     Setting { knobs: &[SAMPLES_16] },
+    Setting { knobs: &[SAMPLES_16, ADAPTIVE] },
 ];
 
 /// The name of the setting that turns nothing: one sample, full quality.
@@ -84,13 +136,14 @@ impl Setting {
         names.join("+")
     }
 
-    /// What is rendered of a frame under this setting.
-    pub(crate) fn applied_to(&self, view: &FrameView) -> FrameView {
-        let mut turned = FrameView { samples: 1, ..*view };
+    /// The picture of that view under this setting. Whatever knobs were turned before are not.
+    pub(crate) fn applied_to(&self, view: &FrameView) -> WantedPicture {
+        let view = FrameView { samples: 1, quality: Quality::default(), ..*view };
+        let mut picture = WantedPicture { view, scale: RenderScale::Full };
         for knob in self.knobs {
-            (knob.turn)(&mut turned);
+            (knob.turn)(&mut picture);
         }
-        turned
+        picture
     }
 }
 
@@ -100,8 +153,8 @@ mod tests {
 
     use super::*;
 
-    const NOTHING: Asked = Asked { specular: false, textured: false, shadows: false };
-    const EVERYTHING: Asked = Asked { specular: true, textured: true, shadows: true };
+    const NOTHING: Asked = Asked { specular: false, filtered: false, shadows: false };
+    const EVERYTHING: Asked = Asked { specular: true, filtered: true, shadows: true };
 
     #[test]
     fn names_are_unique_fit_for_files_and_lead_back() {
@@ -124,12 +177,29 @@ mod tests {
     }
 
     #[test]
-    fn every_setting_is_another_view_of_the_same_camera() {
-        let view = crate::test_scene::view();
-        let views: Vec<FrameView> = SETTINGS.iter().map(|setting| setting.applied_to(&view)).collect();
-        for (index, turned) in views.iter().enumerate() {
-            assert!(turned.validate().is_ok() && turned.camera == view.camera);
-            assert!(!views[..index].contains(turned), "{}", SETTINGS[index].name());
+    fn a_scene_without_highlights_shadows_or_textures_has_no_knobs_for_them() {
+        let names: Vec<String> = Setting::worth_having(NOTHING).iter().map(Setting::name).collect();
+        for word in ["diffuse", "exponent", "shadows", "nearest"] {
+            assert!(!names.iter().any(|name| name.contains(word)), "{names:?}");
         }
+        for name in [PLAIN, "scale-1-2", "samples-16", "reduced-colors"] {
+            assert!(names.iter().any(|known| known == name), "{names:?}");
+        }
+        let shadows = Setting::worth_having(Asked { shadows: true, ..NOTHING });
+        assert!(shadows.iter().any(|setting| setting.name() == "scale-1-2+no-shadows"));
+    }
+
+    #[test]
+    fn every_setting_is_another_picture_from_the_same_camera() {
+        let view = crate::test_scene::view();
+        let turned =
+            FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
+        let pictures: Vec<WantedPicture> =
+            SETTINGS.iter().map(|setting| setting.applied_to(&turned)).collect();
+        for (index, picture) in pictures.iter().enumerate() {
+            assert!(picture.rendered().validate().is_ok() && picture.view.camera == view.camera);
+            assert!(!pictures[..index].contains(picture), "{}", SETTINGS[index].name());
+        }
+        assert_eq!(pictures[0].view, FrameView { samples: 1, ..view }, "no knob stays turned");
     }
 }

@@ -7,6 +7,10 @@ use super::*;
 use crate::scene::{FrameView, Quality};
 use crate::{CompiledScene, simd};
 
+/// Small: without optimisation, as continuous integration tries the scalar level, a ray takes long.
+const WIDTH: u32 = 90;
+const HEIGHT: u32 = 70;
+
 /// Every kind of light, primitive, normal, exponent and texture, on every level that this machine has.
 #[test]
 fn all_levels_of_simd_render_the_same_bytes() {
@@ -17,12 +21,12 @@ fn all_levels_of_simd_render_the_same_bytes() {
         let compiled = Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap());
         for (samples, adaptive) in [(4, false), (9, true)] {
             let quality = Quality { adaptive, ..own.quality };
-            let view = FrameView { width: 150, height: 110, samples, quality, ..own };
+            let view = FrameView { width: WIDTH, height: HEIGHT, samples, quality, ..own };
             let mut frame = PreparedFrame::new(Arc::clone(&compiled), &view).unwrap();
             let mut bytes_at = |level| {
                 frame.level = level;
-                let mut bytes = vec![0; 150 * 110 * 3];
-                render_rows(&frame, 0..110, &mut bytes, &|| false).unwrap();
+                let mut bytes = vec![0; (WIDTH * HEIGHT * 3) as usize];
+                render_rows(&frame, 0..HEIGHT, &mut bytes, &|| false).unwrap();
                 bytes
             };
             let first = bytes_at(simd::best());

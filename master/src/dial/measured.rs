@@ -1,0 +1,88 @@
+//! The ladder of a scene that was measured: a table of `tradeoff`.
+
+use super::ladder::{Ladder, Rung};
+use super::setting::Setting;
+use crate::tradeoff::setting::Setting as Measured;
+use crate::tradeoff::table::Table;
+use crate::wanted::WantedPicture;
+
+/// The front of a table, for pictures that rest as `wanted`. Costs are parts of that row's time, losses what the mean FLIP
+/// error is more than there.
+///
+/// # Errors
+/// A table without a row for the picture at rest, in words.
+pub(crate) fn ladder(table: &Table, wanted: &WantedPicture) -> Result<Ladder, String> {
+    let known = |name: &str| Measured::named(name).map(|setting| setting.applied_to(&wanted.view));
+    let rests = |picture: &WantedPicture| picture == wanted;
+    let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(rests));
+    let Some(full) = full else {
+        let names: Vec<&str> = table.rows.iter().map(|row| row.setting.as_str()).collect();
+        return Err(format!(
+            "has no row for the picture at rest ({} samples a pixel and its other knobs); it has {}",
+            wanted.view.samples,
+            names.join(", ")
+        ));
+    };
+    let rungs = table.rows.iter().filter_map(|row| {
+        let picture = known(&row.setting).filter(|picture| is_below(picture, wanted))?;
+        let cost = row.median_ms / full.median_ms;
+        Some(Rung { setting: Setting::of(&picture), cost, loss: (row.flip - full.flip).max(0.0) })
+    });
+    Ok(Ladder::of(rungs))
+}
+
+/// Whether a picture asks for nothing that the other one does not.
+fn is_below(picture: &WantedPicture, wanted: &WantedPicture) -> bool {
+    Setting::of(picture).applied(wanted) == *picture && picture != wanted
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfarm_tracer::scene::{FrameView, RenderScale};
+
+    use super::*;
+    use crate::tradeoff::table::Row;
+
+    fn row(setting: &str, ms: f64, flip: f64) -> Row {
+        let (max_error, rmse, psnr_db, ssim) = (9, 1.0, 40.0, 0.9);
+        Row { setting: setting.to_owned(), median_ms: ms, min_ms: ms, max_error, rmse, psnr_db, ssim, flip }
+    }
+
+    fn table() -> Table {
+        let rows = vec![
+            row("samples-1", 20.0, 0.05),
+            row("samples-4", 60.0, 0.02),
+            row("samples-4+adaptive", 30.0, 0.022),
+            row("scale-1-2", 6.0, 0.11),
+            row("no-shadows", 12.0, 0.3),
+            row("samples-16", 200.0, 0.01),
+        ];
+        let (scene, simd_level) = ("a".to_owned(), "none".to_owned());
+        Table { scene, width: 64, height: 48, threads: 1, simd_level, rows }
+    }
+
+    fn resting(samples: u32) -> WantedPicture {
+        let view = FrameView { samples, ..crate::test_scene::view() };
+        WantedPicture { view, scale: RenderScale::Full }
+    }
+
+    #[test]
+    fn the_front_of_a_table_leads_down_from_the_picture_at_rest() {
+        let wanted = resting(4);
+        let ladder = ladder(&table(), &wanted).unwrap();
+        let figures: Vec<(f64, f64)> = ladder.rungs().iter().map(|rung| (rung.cost, rung.loss)).collect();
+        assert_eq!(figures.len(), 4, "{figures:?}");
+        assert_eq!(figures[0], (1.0, 0.0));
+        assert!((figures[1].0 - 0.5).abs() < 1e-9 && (figures[1].1 - 0.002).abs() < 1e-9, "{figures:?}");
+        let adaptive = ladder.rungs()[1].setting.applied(&wanted).view;
+        assert!(adaptive.quality.adaptive && adaptive.samples == 4);
+        let last = ladder.cheapest().applied(&wanted);
+        assert_eq!((last.scale, last.view.samples), (RenderScale::Half, 1));
+    }
+
+    #[test]
+    fn a_table_without_the_picture_at_rest_is_refused_with_what_it_has() {
+        let message = ladder(&table(), &resting(9)).unwrap_err();
+        assert!(message.contains("9 samples") && message.contains("samples-16"), "{message}");
+    }
+}
