@@ -15,7 +15,7 @@ pub(crate) struct Seal {
     pub(crate) view: FrameView,
     pub(crate) announce: FrameAnnounce,
     pub(crate) painter: Signed,
-    /// Whoever has sent other bytes.
+    /// Whoever has sent other bytes last.
     pub(crate) checker: Option<Signed>,
 }
 
@@ -54,11 +54,40 @@ impl Seals {
         if seal.painter.hash == now.hash {
             return Finding::Same;
         }
-        seal.checker.get_or_insert(now);
+        // The latest counts: an earlier one may have come from somebody who no longer held the lease, and whoever is judged
+        // is judged at once.
+        seal.checker = Some(now);
         let (painter, checker) = (seal.painter.worker, now.worker);
         tracing::warn!(
             "{painter} and {checker} have sent different pixels of {lease}: the master traces them itself"
         );
         Finding::Different
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+    use rayfarm_protocol::AssetId;
+
+    use super::*;
+    use crate::test_scene::view;
+
+    fn signed(worker: u64) -> Signed {
+        Signed { worker: WorkerId(worker), hash: blake3::hash(&worker.to_le_bytes()) }
+    }
+
+    #[test]
+    fn the_one_who_answered_last_is_judged() {
+        let lease = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count: 1 };
+        let (frame, scene) = (lease.frame, AssetId([0; 32]));
+        let announce = FrameAnnounce { frame, scene, width: 1, height: 1, view: Bytes::new() };
+        let mut seals = Seals::default();
+        seals.add(Seal { lease, view: view(), announce, painter: signed(1), checker: None });
+        assert_eq!(seals.compare(&lease, Signed { worker: WorkerId(2), ..signed(1) }), Finding::Same);
+        for checker in [3, 4] {
+            assert_eq!(seals.compare(&lease, signed(checker)), Finding::Different);
+            assert_eq!(seals.get(frame, 0).and_then(|seal| seal.checker).unwrap().worker, WorkerId(checker));
+        }
     }
 }

@@ -117,7 +117,7 @@ impl Shell {
         if content == seal.painter {
             return Finding::Same;
         }
-        seal.checker.get_or_insert(content);
+        seal.checker = Some(content);
         Finding::Different
     }
 

@@ -127,9 +127,11 @@ fn alive(world: &World, latest: u64) -> Result<(), String> {
 }
 
 impl World {
-    /// No more faults. Whoever is paused goes on, one worker is surely well, and one more frame is asked for.
+    /// No more faults, nor liars among those who come. Whoever is paused goes on, one worker is surely well, and one more
+    /// frame is asked for.
     fn calm_down(&mut self) -> u64 {
         self.faults = false;
+        self.setup.liars = 0;
         self.setup.input_rate = 0.0;
         self.clock.forget(|happening| matches!(happening, Happening::Input | Happening::Fault));
         let ids: Vec<WorkerId> = self.machines.keys().copied().collect();

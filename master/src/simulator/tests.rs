@@ -9,7 +9,9 @@ use crate::scheduler::SegmentPolicy;
 
 #[test]
 fn fixed_schedules_are_survived() {
-    for seed in 0..25 {
+    // The last two have shown what was wrong: a liar's late answer was taken for somebody else's, and the only worker left
+    // was a liar.
+    for seed in (0..25).chain([202_736, 203_044]) {
         if let Err(what) = survive(Schedule { seed }) {
             panic!("{what}; to see it again: rayfarm-master simulate --faults --seed {seed}");
         }

@@ -229,8 +229,7 @@ impl World {
             }
             Happening::Request => self.request(),
             Happening::Fault => self.fault(),
-            Happening::Judged { frame, segment } => {
-                let verdict = self.shell.judge(frame, segment);
+            Happening::Judged { frame, segment, verdict } => {
                 self.tell(Event::SegmentJudged { frame, segment, verdict });
             }
         }
@@ -276,7 +275,8 @@ impl World {
                 self.shell.verify(worker, lease)
             }
             Action::Judge { frame, segment } => {
-                self.clock.plan(self.clock.now + JUDGEMENT, Happening::Judged { frame, segment });
+                let verdict = self.shell.judge(frame, segment);
+                self.clock.plan(self.clock.now + JUDGEMENT, Happening::Judged { frame, segment, verdict });
                 Ok(())
             }
             Action::Unseal { frame, segment } => {
