@@ -1,10 +1,11 @@
-//! What the knobs cost and lose on the project's scenes: the ladder where a scene has no table of its own.
+//! What the knobs cost and lose on other scenes: the ladder where a scene has no table of its own.
 //!
 //! Costs multiply and losses add up, knob by knob. That is rough, and good enough to begin with: what the costs really are is
-//! learnt from the frames. Losses are FLIP at 1024x768 against the same picture without the loss: medians of the room, the camera on
-//! its stage and a million triangles of busts. They differ by a factor of four: without shadows, the room is another room.
+//! learnt from the frames. The figures are medians of the tables in `models/tradeoff`, which `tradeoff` has written: three of
+//! the project's scenes, a bust, and ten of them. Losses are FLIP against the same picture without the loss. Scenes differ by a factor of four: without
+//! shadows, the room is another room.
 
-use rayfarm_tracer::scene::{ExponentPrecision, RenderScale, Scene, Shading};
+use rayfarm_tracer::scene::{RenderScale, Scene, Shading};
 
 use super::ladder::{Ladder, Rung};
 use super::setting::Setting;
@@ -18,42 +19,39 @@ struct Effect {
 }
 
 const NONE: Effect = Effect { cost: 1.0, loss: 0.0 };
-/// Costs are taken to be the share of the pixels, and a tenth of the rest.
 const SCALES: [(RenderScale, Effect); 3] = [
     (RenderScale::Full, NONE),
-    (RenderScale::ThreeQuarters, Effect { cost: 0.61, loss: 0.020 }),
-    (RenderScale::Half, Effect { cost: 0.33, loss: 0.027 }),
+    (RenderScale::ThreeQuarters, Effect { cost: 0.673, loss: 0.0062 }),
+    (RenderScale::Half, Effect { cost: 0.387, loss: 0.0135 }),
 ];
-/// Shadows and highlights add 79 and 1.6 per cent to a frame's time: `commands/explain/features.rs`.
-const NO_SHADOWS: Effect = Effect { cost: 0.56, loss: 0.101 };
-/// The loss is that of the busts: in the other two no highlight is to be seen.
-const DIFFUSE: Effect = Effect { cost: 0.98, loss: 0.025 };
-/// Not measured, and next to nothing.
-const FAST_EXPONENT: Effect = Effect { cost: 0.995, loss: 0.001 };
-/// Of a pixel's time, what does not depend on its samples.
-const PER_PIXEL: f64 = 0.05;
-/// The error of one sample a pixel beside very many; that of n is taken to be smaller by the root of n. From 16 to 1 it is 0.012.
-const ONE_SAMPLE: f64 = 0.016;
+const NO_SHADOWS: Effect = Effect { cost: 0.503, loss: 0.0868 };
+const DIFFUSE: Effect = Effect { cost: 0.971, loss: 0.0206 };
+/// What a pixel costs beside its samples, in samples.
+const PER_PIXEL: f64 = 0.38;
+/// The error of one sample a pixel beside very many; that of n is taken to be smaller by the root of n.
+const ONE_SAMPLE: f64 = 0.0115;
+/// What a pixel of adaptive anti-aliasing costs however many samples are asked for, and for each of them, in samples.
+const ADAPTIVE_PER_PIXEL: f64 = 2.0;
+const ADAPTIVE_PER_SAMPLE: f64 = 0.165;
+/// What it loses beside all samples everywhere.
+const ADAPTIVE_LOSS: f64 = 0.0011;
 
 /// The ladder for pictures of a scene.
 pub(crate) fn ladder(scene: &Scene, wanted: &WantedPicture) -> Ladder {
     let settings = SCALES.iter().flat_map(|&(scale, _)| {
         sample_counts(wanted.view.samples).flat_map(move |samples| {
-            [true, false].into_iter().flat_map(move |shadows| {
-                let terms = [
-                    (Shading::Full, ExponentPrecision::Exact),
-                    (Shading::Full, ExponentPrecision::Fast),
-                    (Shading::Diffuse, ExponentPrecision::Exact),
-                ];
-                terms.map(|(shading, exponent)| Setting {
-                    samples,
-                    scale,
-                    shadows,
-                    shading,
-                    exponent,
-                    ..Setting::FULL
-                })
-            })
+            [(false, true), (true, true), (false, false), (true, false)].into_iter().flat_map(
+                move |(adaptive, shadows)| {
+                    [Shading::Full, Shading::Diffuse].map(|shading| Setting {
+                        samples,
+                        adaptive: adaptive && samples > 1,
+                        scale,
+                        shadows,
+                        shading,
+                        ..Setting::FULL
+                    })
+                },
+            )
         })
     });
     Ladder::of(settings.map(|setting| rung(setting.for_scene(scene), wanted)))
@@ -72,20 +70,100 @@ fn rung(setting: Setting, wanted: &WantedPicture) -> Rung {
         SCALES.iter().find(|(scale, _)| *scale == wanted.scale).map_or(NONE, |(_, effect)| *effect)
     };
     let (before, after) = (scale(wanted), scale(&picture));
-    let (samples, fewer) = (f64::from(wanted.view.samples), f64::from(picture.view.samples));
+    let (all, fewer) = (sampling(wanted), sampling(&picture));
     let effects = [
         Effect { cost: after.cost / before.cost, loss: after.loss - before.loss },
-        Effect {
-            cost: (PER_PIXEL + fewer) / (PER_PIXEL + samples),
-            loss: ONE_SAMPLE * (1.0 / fewer.sqrt() - 1.0 / samples.sqrt()),
-        },
+        Effect { cost: fewer.cost / all.cost, loss: fewer.loss - all.loss },
         if quality.shadows == full.shadows { NONE } else { NO_SHADOWS },
         if quality.shading == full.shading { NONE } else { DIFFUSE },
-        if quality.exponent == full.exponent { NONE } else { FAST_EXPONENT },
     ];
     Rung {
         setting,
         cost: effects.iter().map(|effect| effect.cost).product(),
         loss: effects.iter().map(|effect| effect.loss).sum(),
+    }
+}
+
+/// What a pixel's samples cost, in samples, and their error beside very many.
+fn sampling(picture: &WantedPicture) -> Effect {
+    let samples = f64::from(picture.view.samples);
+    let loss = ONE_SAMPLE / samples.sqrt();
+    if picture.view.is_adaptive() {
+        Effect { cost: ADAPTIVE_PER_PIXEL + ADAPTIVE_PER_SAMPLE * samples, loss: loss + ADAPTIVE_LOSS }
+    } else {
+        Effect { cost: PER_PIXEL + samples, loss }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayfarm_tracer::scene::FrameView;
+
+    use super::*;
+    use crate::tradeoff::setting::Setting as Measured;
+    use crate::tradeoff::table::Table;
+
+    const TABLES: [&[u8]; 5] = [
+        include_bytes!("../../../models/tradeoff/room.csv"),
+        include_bytes!("../../../models/tradeoff/textured.csv"),
+        include_bytes!("../../../models/tradeoff/product.csv"),
+        include_bytes!("../../../models/tradeoff/bust.csv"),
+        include_bytes!("../../../models/tradeoff/ten-busts.csv"),
+    ];
+
+    fn wanted(samples: u32) -> WantedPicture {
+        let view = FrameView { samples, ..crate::test_scene::view() };
+        WantedPicture { view, scale: RenderScale::Full }
+    }
+
+    /// Cost and loss of a setting beside another one, in each table that has both, from the least to the greatest.
+    fn measured(setting: &str, beside: &str) -> [Vec<f64>; 2] {
+        let tables = TABLES.map(|text| Table::parse(text).unwrap());
+        let row = |table: &Table, name: &str| table.rows.iter().find(|row| row.setting == name).cloned();
+        let pairs = tables.iter().filter_map(|table| row(table, setting).zip(row(table, beside)));
+        let pairs: Vec<_> = pairs.collect();
+        assert!(pairs.len() >= 3, "{setting} beside {beside}");
+        let sorted = |mut values: Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        [
+            sorted(pairs.iter().map(|(one, other)| one.median_ms / other.median_ms).collect()),
+            sorted(pairs.iter().map(|(one, other)| one.flip - other.flip).collect()),
+        ]
+    }
+
+    /// Alone, a knob is expected to do about what it did to the scenes that were measured, in the middle.
+    #[test]
+    fn knobs_are_expected_to_do_what_was_measured() {
+        let median = |values: &[f64]| values[values.len() / 2];
+        for (setting, beside, samples) in [
+            ("scale-3-4", "samples-1", 1),
+            ("scale-1-2", "samples-1", 1),
+            ("no-shadows", "samples-1", 1),
+            ("diffuse", "samples-1", 1),
+            ("samples-1", "samples-16", 16),
+            ("samples-4", "samples-16", 16),
+            ("samples-9", "samples-16", 16),
+            ("samples-4+adaptive", "samples-4", 4),
+            ("samples-9+adaptive", "samples-9", 9),
+            ("samples-16+adaptive", "samples-16", 16),
+        ] {
+            let [costs, losses] = measured(setting, beside);
+            let picture = Measured::named(setting).unwrap().applied_to(&wanted(samples).view);
+            let expected = rung(Setting::of(&picture), &wanted(samples));
+            let (cost, loss) = (median(&costs), median(&losses));
+            let what = format!("{setting}: expected {expected:?}, measured {costs:?} and {losses:?}");
+            assert!((expected.cost / cost - 1.0).abs() < 0.15, "{what}");
+            assert!((expected.loss - loss).abs() < 0.1 * loss + 0.001, "{what}");
+        }
+    }
+
+    #[test]
+    fn half_the_time_is_saved_where_neighbours_do_not_differ_before_anything_else_is_left_out() {
+        let rungs = ladder(&crate::test_scene::scene(), &wanted(16));
+        let first = rungs.rungs().iter().find(|rung| rung.cost < 0.5).unwrap().setting.applied(&wanted(16));
+        assert!(first.view.quality.adaptive && first.view.samples == 16, "{first:?}");
+        assert_eq!(first.scale, RenderScale::Full);
     }
 }

@@ -72,14 +72,16 @@ impl Setting {
     /// This without what makes no difference to pictures of a scene: the same pixels would come, and no sooner.
     pub(crate) fn for_scene(&self, scene: &Scene) -> Self {
         let shadows = scene.lights.iter().any(|light| light.shadows);
-        let specular = scene.materials.iter().any(|material| material.is_specular());
+        let mut shining = scene.materials.iter().filter(|material| material.is_specular()).peekable();
+        let specular = shining.peek().is_some();
+        let powers = shining.any(|material| !material.has_squared_highlight());
         let mut setting = *self;
         setting.shadows |= !shadows;
         // Without the term, its precision is nobody's business.
         if !specular {
             setting.shading = Shading::Full;
         }
-        if !specular || setting.shading == Shading::Diffuse {
+        if !powers || setting.shading == Shading::Diffuse {
             setting.exponent = ExponentPrecision::Exact;
         }
         setting

@@ -95,7 +95,10 @@ pub(crate) fn chart(report: &Report) -> Chart {
         all.push(series("others", Line::None, others));
     }
     Chart {
-        title: format!("{scene}, {width} x {height}, {threads} threads"),
+        title: format!(
+            "{scene}, {width} x {height}, {threads} thread{}",
+            if *threads == 1 { "" } else { "s" }
+        ),
         x: Axis { label: "milliseconds per frame".to_owned(), logarithmic: true, from_zero: false },
         // Good settings lie close to zero, where only ratios tell them apart; zero itself has no place there.
         y: Axis {

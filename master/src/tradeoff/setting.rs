@@ -14,6 +14,8 @@ use crate::wanted::WantedPicture;
 pub(crate) struct Asked {
     /// Something has a highlight.
     pub(crate) specular: bool,
+    /// The precision of an exponent makes a difference.
+    pub(crate) powers: bool,
     /// Something has a texture that is not looked up at the nearest texel.
     pub(crate) filtered: bool,
     /// A light casts shadows.
@@ -26,6 +28,7 @@ impl Asked {
         let (features, data) = (scene.features(), scene.scene());
         Self {
             specular: features.specular,
+            powers: data.materials.iter().any(|m| m.is_specular() && !m.has_squared_highlight()),
             filtered: features.textured && data.textures.iter().any(|map| map.filter != Filter::Nearest),
             shadows: data.lights.iter().any(|light| light.shadows),
         }
@@ -68,7 +71,7 @@ const DIFFUSE: Knob = Knob {
 };
 const FAST: Knob = Knob {
     name: "fast-exponent",
-    matters: |asked| asked.specular,
+    matters: |asked| asked.powers,
     turn: |p| p.view.quality.exponent = ExponentPrecision::Fast,
 };
 const NEAREST: Knob = Knob {
@@ -153,8 +156,8 @@ mod tests {
 
     use super::*;
 
-    const NOTHING: Asked = Asked { specular: false, filtered: false, shadows: false };
-    const EVERYTHING: Asked = Asked { specular: true, filtered: true, shadows: true };
+    const NOTHING: Asked = Asked { specular: false, powers: false, filtered: false, shadows: false };
+    const EVERYTHING: Asked = Asked { specular: true, powers: true, filtered: true, shadows: true };
 
     #[test]
     fn names_are_unique_fit_for_files_and_lead_back() {

@@ -154,7 +154,7 @@ impl Table {
         Self::parse(&text).map_err(refuse)
     }
 
-    fn parse(text: &[u8]) -> Result<Self, String> {
+    pub(crate) fn parse(text: &[u8]) -> Result<Self, String> {
         let mut reader = csv::Reader::from_reader(text);
         let places = places(reader.headers().map_err(|error| error.to_string())?)?;
         let mut table: Option<Self> = None;

@@ -199,6 +199,20 @@ impl Material {
     pub fn is_specular(&self) -> bool {
         self.specular != Vec3::ZERO
     }
+
+    /// Whether squaring computes the power of its highlight, so that [`ExponentPrecision`] makes no difference: whole exponents
+    /// up to 256, where squaring rounds less than a logarithm does.
+    pub fn has_squared_highlight(&self) -> bool {
+        is_squared(self.exponent)
+    }
+}
+
+/// See [`Material::has_squared_highlight`].
+#[inline(always)]
+pub(crate) fn is_squared(exponent: f32) -> bool {
+    const MOST_SQUARED: u32 = 256;
+    let whole = exponent as u32;
+    whole as f32 == exponent && whole <= MOST_SQUARED
 }
 
 /// A texture and how it is looked up.

@@ -1,16 +1,13 @@
 //! The highlight: Blinn's half vector, Phong's exponent.
 
 use super::binomial;
-use crate::scene::ExponentPrecision;
+use crate::scene::{ExponentPrecision, is_squared};
 use crate::simd::math::{exp2, log2};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat};
 
 /// Up to this exponent the rounding of N.H to `f32` stays below a fifth of a step of the 8-bit picture.
 const SINGLE: f32 = 2000.0;
-
-/// Up to this exponent squaring rounds less than the logarithm does.
-const MOST_SQUARED: u32 = 256;
 
 /// max(0, N.H)^p with H = (L + V) / |L + V|: in single precision where that is precise, else in double precision. The fast one is
 /// in single precision always, by a series where that is shorter: it is 0.0021 off at most.
@@ -99,8 +96,7 @@ fn raised_to<S: Simd>(
     sine_square: Option<f32x16<S>>,
     exponent: f32,
 ) -> f32x16<S> {
-    let whole = exponent as u32;
-    if whole as f32 != exponent || whole > MOST_SQUARED {
+    if !is_squared(exponent) {
         if let Some(sine_square) = sine_square
             && exponent >= binomial::LEAST_EXPONENT
         {
@@ -109,6 +105,7 @@ fn raised_to<S: Simd>(
         let exponent = splat(simd, 0.5 * exponent);
         return exp2(simd, (log2(simd, square) * exponent).max(splat(simd, -126.0)));
     }
+    let whole = exponent as u32;
     let mut power = if whole & 1 == 1 { square.sqrt() } else { splat(simd, 1.0) };
     let mut rest = whole >> 1;
     while rest != 0 {
