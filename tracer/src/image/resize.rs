@@ -5,6 +5,7 @@
 //! about as Mitchell-Netravali, which looks at four times the pixels, and a sixth less than the nearest pixel.
 
 use super::{ImageError, RgbImage};
+use crate::simd::{self, Level, Simd, dispatch};
 
 /// Weights are parts of this.
 const ONE: u32 = 1 << 8;
@@ -32,8 +33,19 @@ pub fn resize(picture: RgbImage, width: u32, height: u32) -> Result<RgbImage, Im
 pub struct Resizer {
     columns: Vec<Between>,
     rows: Vec<Between>,
-    /// A row between two rows of the original, in parts of a step.
-    blended: Vec<u16>,
+    row_bytes: usize,
+    /// The two rows of the original that were needed last, as wide as the new ones: neighbours among the new rows lie between the
+    /// same two.
+    wide: [WideRow; 2],
+    /// Which lanes it is done with.
+    level: Level,
+}
+
+/// A row of the original in the new width, in parts of a step.
+#[derive(Debug, Default)]
+struct WideRow {
+    index: Option<usize>,
+    values: Vec<u16>,
 }
 
 /// A place between two pixels or rows of the original.
@@ -52,29 +64,51 @@ impl Resizer {
         (!empty).then(|| Self {
             columns: places(from.0, to.0),
             rows: places(from.1, to.1),
-            blended: vec![0; from.0 as usize * 3],
+            row_bytes: from.0 as usize * 3,
+            wide: Default::default(),
+            level: simd::best(),
         })
     }
 
-    /// Row `y` of the new picture into `out`, RGB8 like the whole `original`.
+    /// Row `y` of the new picture into `out`, RGB8 like the whole `original`, which is the same for all rows.
     ///
     /// # Panics
     /// If there is no such row, or `original` is smaller than was said.
     pub fn row(&mut self, original: &[u8], y: usize, out: &mut [u8]) {
         let Between { first, second, weight } = self.rows[y];
-        let row_bytes = self.blended.len();
-        let row = |index: usize| &original[index * row_bytes..(index + 1) * row_bytes];
-        for ((blended, above), below) in self.blended.iter_mut().zip(row(first)).zip(row(second)) {
-            *blended = (u32::from(*above) * (ONE - weight) + u32::from(*below) * weight) as u16;
+        if self.wide[0].index != Some(first) {
+            self.wide.swap(0, 1);
         }
+        let Self { columns, wide: [above, below], row_bytes, level, .. } = self;
+        for (wide, index) in [(&mut *above, first), (&mut *below, second)] {
+            if wide.index != Some(index) {
+                wide.widen(columns, &original[index * *row_bytes..(index + 1) * *row_bytes]);
+                wide.index = Some(index);
+            }
+        }
+        dispatch!(*level, simd => blend(simd, &above.values, &below.values, weight, out));
+    }
+}
+
+/// Between two rows: plain whole numbers, of which the compiler makes vectors.
+#[inline(always)]
+fn blend<S: Simd>(_: S, above: &[u16], below: &[u16], weight: u32, out: &mut [u8]) {
+    for ((value, &above), &below) in out.iter_mut().zip(above).zip(below) {
+        let sum = u32::from(above) * (ONE - weight) + u32::from(below) * weight;
+        *value = ((sum + ONE * ONE / 2) / (ONE * ONE)) as u8;
+    }
+}
+
+impl WideRow {
+    fn widen(&mut self, columns: &[Between], row: &[u8]) {
+        self.values.resize(columns.len() * 3, 0);
         for (pixel, &Between { first, second, weight }) in
-            out.as_chunks_mut::<3>().0.iter_mut().zip(&self.columns)
+            self.values.as_chunks_mut::<3>().0.iter_mut().zip(columns)
         {
-            let (left, right) = (&self.blended[first * 3..][..3], &self.blended[second * 3..][..3]);
+            let (left, right) = (&row[first * 3..][..3], &row[second * 3..][..3]);
             for channel in 0..3 {
                 let (left, right) = (u32::from(left[channel]), u32::from(right[channel]));
-                pixel[channel] =
-                    ((left * (ONE - weight) + right * weight + ONE * ONE / 2) / (ONE * ONE)) as u8;
+                pixel[channel] = (left * (ONE - weight) + right * weight) as u16;
             }
         }
     }
