@@ -89,16 +89,16 @@ impl Costs {
         Some((self.load?.mean + self.ratios.get(rung)?.mean).exp())
     }
 
-    /// A frame at a rung took so long.
-    pub(super) fn observe(&mut self, rung: usize, took: Duration) {
-        let Some(ratio) = self.ratios.get_mut(rung) else { return };
+    /// A frame at a rung took so long. Returns whether the load has jumped.
+    pub(super) fn observe(&mut self, rung: usize, took: Duration) -> bool {
+        let Some(ratio) = self.ratios.get_mut(rung) else { return false };
         let seen = took.as_secs_f64().max(SHORTEST).ln();
         if std::mem::replace(&mut self.last_rung, rung) != rung && rung > 0 {
             ratio.variance = (ratio.variance + REVISITED).min(UNTRIED);
         }
         let Some(load) = &mut self.load else {
             self.load = Some(Estimate { mean: seen - ratio.mean, variance: self.noise + ratio.variance });
-            return;
+            return false;
         };
         load.variance += self.noise * LOAD_DRIFT;
         let known = load.variance + ratio.variance;
@@ -112,12 +112,13 @@ impl Costs {
             (self.slower, self.quicker) = (0.0, 0.0);
             // Two of three frames at least are of the new load.
             *load = Estimate { mean: median(self.last_loads), variance: self.noise };
-            return;
+            return true;
         }
         load.learn(surprise, spread);
         ratio.learn(surprise, spread);
         let noise = self.noise + NOISE_GAIN * (surprise * surprise - known - self.noise);
         self.noise = noise.clamp(LEAST_NOISE, MOST_NOISE);
+        false
     }
 }
 
@@ -134,7 +135,9 @@ mod tests {
     }
 
     fn see(costs: &mut Costs, rung: usize, seconds: f64, frames: usize) {
-        (0..frames).for_each(|_| costs.observe(rung, Duration::from_secs_f64(seconds)));
+        for _ in 0..frames {
+            costs.observe(rung, Duration::from_secs_f64(seconds));
+        }
     }
 
     #[test]

@@ -18,6 +18,15 @@ const NOTABLY: f64 = 0.95;
 /// So many frames in a row in which no rung is predicted to hold: then that is told.
 const BEATEN_FOR: u32 = 10;
 
+/// The load has jumped up by this factor, and since then a rung that takes no more than this part of the time has stood for so
+/// many frames: then the next better one is tried, whatever is predicted of it. What jumped may have been the cost of the rung
+/// before alone, and nothing else would tell.
+const JUMP: f64 = 1.2;
+const ROOM: f64 = 0.6;
+const TRY_AFTER: u32 = 40;
+/// So many frames are given to it, the first of which are still those of the rung before.
+const TRIAL: u32 = 8;
+
 /// Parts of the time that a frame has.
 #[derive(Clone, Copy, Debug)]
 struct Band {
@@ -37,6 +46,12 @@ pub(crate) struct Governor {
     since_change: u32,
     better_for: u32,
     beaten_for: u32,
+    /// Rungs that no frame has had since the load jumped.
+    doubtful: Vec<bool>,
+    /// The load before it did, in seconds of a full frame.
+    calm: f64,
+    /// Frames that a doubtful rung is still given.
+    trial: u32,
 }
 
 impl Governor {
@@ -45,7 +60,19 @@ impl Governor {
     pub(crate) fn new(ratios: impl IntoIterator<Item = f64>, budget: Duration) -> Self {
         let budget = budget.as_secs_f64();
         let costs = Costs::new(ratios);
-        Self { costs, budget, rung: 0, last_seen: 0, since_change: DWELL, better_for: 0, beaten_for: 0 }
+        let doubtful = vec![false; costs.len()];
+        Self {
+            costs,
+            budget,
+            rung: 0,
+            last_seen: 0,
+            since_change: DWELL,
+            better_for: 0,
+            beaten_for: 0,
+            doubtful,
+            calm: f64::MAX,
+            trial: 0,
+        }
     }
 
     /// The rung for the next frame.
@@ -69,16 +96,23 @@ impl Governor {
         let is_first = self.costs.predicted(0).is_none();
         // Workers began it while they were busy with one of another rung: what it took says little of either.
         let is_mixed = std::mem::replace(&mut self.last_seen, rung) != rung && !is_first;
-        if !is_mixed {
-            self.costs.observe(rung, took);
+        let before = self.costs.predicted(0);
+        if !is_mixed && self.costs.observe(rung, took) {
+            self.doubtful.fill(true);
+            self.calm = before.unwrap_or(f64::MAX);
+        }
+        if let Some(doubtful) = self.doubtful.get_mut(rung) {
+            *doubtful &= is_mixed;
         }
         self.since_change = self.since_change.saturating_add(1);
         let band = if self.since_change >= SETTLE { SETTLED } else { FRESH };
         let best = (0..self.costs.len()).find(|&rung| self.fits(rung, band.enter));
+        self.trial = self.trial.saturating_sub(1);
         match best {
+            _ if self.trial > 0 => {}
             Some(best) if best < self.rung => self.climb(best),
             _ if is_first || !self.fits(self.rung, band.leave) => self.descend(best),
-            _ => self.better_for = 0,
+            _ => self.stay(),
         }
         let holds = (0..self.costs.len()).any(|rung| self.fits(rung, SETTLED.leave));
         self.beaten_for = if holds { 0 } else { self.beaten_for.saturating_add(1) };
@@ -89,6 +123,19 @@ impl Governor {
         self.better_for += 1;
         if self.better_for >= PATIENCE && self.since_change >= DWELL {
             self.change(best);
+        }
+    }
+
+    /// The rung holds, and is predicted to be the best that does. If that is doubtful, it is put to the test.
+    fn stay(&mut self) {
+        self.better_for = 0;
+        let Some(better) = self.rung.checked_sub(1) else { return };
+        let is_doubtful = self.doubtful.get(better).is_some_and(|doubtful| *doubtful);
+        let has_jumped = self.costs.predicted(0).is_some_and(|load| load > JUMP * self.calm);
+        let settled = self.since_change >= TRY_AFTER;
+        if is_doubtful && has_jumped && settled && self.fits(self.rung, ROOM) {
+            self.change(better);
+            self.trial = TRIAL;
         }
     }
 

@@ -194,6 +194,22 @@ fn frames_of_a_picture_at_rest_tell_what_a_moving_one_needs() {
     assert_eq!(governor.rung(), 0);
 }
 
+/// What one rung takes may change without the others, as adaptive anti-aliasing does when the camera comes to edges: the load seems to
+/// have jumped, and nothing but the worst rung to hold.
+#[test]
+fn a_rung_that_becomes_dear_alone_does_not_spoil_the_others() {
+    for seed in 0..50 {
+        let mut simulation = Simulation::new(0.05, seed);
+        simulation.frames(2.0, SETTLING);
+        assert_eq!(simulation.governor.rung(), 3, "seed {seed}");
+        simulation.frames(1.25, SETTLING);
+        assert_eq!(simulation.governor.rung(), 2, "seed {seed}");
+        simulation.truth[2] = 1.5;
+        simulation.frames(1.25, 120);
+        assert_eq!(simulation.governor.rung(), 3, "seed {seed}");
+    }
+}
+
 /// Falling costs of up to eight rungs, the first being 1.
 fn ladders() -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(0.4..0.95_f64, 0..7).prop_map(|factors| {
