@@ -33,6 +33,8 @@ struct Row {
     tested: u64,
     at_edges: u64,
     wrong: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_wrong: Option<String>,
 }
 
 /// Checks a scene, or the built-in ones, and tells on standard output.
@@ -75,6 +77,7 @@ fn report(subject: &Subject, outcomes: &[Outcome]) -> Report {
         tested: outcome.tested,
         at_edges: outcome.at_edges,
         wrong: outcome.wrong,
+        first_wrong: outcome.first_wrong.clone(),
     };
     Report {
         scene: subject.name.clone(),
@@ -95,6 +98,7 @@ fn table(report: &Report) -> String {
     for row in &report.checks {
         let tested = format!("{} {}", grouped(row.tested), row.unit);
         text += &line(&row.check, &row.case, &tested, &grouped(row.at_edges), &grouped(row.wrong));
+        text.extend(row.first_wrong.iter().map(|what| format!("          {what}\n")));
     }
     text
 }
@@ -113,7 +117,16 @@ mod tests {
     use super::*;
 
     fn outcome(check: Check, wrong: u64) -> Outcome {
-        Outcome { check, case: "a case".into(), unit: "rays", tested: 12_345, at_edges: 6, wrong }
+        let first_wrong = (wrong > 0).then(|| "pixel (1, 2)".to_owned());
+        Outcome {
+            check,
+            case: "a case".into(),
+            unit: "rays",
+            tested: 12_345,
+            at_edges: 6,
+            wrong,
+            first_wrong,
+        }
     }
 
     #[test]
@@ -127,6 +140,7 @@ mod tests {
         let line = text.lines().find(|line| line.contains("acne")).unwrap();
         let words: Vec<&str> = line.split_whitespace().collect();
         assert_eq!(words, ["acne", "a", "case", "12,345", "rays", "6", "7"]);
+        assert!(text.ends_with("\n          pixel (1, 2)\n"), "{text}");
     }
 
     #[test]

@@ -45,7 +45,15 @@ pub fn leaks(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
         let pieces = pieces(&subject, &frame, &seams);
         let Tally { at_edges, wrong } = shoot(&frame, &pieces, rays);
         let case = format!("scale {scale:e}, {distance:e} extents away");
-        Ok(Outcome { check: Check::Leaks, case, unit: "rays", tested: rays, at_edges, wrong })
+        Ok(Outcome {
+            check: Check::Leaks,
+            case,
+            unit: "rays",
+            tested: rays,
+            at_edges,
+            wrong,
+            first_wrong: None,
+        })
     };
     PLACES.into_iter().map(at).collect()
 }

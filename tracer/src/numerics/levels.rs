@@ -20,7 +20,15 @@ pub fn levels(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compil
         frame.level = level;
         let wrong = differing_bytes(&best, &picture(&frame));
         let tested = best.len() as u64;
-        outcomes.push(Outcome { check: Check::Levels, case, unit: "bytes", tested, at_edges: 0, wrong });
+        outcomes.push(Outcome {
+            check: Check::Levels,
+            case,
+            unit: "bytes",
+            tested,
+            at_edges: 0,
+            wrong,
+            first_wrong: None,
+        });
     }
     Ok(outcomes)
 }

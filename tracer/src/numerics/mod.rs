@@ -116,6 +116,8 @@ pub struct Outcome {
     pub at_edges: u64,
     /// Those of them that are wrong.
     pub wrong: u64,
+    /// What is wrong with the first of these, where that can be told in a line.
+    pub first_wrong: Option<String>,
 }
 
 impl Outcome {

@@ -32,6 +32,7 @@ pub fn offset(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compil
             tested: verdict.tested,
             at_edges: verdict.at_edges,
             wrong: verdict.wrong,
+            first_wrong: verdict.first_wrong.map(|pixel| pixel.to_string()),
         })
     };
     DISTANCES.into_iter().map(at).collect()

@@ -1,5 +1,7 @@
 //! Pixels of the fast path against the oracle's.
 
+use std::fmt;
+
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -7,11 +9,27 @@ use super::{Effort, Subject};
 use crate::reference::Oracle;
 use crate::scene::FrameView;
 
-/// A pixel stands at an edge when the oracle sees this far away, in pixels, what the fast path saw. The fast path shades points
-/// that are rounded to `f32`, to 2^-24 of their distance: in a picture of 16384 pixels that is 2^-10 of one.
+/// A pixel stands at an edge when what the oracle sees this far away, in pixels, is on either side of what the fast path saw. The fast
+/// path shades points that are rounded to `f32`, to 2^-24 of their distance: in a picture of 16384 pixels that is 2^-10 of one.
 const NEXT_TO: f64 = 1.0 / 1024.0;
 /// As far away, at the edge of a shadow: there the rounding of the point counts as often as light that grazes draws it out.
 const NEXT_TO_SHADOW: f64 = 1.0 / 16.0;
+
+/// A pixel that is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct WrongPixel {
+    /// Column and row.
+    at: [u32; 2],
+    found: [u8; 3],
+    expected: [u8; 3],
+}
+
+impl fmt::Display for WrongPixel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { at: [x, y], found, expected } = self;
+        write!(f, "pixel ({x}, {y}) is {found:?}, and {expected:?} by the oracle")
+    }
+}
 
 /// What the oracle says of some pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,24 +37,30 @@ pub(super) struct Verdict {
     pub(super) tested: u64,
     pub(super) at_edges: u64,
     pub(super) wrong: u64,
+    /// The first one that is.
+    pub(super) first_wrong: Option<WrongPixel>,
 }
 
 /// Asks the oracle of a scene about pixels of its picture. A channel may differ by a step of the encoding.
 pub(super) fn ask(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &[usize]) -> Verdict {
     let oracle = Oracle::new(&subject.scene, &subject.meshes, &subject.textures, view);
     let judge = |&pixel: &usize| {
-        let found = &picture[pixel * 3..pixel * 3 + 3];
+        let found = [0, 1, 2].map(|channel| picture[pixel * 3 + channel]);
         let (x, y) = (pixel as u32 % view.width, pixel as u32 / view.width);
         let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let agrees = |at: DVec2| is_near(found, oracle.encoded_at(at.x, at.y));
-        let right = agrees(center);
-        let at_edge = !right && around(center).any(agrees);
-        Verdict { tested: 1, at_edges: at_edge.into(), wrong: (!right && !at_edge).into() }
+        let seen = |at: DVec2| oracle.encoded_at(at.x, at.y);
+        let expected = seen(center);
+        let right = is_near(found, expected);
+        let at_edge = !right && around(center).any(|ring| is_between(found, ring.map(seen), expected));
+        let wrong = !right && !at_edge;
+        let first_wrong = wrong.then_some(WrongPixel { at: [x, y], found, expected });
+        Verdict { tested: 1, at_edges: at_edge.into(), wrong: wrong.into(), first_wrong }
     };
     pixels.par_iter().map(judge).reduce(Verdict::default, |a, b| Verdict {
         tested: a.tested + b.tested,
         at_edges: a.at_edges + b.at_edges,
         wrong: a.wrong + b.wrong,
+        first_wrong: a.first_wrong.or(b.first_wrong),
     })
 }
 
@@ -66,14 +90,22 @@ pub(super) fn chosen(first: &[usize], pixels: usize, count: usize) -> Vec<usize>
     chosen
 }
 
-fn is_near(found: &[u8], expected: [u8; 3]) -> bool {
+fn is_near(found: [u8; 3], expected: [u8; 3]) -> bool {
     found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1)
 }
 
-fn around(center: DVec2) -> impl Iterator<Item = DVec2> {
+/// Whether each channel is one that is seen around, or lies between these: beside an edge, colours may change from place to place.
+fn is_between(found: [u8; 3], around: [[u8; 3]; 8], center: [u8; 3]) -> bool {
+    (0..3).all(|channel| {
+        let seen = || around.iter().chain([&center]).map(|color| color[channel]);
+        let (least, greatest) = (seen().min().unwrap_or(0), seen().max().unwrap_or(255));
+        (least.saturating_sub(1)..=greatest.saturating_add(1)).contains(&found[channel])
+    })
+}
+
+/// Rings of places around one.
+fn around(center: DVec2) -> impl Iterator<Item = [DVec2; 8]> {
     let steps = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
-    let ring = move |away: f64| {
-        steps.into_iter().map(move |(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * away)
-    };
-    [NEXT_TO, NEXT_TO_SHADOW].into_iter().flat_map(ring)
+    let ring = move |away: f64| steps.map(|(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * away);
+    [NEXT_TO, NEXT_TO_SHADOW].into_iter().map(ring)
 }

@@ -25,7 +25,15 @@ pub fn scale(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
             wrong += differing_bytes(&own, &scaled);
         }
         let case = case.to_owned();
-        outcomes.push(Outcome { check: Check::Scale, case, unit: "bytes", tested, at_edges: 0, wrong });
+        outcomes.push(Outcome {
+            check: Check::Scale,
+            case,
+            unit: "bytes",
+            tested,
+            at_edges: 0,
+            wrong,
+            first_wrong: None,
+        });
     }
     Ok(outcomes)
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::leaks::{Tally, pieces, shoot};
-use super::oracle::{Verdict, ask, chosen};
+use super::oracle::{Verdict, ask, chosen, is_between};
 use super::scenes::torus;
 use super::seams::Seams;
 use super::*;
@@ -77,7 +77,11 @@ fn the_oracle_sees_a_pixel_that_is_wrong() {
     for &pixel in &pixels[..3] {
         picture[pixel * 3 + 1] ^= 0x20;
     }
-    assert_eq!(ask(&subject, &view, &picture, &pixels), Verdict { wrong: 3, ..fine });
+    let broken = ask(&subject, &view, &picture, &pixels);
+    let told = broken.first_wrong.unwrap().to_string();
+    let (x, y) = (pixels[0] as u32 % view.width, pixels[0] as u32 / view.width);
+    assert!(told.starts_with(&format!("pixel ({x}, {y}) is [")), "{told}");
+    assert_eq!(broken, Verdict { wrong: 3, first_wrong: broken.first_wrong, ..fine });
 }
 
 #[test]
@@ -109,4 +113,17 @@ fn a_scene_is_placed_with_all_that_is_in_it() {
     assert_eq!(moved.models[1].scale, DVec3::splat(1.2));
     assert_eq!(moved.camera.position, DVec3::new(10.6, 2.2, 7.0));
     assert_ne!(moved.planes[0].point, subject.scene.planes[0].point);
+}
+
+#[test]
+fn what_lies_between_colours_is_between_them_in_every_channel() {
+    let mut around = [[100, 50, 0]; 8];
+    around[3] = [140, 10, 0];
+    let is = |found| is_between(found, around, [100, 50, 0]);
+    for found in [[100, 50, 0], [140, 10, 1], [120, 30, 0], [141, 9, 0]] {
+        assert!(is(found), "{found:?}");
+    }
+    for found in [[98, 50, 0], [142, 30, 0], [120, 52, 0], [120, 30, 2]] {
+        assert!(!is(found), "{found:?}");
+    }
 }
