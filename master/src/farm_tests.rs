@@ -20,6 +20,9 @@ use crate::farm::{
 };
 use crate::test_scene::{scene, view};
 
+mod service;
+mod strangers;
+
 /// Far beyond what any of these tests takes: a farm that hangs fails instead of hanging the tests.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -173,95 +176,6 @@ async fn a_lone_worker_that_fails_once_is_tried_again() {
     farm.shut_down().await;
     let leases = patiently(worker).await.unwrap().leases;
     assert!(leases < 40, "{leases} leases for one frame: it was asked again and again without a pause");
-}
-
-#[tokio::test]
-async fn a_paused_worker_waits_until_it_is_resumed() {
-    let mut farm = farm(SegmentPolicy::Adaptive).await;
-    fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 1).await;
-    let first = farm.status().workers[0].id;
-    farm.control().pause(first).unwrap();
-    assert_eq!(farm.status().workers[0].state, WorkerState::Paused);
-    fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 2).await;
-    render(&mut farm, view()).await;
-    assert_eq!(farm.status().workers[0].segments_done, 0);
-    let second = farm.status().workers[1].id;
-    farm.control().pause(second).unwrap();
-    farm.request(turned(1));
-    farm.control().resume(first).unwrap();
-    assert!(is_picture(&turned(1), &finished(&mut farm).await.pixels));
-    assert_ne!(farm.status().workers[0].segments_done, 0);
-    assert_eq!(farm.control().pause(99), Err(UnknownWorker(99)));
-}
-
-#[tokio::test]
-async fn a_drained_worker_is_told_and_leaves_and_may_come_again() {
-    let mut farm = farm(SegmentPolicy::Adaptive).await;
-    let leaving = fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 1).await;
-    render(&mut farm, view()).await;
-    farm.control().drain(farm.status().workers[0].id).unwrap();
-    let outcome = patiently(leaving).await.unwrap();
-    assert!(outcome.drained, "it was not told to drain");
-    assert!(outcome.goodbye.unwrap().contains("drains"));
-    fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 1).await;
-    render(&mut farm, turned(1)).await;
-}
-
-#[tokio::test]
-async fn a_kicked_worker_stays_out_until_it_is_allowed() {
-    let mut farm = farm(SegmentPolicy::Adaptive).await;
-    let kicked = fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 1).await;
-    farm.control().kick(farm.status().workers[0].id, "it is needed elsewhere").unwrap();
-    assert_eq!(patiently(kicked).await.unwrap().goodbye.as_deref(), Some("it is needed elsewhere"));
-    assert_eq!(farm.status().kicked, ["fake"]);
-
-    let mut stream = TcpStream::connect(farm.address()).await.unwrap();
-    let hello = Hello { name: "fake".into(), threads: 1, simd: "none".into(), software: "test".into() };
-    let refused = handshake::as_worker(&mut stream, &hello).await.unwrap_err().to_string();
-    assert!(refused.contains("was kicked"), "{refused}");
-    assert_eq!((farm.control().allow("fake"), farm.control().allow("fake")), (1, 0));
-    fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 1).await;
-    render(&mut farm, view()).await;
-}
-
-#[tokio::test]
-async fn strangers_disturb_nobody() {
-    let mut farm = farm(SegmentPolicy::Adaptive).await;
-    fake_worker::start(farm.address(), Script::Honest).await;
-    until_workers(&farm, 1).await;
-    farm.request(view());
-    let babbler = fake_worker::start(farm.address(), Script::Babble).await;
-    let mut silent = TcpStream::connect(farm.address()).await.unwrap();
-    let mut browser = TcpStream::connect(farm.address()).await.unwrap();
-    browser.write_all(b"GET / HTTP/1.1\r\nHost: farm\r\n\r\n").await.unwrap();
-    let mut hasty = TcpStream::connect(farm.address()).await.unwrap();
-    hasty.write_all(b"RAYF").await.unwrap();
-    drop(hasty);
-    patiently(babbler).await.unwrap();
-    let _ = browser.read_to_end(&mut Vec::new()).await;
-    assert!(is_picture(&view(), &finished(&mut farm).await.pixels));
-    until_workers(&farm, 1).await;
-    render(&mut farm, turned(1)).await;
-    silent.shutdown().await.unwrap();
-}
-
-#[tokio::test]
-async fn a_worker_of_another_version_is_told_so() {
-    let mut farm = farm(SegmentPolicy::Adaptive).await;
-    let mut skewed = TcpStream::connect(farm.address()).await.unwrap();
-    skewed.write_all(b"RAYFARM\n\x63\0\x02\0").await.unwrap();
-    let mut answer = Vec::new();
-    skewed.read_to_end(&mut answer).await.unwrap();
-    let text = String::from_utf8_lossy(&answer);
-    assert!(text.contains("version 99") && text.contains("install the same release"), "{text}");
-    fake_worker::start(farm.address(), Script::Honest).await;
-    render(&mut farm, view()).await;
 }
 
 #[tokio::test]

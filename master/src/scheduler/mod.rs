@@ -30,6 +30,8 @@ mod audit_scenarios;
 #[cfg(test)]
 mod scenarios;
 #[cfg(test)]
+mod service_scenarios;
+#[cfg(test)]
 mod sizes_tests;
 #[cfg(test)]
 mod transcript;

@@ -95,7 +95,7 @@ fn is_near(found: [u8; 3], expected: [u8; 3]) -> bool {
 }
 
 /// Whether each channel is one that is seen around, or lies between these: beside an edge, colours may change from place to place.
-fn is_between(found: [u8; 3], around: [[u8; 3]; 8], center: [u8; 3]) -> bool {
+pub(super) fn is_between(found: [u8; 3], around: [[u8; 3]; 8], center: [u8; 3]) -> bool {
     (0..3).all(|channel| {
         let seen = || around.iter().chain([&center]).map(|color| color[channel]);
         let (least, greatest) = (seen().min().unwrap_or(0), seen().max().unwrap_or(255));

@@ -1,0 +1,58 @@
+//! Workers that are paused, drained and kicked.
+
+use super::*;
+
+#[tokio::test]
+async fn a_paused_worker_waits_until_it_is_resumed() {
+    let mut farm = farm(SegmentPolicy::Adaptive).await;
+    fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 1).await;
+    let first = farm.status().workers[0].id;
+    farm.control().pause(first).unwrap();
+    assert_eq!(farm.status().workers[0].state, WorkerState::Paused);
+    fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 2).await;
+    render(&mut farm, view()).await;
+    assert_eq!(farm.status().workers[0].segments_done, 0);
+    let second = farm.status().workers[1].id;
+    farm.control().pause(second).unwrap();
+    farm.request(turned(1));
+    farm.control().resume(first).unwrap();
+    assert!(is_picture(&turned(1), &finished(&mut farm).await.pixels));
+    assert_ne!(farm.status().workers[0].segments_done, 0);
+    assert_eq!(farm.control().pause(99), Err(UnknownWorker(99)));
+}
+
+#[tokio::test]
+async fn a_drained_worker_is_told_and_leaves_and_may_come_again() {
+    let mut farm = farm(SegmentPolicy::Adaptive).await;
+    let leaving = fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 1).await;
+    render(&mut farm, view()).await;
+    farm.control().drain(farm.status().workers[0].id).unwrap();
+    let outcome = patiently(leaving).await.unwrap();
+    assert!(outcome.drained, "it was not told to drain");
+    assert!(outcome.goodbye.unwrap().contains("drains"));
+    fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 1).await;
+    render(&mut farm, turned(1)).await;
+}
+
+#[tokio::test]
+async fn a_kicked_worker_stays_out_until_it_is_allowed() {
+    let mut farm = farm(SegmentPolicy::Adaptive).await;
+    let kicked = fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 1).await;
+    farm.control().kick(farm.status().workers[0].id, "it is needed elsewhere").unwrap();
+    assert_eq!(patiently(kicked).await.unwrap().goodbye.as_deref(), Some("it is needed elsewhere"));
+    assert_eq!(farm.status().kicked, ["fake"]);
+
+    let mut stream = TcpStream::connect(farm.address()).await.unwrap();
+    let hello = Hello { name: "fake".into(), threads: 1, simd: "none".into(), software: "test".into() };
+    let refused = handshake::as_worker(&mut stream, &hello).await.unwrap_err().to_string();
+    assert!(refused.contains("was kicked"), "{refused}");
+    assert_eq!((farm.control().allow("fake"), farm.control().allow("fake")), (1, 0));
+    fake_worker::start(farm.address(), Script::Honest).await;
+    until_workers(&farm, 1).await;
+    render(&mut farm, view()).await;
+}
