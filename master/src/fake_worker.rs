@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 use std::ops::Range;
+use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{self, Sender};
@@ -15,6 +16,9 @@ use tokio::task::JoinHandle;
 
 use crate::framebuffer::FramePixels;
 
+/// What one that is busy takes for a pixel.
+const PIXEL_TIME: Duration = Duration::from_nanos(2_440);
+
 /// What a worker does besides rendering what it is asked to.
 pub(crate) enum Script {
     /// Nothing.
@@ -23,6 +27,8 @@ pub(crate) enum Script {
     VanishAt(usize),
     /// Answers its first lease only when it is told to.
     Late(oneshot::Receiver<()>),
+    /// Takes five milliseconds a frame of 32 x 64 pixels, and as much as that for each pixel of others.
+    Busy,
     /// Answers no lease of a frame that is as wide as that, or wider.
     OnlyNarrowerThan(u32),
     /// Sends a byte too few.
@@ -122,12 +128,17 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
     // Every other misdeed is done once.
     let misdeed = match script {
         Script::VanishAt(_) => Script::Honest,
+        Script::Busy => Script::Busy,
         Script::Lie => Script::Lie,
         Script::OnlyNarrowerThan(width) if view.width >= *width => return,
         Script::OnlyNarrowerThan(_) => Script::Honest,
         _ => std::mem::replace(script, Script::Honest),
     };
     let answers = match misdeed {
+        Script::Busy => {
+            tokio::time::sleep(PIXEL_TIME * (bytes.len() / 3) as u32).await;
+            1
+        }
         Script::Honest | Script::VanishAt(_) | Script::OnlyNarrowerThan(_) | Script::Babble => 1,
         Script::Late(go) => {
             let sender = sender.clone();

@@ -37,3 +37,8 @@ fn the_textures_hold() {
 fn the_instances_hold() {
     check("instances.toml");
 }
+
+#[test]
+fn the_room_holds() {
+    check("room.toml");
+}

@@ -20,7 +20,8 @@ pub(crate) struct DialArgs {
 /// How much may be lost.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ErrorArgs {
-    /// The fastest setting whose mean FLIP error is at most E: 0 is none, 1 is white for black. With --target-fps, the most
+    /// The fastest setting that loses at most E of mean FLIP error beside the picture that is asked for: 0 is nothing, 1 white
+    /// for black. With --target-fps, the most
     /// that a moving picture may lose.
     #[arg(long, value_name = "E", value_parser = error_limit)]
     pub(crate) max_error: Option<f64>,

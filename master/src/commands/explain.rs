@@ -11,7 +11,7 @@ use bytes::Bytes;
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
 use rayfarm_tracer::scene::{ColorDepth, FrameView};
-use rayfarm_tracer::{CompiledScene, simd_level};
+use rayfarm_tracer::{CompiledScene, TILE_SIZE, simd_level};
 use serde::Serialize;
 
 use self::features::{FeatureFacts, features, kernels};
@@ -246,7 +246,13 @@ fn pixel_bytes(view: &FrameView) -> u64 {
 }
 
 fn rays(things: &Things, view: &FrameView) -> Rays {
-    let primary = u64::from(view.width) * u64::from(view.height) * u64::from(view.samples);
+    let [width, height, samples] = [view.width, view.height, view.samples].map(u64::from);
+    let primary = if view.is_adaptive() {
+        // At the corners of each band of rows, at the centre, and all.
+        (width + 1) * (height + height.div_ceil(u64::from(TILE_SIZE))) + width * height * (1 + samples)
+    } else {
+        width * height * samples
+    };
     // No material reflects or transmits yet.
     let shadow = if view.quality.shadows { primary * things.lights_with_shadows as u64 } else { 0 };
     Rays { primary, shadow, secondary: 0 }

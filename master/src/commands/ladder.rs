@@ -1,7 +1,6 @@
 //! The dial as a command line asks for it.
 
-use rayfarm_tracer::scene::Scene;
-
+use super::source::Source;
 use crate::cli::{DialArgs, ErrorArgs};
 use crate::dial::{Dial, Ladder, measured_ladder, prior_ladder};
 use crate::error::CommandError;
@@ -15,13 +14,13 @@ use crate::wanted::WantedPicture;
 /// A table that cannot be used.
 pub(super) fn turned(
     args: &DialArgs,
-    scene: &Scene,
+    source: &Source,
     wanted: WantedPicture,
     animated: bool,
 ) -> Result<(WantedPicture, Option<Dial>), CommandError> {
     Ok(match args.target_fps {
-        Some(rate) => (wanted, Some(Dial::new(ladder(&args.error, scene, &wanted)?, rate, animated))),
-        None => (within(&args.error, scene, wanted)?, None),
+        Some(rate) => (wanted, Some(Dial::new(ladder(&args.error, source, &wanted)?, rate, animated))),
+        None => (within(&args.error, source, wanted)?, None),
     })
 }
 
@@ -31,11 +30,11 @@ pub(super) fn turned(
 /// A table that cannot be used.
 pub(super) fn within(
     args: &ErrorArgs,
-    scene: &Scene,
+    source: &Source,
     wanted: WantedPicture,
 ) -> Result<WantedPicture, CommandError> {
     Ok(match args.max_error {
-        Some(_) => ladder(args, scene, &wanted)?.cheapest().applied(&wanted),
+        Some(_) => ladder(args, source, &wanted)?.cheapest().applied(&wanted),
         None if args.front.is_some() => {
             let what = "--front is for --max-error, and in view for --target-fps; give one of them as well";
             return Err(CommandError::WrongInput(what.to_owned()));
@@ -44,14 +43,20 @@ pub(super) fn within(
     })
 }
 
-fn ladder(args: &ErrorArgs, scene: &Scene, wanted: &WantedPicture) -> Result<Ladder, CommandError> {
+fn ladder(args: &ErrorArgs, source: &Source, wanted: &WantedPicture) -> Result<Ladder, CommandError> {
     let ladder = match &args.front {
         Some(path) => {
             let table = Table::read(path).map_err(CommandError::wrong_input)?;
+            if table.scene != source.name {
+                let (path, of, name) = (path.display(), &table.scene, &source.name);
+                tracing::warn!(
+                    "{path} was measured on {of}, not on {name}: what settings cost and lose may be other here"
+                );
+            }
             let told = |problem| CommandError::WrongInput(format!("{}: {problem}", path.display()));
             measured_ladder(&table, wanted).map_err(told)?
         }
-        None => prior_ladder(scene, wanted),
+        None => prior_ladder(&source.scene, wanted),
     };
     Ok(match args.max_error {
         Some(most) => ladder.up_to(most),

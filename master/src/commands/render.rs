@@ -48,7 +48,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let pattern = OutputPattern::parse(&args.output, args.frames)?;
     pattern.path(0).as_deref().map(check_writable).transpose()?;
     let source = Source::load(&args.scene)?;
-    let wanted = within(&args.error, &source.scene, source.wanted(&args.picture)?)?;
+    let wanted = within(&args.error, &source, source.wanted(&args.picture)?)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
     let oversight = Oversight::new(&args.oversight)?;

@@ -29,7 +29,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let source = Source::load(&path)?;
     let asked = source.wanted(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
-    let (picture, dial) = turned(&args.dial, &source.scene, asked, animation.is_moving())?;
+    let (picture, dial) = turned(&args.dial, &source, asked, animation.is_moving())?;
     let view = picture.view;
     let compiled = source.compiled()?;
     let about = About {

@@ -18,8 +18,8 @@ pub(crate) struct Rung {
 /// Rungs that are nearer to each other in cost than this factor are one: a step that changes the rate by less than its
 /// noise is no use.
 const LEAST_STEP: f64 = 0.93;
-/// Rungs at most.
-const MAX_RUNGS: usize = 24;
+/// Rungs at most: so many steps go down to a ten-thousandth of the time.
+const MAX_RUNGS: usize = 128;
 
 /// The Pareto front of settings, the full one first.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,15 +10,23 @@ use crate::wanted::WantedPicture;
 /// error is more than there.
 ///
 /// # Errors
-/// A table without a row for the picture at rest, in words.
+/// A table without a row for the picture at rest, or a picture at rest with a knob turned down: the table's errors are those
+/// beside all that a scene can ask for, and say nothing of what is lost beside less. In words.
 pub(crate) fn ladder(table: &Table, wanted: &WantedPicture) -> Result<Ladder, String> {
+    let turned = wanted.reductions();
+    if !turned.is_empty() {
+        return Err(format!(
+            "was measured beside pictures with every knob at full quality, and this one rests with {}: leave that out, or the table",
+            turned.join(", ")
+        ));
+    }
     let known = |name: &str| Measured::named(name).map(|setting| setting.applied_to(&wanted.view));
     let rests = |picture: &WantedPicture| picture == wanted;
     let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(rests));
     let Some(full) = full else {
         let names: Vec<&str> = table.rows.iter().map(|row| row.setting.as_str()).collect();
         return Err(format!(
-            "has no row for the picture at rest ({} samples a pixel and its other knobs); it has {}",
+            "has no row for the picture at rest, with {} samples a pixel; it has {}",
             wanted.view.samples,
             names.join(", ")
         ));
@@ -84,5 +92,13 @@ mod tests {
     fn a_table_without_the_picture_at_rest_is_refused_with_what_it_has() {
         let message = ladder(&table(), &resting(9)).unwrap_err();
         assert!(message.contains("9 samples") && message.contains("samples-16"), "{message}");
+    }
+
+    #[test]
+    fn a_picture_that_rests_with_a_knob_turned_down_has_no_ladder() {
+        let mut wanted = resting(4);
+        wanted.view.quality.shadows = false;
+        let message = ladder(&table(), &wanted).unwrap_err();
+        assert!(message.contains("no shadows"), "{message}");
     }
 }

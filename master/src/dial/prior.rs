@@ -166,4 +166,10 @@ mod tests {
         assert!(first.view.quality.adaptive && first.view.samples == 16, "{first:?}");
         assert_eq!(first.scale, RenderScale::Full);
     }
+
+    #[test]
+    fn however_much_is_asked_for_the_ladder_goes_down_to_the_cheapest() {
+        let last = ladder(&crate::test_scene::scene(), &wanted(256)).cheapest().applied(&wanted(256));
+        assert_eq!((last.view.samples, last.scale), (1, RenderScale::Half));
+    }
 }

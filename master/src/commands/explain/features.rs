@@ -109,7 +109,11 @@ fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
     FeatureFacts {
         name: "textures",
         asked_for,
-        why: format!("{nearest} of {} nearest, the others bilinear", counted(maps.len() as u64, "texture")),
+        why: if maps.is_empty() {
+            "there are none".to_owned()
+        } else {
+            format!("{nearest} of {} nearest, the others bilinear", counted(maps.len() as u64, "texture"))
+        },
         // Most pixels, perhaps, have the dearer one.
         measured_percent: if asked_for && nearest == maps.len() { NEAREST } else { BILINEAR },
         bytes: pictures + uvs,

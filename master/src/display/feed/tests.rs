@@ -87,7 +87,7 @@ fn is_reduced(arrival: &Arrival) -> bool {
 #[tokio::test]
 async fn what_moves_is_reduced_and_what_rests_is_the_full_picture_to_the_last_bit() {
     let plain = Feed::start(Script::Honest, STILL, None).await;
-    let feed = Feed::start(Script::Honest, STILL, Some(dial(false))).await;
+    let feed = Feed::start(Script::Busy, STILL, Some(dial(false))).await;
     let first = feed.picture(|| (), |_| true).await;
     assert!(is_at_rest(&first) && is_picture(&turned(0).view, &first.frame.pixels));
 
@@ -133,7 +133,7 @@ async fn a_full_picture_on_the_way_gives_way_to_a_moving_one() {
 #[tokio::test]
 async fn an_animation_never_rests() {
     let spinning = Animation { spin: 1.0, ..STILL };
-    let feed = Feed::start(Script::Honest, spinning, Some(dial(true))).await;
+    let feed = Feed::start(Script::Busy, spinning, Some(dial(true))).await;
     for _ in 0..20 {
         let frame = feed.picture(|| (), |_| true).await;
         assert!(!is_at_rest(&frame) && is_reduced(&frame));

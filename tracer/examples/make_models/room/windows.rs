@@ -11,6 +11,8 @@ use crate::generator::shapes::{
     Ends, Path, beveled_box, grid, lathe, plain_box, rectangle_moulding, spline, tube,
 };
 
+/// From the casing's outer edge to the face that it turns to the opening: a little inside the masonry, not in one plane with it.
+const JAMB: f64 = CASING + 0.003;
 /// Panes across and up.
 const PANES: (usize, usize) = (3, 5);
 /// Width of the bars between panes.
@@ -42,8 +44,8 @@ fn casing(opening: &Opening) -> Shape {
         (0.022, 0.036),
         (0.03, 0.026),
         (0.075, 0.02),
-        (0.09, 0.014),
-        (0.09, -0.1),
+        (JAMB, 0.014),
+        (JAMB, -0.1),
     ];
     let low = if opening.sill > 0.0 { opening.sill } else { -0.3 };
     let size = DVec2::new(opening.width + 2.0 * CASING, opening.head - low + 2.0 * CASING);
