@@ -116,16 +116,16 @@ impl RaysPerFrame {
         Self { primary: mean(self.primary), shadow: mean(self.shadow), secondary: mean(self.secondary) }
     }
 
-    /// Adds another frame's.
+    /// Adds another frame's. Workers count them, and may claim anything.
     pub(crate) fn add(&mut self, other: Self) {
-        self.primary += other.primary;
-        self.shadow += other.shadow;
-        self.secondary += other.secondary;
+        self.primary = self.primary.saturating_add(other.primary);
+        self.shadow = self.shadow.saturating_add(other.shadow);
+        self.secondary = self.secondary.saturating_add(other.secondary);
     }
 
     /// Of all kinds.
     pub(crate) fn total(self) -> u64 {
-        self.primary + self.shadow + self.secondary
+        self.primary.saturating_add(self.shadow).saturating_add(self.secondary)
     }
 }
 

@@ -8,6 +8,9 @@ pub const MAX_CONTROL_BYTES: usize = 4 << 10;
 /// A worker's name, its SIMD level, its software version: each.
 pub const MAX_NAME_BYTES: usize = 255;
 
+/// Render threads of a worker: more than its command line takes are a lie.
+pub const MAX_THREADS: u32 = 65_535;
+
 /// The reason in a refusal, a failure or a goodbye. Longer ones are cut before they are sent.
 pub const MAX_REASON_BYTES: usize = 2 << 10;
 

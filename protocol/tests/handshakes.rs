@@ -180,14 +180,15 @@ async fn before_the_handshake_is_done_frames_are_small_and_of_few_kinds() {
 
 #[tokio::test]
 async fn absurd_hellos_are_refused_and_long_names_cut_by_honest_workers() {
-    let (mut master, mut peer) = duplex(4096);
-    let nobody = Hello { threads: 0, ..hello() };
-    let body = rayfarm_protocol::codec::encode(&nobody).unwrap();
-    peer.write_all(&preamble(PROTOCOL_VERSION, 2)).await.unwrap();
-    peer.write_all(&[body.len() as u8, 0, 0, 0, 0x01, 0, 0, 0]).await.unwrap();
-    peer.write_all(&body).await.unwrap();
-    let error = as_master(&mut master, |_| panic!("nobody may decide on this")).await.unwrap_err();
-    assert!(error.to_string().contains("at least one render thread"), "{error}");
+    for (threads, part) in [(0, "at least one render thread"), (65_536, "at most 65535")] {
+        let (mut master, mut peer) = duplex(4096);
+        let body = rayfarm_protocol::codec::encode(&Hello { threads, ..hello() }).unwrap();
+        peer.write_all(&preamble(PROTOCOL_VERSION, 2)).await.unwrap();
+        peer.write_all(&[body.len() as u8, 0, 0, 0, 0x01, 0, 0, 0]).await.unwrap();
+        peer.write_all(&body).await.unwrap();
+        let error = as_master(&mut master, |_| panic!("nobody may decide on this")).await.unwrap_err();
+        assert!(error.to_string().contains(part), "{error}");
+    }
 
     let (mut master, mut worker) = duplex(4096);
     let long = Hello { name: "\n".repeat(9000), ..hello() };

@@ -86,12 +86,13 @@ impl Scheduler {
     }
 
     /// Rows to verify of complete frames; otherwise rows of the oldest frame, if this worker can do some in time; otherwise
-    /// more rows to verify; otherwise those of the next frame, which begins if it may.
+    /// more rows to verify; otherwise rows that newcomers hold; otherwise those of the next frame, which begins if it may.
     fn give_one(&mut self, now: Duration, crew: &mut Crew, hand: usize) -> bool {
         let Some(id) = crew.id(hand) else { return false };
         if self.give_old_audit(now, id, Some(&mut *crew))
             || self.give_rows(now, crew, hand, 0)
             || self.give_audit(now, id, Some(&mut *crew))
+            || self.give_newcomers_rows(now, id, crew)
         {
             return true;
         }

@@ -3,12 +3,16 @@
 use std::time::Duration;
 
 use super::adaptive::{Crew, seconds};
+use super::worker::Worker;
 use super::{FrameId, Lease, Scheduler, WorkerId};
 
 /// Workers that render the same segment at most...
 const MAX_COPIES: usize = 3;
-/// ...not counting those that have had it for longer than this: they may answer pings and nothing else for ever.
+/// ...not counting those that have had it for longer than this: they may answer pings and nothing else for ever...
 const TRUSTED_FOR: Duration = Duration::from_secs(10);
+/// ...nor, for longer than this, those that have not yet answered anything: they may be fetching the scene over a slow link. To
+/// a worker that has, these do not count at all.
+const NEWCOMER_TRUSTED_FOR: Duration = Duration::from_secs(1);
 
 /// A segment that others render.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +27,21 @@ impl Scheduler {
     pub(super) fn any_copy(&mut self, now: Duration, id: WorkerId) -> Option<Lease> {
         let best = self.copyable(now, id).min_by_key(|known| (known.frame, known.copies, known.segment))?;
         self.frames.iter_mut().find(|known| known.id == best.frame)?.copy(best.segment, id)
+    }
+
+    /// Rows of the oldest frame that nobody renders but workers of whom nothing has come yet: who is known goes before the next frame
+    /// for them, because nobody knows whether they will be rendered. In the first frame all are new.
+    pub(super) fn give_newcomers_rows(&mut self, now: Duration, id: WorkerId, crew: &mut Crew) -> bool {
+        let has_answered = |worker: &Worker| worker.segments_done > 0;
+        let is_known = self.last_frame > Duration::ZERO && self.workers.get(&id).is_some_and(has_answered);
+        let Some(oldest) = self.frames.front().map(|frame| frame.id).filter(|_| is_known) else {
+            return false;
+        };
+        let unsure = |known: &Candidate| known.frame == oldest && known.copies == 0;
+        let Some(Candidate { segment, .. }) = self.copyable(now, id).find(unsure) else { return false };
+        let lease = self.frames.front_mut().and_then(|frame| frame.copy(segment, id));
+        lease.into_iter().for_each(|lease| self.grant(now, id, lease, Some(&mut *crew)));
+        lease.is_some()
     }
 
     /// The policy adaptive's: idle workers, the fastest first, repeat what they are predicted to finish earlier.
@@ -52,10 +71,18 @@ impl Scheduler {
     fn copyable(&self, now: Duration, id: WorkerId) -> impl Iterator<Item = Candidate> {
         let segments = self.frames.iter().flat_map(|f| f.segments.iter().map(|(n, s)| (f.id, *n, s)));
         let open = segments.filter(move |(_, _, segment)| !segment.done && !segment.holders.contains(&id));
+        let is_proven = |worker: &Worker| worker.segments_done > 0;
+        let for_proven = self.workers.get(&id).is_some_and(is_proven);
+        let trust = move |worker: &Worker| match (is_proven(worker), for_proven) {
+            (true, _) => TRUSTED_FOR,
+            (false, false) => NEWCOMER_TRUSTED_FOR,
+            (false, true) => Duration::ZERO,
+        };
         let counted = open.map(move |(frame, segment, known)| {
             let trusted = |holder: &&WorkerId| {
-                let held = self.workers.get(holder).and_then(|worker| worker.leases.get(&(frame, segment)));
-                held.is_some_and(|held| held.granted_at.saturating_add(TRUSTED_FOR) > now)
+                let worker = self.workers.get(holder);
+                let held = worker.and_then(|worker| Some((worker, worker.leases.get(&(frame, segment))?)));
+                held.is_some_and(|(worker, held)| held.granted_at.saturating_add(trust(worker)) > now)
             };
             Candidate { frame, segment, copies: known.holders.iter().filter(trusted).count() }
         });

@@ -152,6 +152,26 @@ impl World {
         }
     }
 
+    /// Renders frames with healthy workers, then so many others come that never answer anything. The worst frame, in
+    /// milliseconds, before and after that. `None` where an invariant does not hold.
+    #[cfg(test)]
+    pub(crate) fn crowded(mut self, newcomers: u32, ailment: Ailment, at: u64) -> Option<[f64; 2]> {
+        self.checking = true;
+        self.begin();
+        self.run(at / 2, |_| false);
+        let mut worst = [0.0; 2];
+        for (phase, worst) in worst.iter_mut().enumerate() {
+            self.tally.restart(self.clock.now);
+            for _ in 0..if phase == 1 { newcomers } else { 0 } {
+                let id = self.join(1.0);
+                self.machines.get_mut(&id)?.ailment = ailment;
+            }
+            self.run(self.clock.now + at, |_| false);
+            *worst = self.tally.measured(self.clock.now, 1.0).worst_frame_ms;
+        }
+        self.violation.is_none().then_some(worst)
+    }
+
     /// Renders frames with healthy workers, then something happens to one of them at a time. The worst frame, in
     /// milliseconds, before and after that. `None` where an invariant does not hold.
     #[cfg(test)]

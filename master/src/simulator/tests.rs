@@ -65,6 +65,22 @@ fn a_worker_that_fails_makes_a_frame_late_by_a_frame_at_most() {
     }
 }
 
+#[test]
+fn newcomers_that_never_answer_make_no_frame_late() {
+    for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Smart(16)] {
+        for (workers, newcomers) in [(1, 3), (1, 6), (3, 20)] {
+            for ailment in [Ailment::Stopped, Ailment::Stuck] {
+                let setup = Setup { workers, policy, ..Setup::default() };
+                let [usual, worst] = World::new(setup).crowded(newcomers, ailment, SECOND * 4).unwrap();
+                assert!(
+                    worst < 2.2 * usual,
+                    "{policy}, {workers} and {newcomers} {ailment:?}: {worst} ms after {usual} ms"
+                );
+            }
+        }
+    }
+}
+
 /// Frames that were shown wrong, and workers that were expelled, in so many frames; the same again in as many more.
 fn with_liars(setup: Setup) -> [(u64, u64); 2] {
     let frames = setup.frames;

@@ -13,7 +13,7 @@ use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::time::timeout;
 
 use crate::envelope::{Envelope, Kind, read_body, read_header};
-use crate::limits::{HANDSHAKE_DEADLINE, MAX_NAME_BYTES, MAX_REASON_BYTES};
+use crate::limits::{HANDSHAKE_DEADLINE, MAX_NAME_BYTES, MAX_REASON_BYTES, MAX_THREADS};
 use crate::message::{decode_control, encode_control, encode_reason};
 use crate::text::{cut, printable};
 use crate::{Hello, ProtocolError, Role, Welcome};
@@ -99,6 +99,12 @@ fn checked_hello(hello: Hello) -> Result<Hello, String> {
     }
     if hello.threads == 0 {
         return Err("a worker needs at least one render thread".to_owned());
+    }
+    if hello.threads > MAX_THREADS {
+        return Err(format!(
+            "the worker claims {} render threads, at most {MAX_THREADS} are believed",
+            hello.threads
+        ));
     }
     Ok(Hello {
         name: printable(&hello.name),
