@@ -69,6 +69,8 @@ struct Inner {
     armed_for: Option<Duration>,
     /// Whether it was told that the only worker is verified by the master.
     alone: bool,
+    /// Whether goodbye has been said to everybody.
+    is_ending: bool,
 }
 
 /// A frame that was asked for.
@@ -98,6 +100,7 @@ impl Driver {
             counted: ByteCount::default(),
             armed_for: None,
             alone: false,
+            is_ending: false,
         };
         Self {
             started: Instant::now(),

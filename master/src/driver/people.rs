@@ -70,6 +70,9 @@ impl Driver {
     /// Why a worker that shakes hands is not let in, if it is not.
     pub(crate) fn refusal(&self, hello: &Hello, address: IpAddr) -> Option<String> {
         let inner = self.lock();
+        if inner.is_ending {
+            return Some("the master ends".to_owned());
+        }
         let count = inner.roster.len();
         if inner.roster.is_barred(&hello.name, address) {
             return Some(format!(
@@ -115,10 +118,11 @@ impl Driver {
         }
     }
 
-    /// Says goodbye to everybody and waits, not for long, until they have heard it.
+    /// Says goodbye to everybody and waits, not for long, until they have heard it. Nobody is let in any more.
     pub(crate) async fn part(&self, reason: &str) {
         let farewells: Vec<_> = {
             let mut inner = self.lock();
+            inner.is_ending = true;
             let farewells = inner.roster.ids().into_iter().map(|worker| {
                 let farewell = inner.roster.end(worker, reason, Return::Unwanted);
                 self.drive(&mut inner, Event::WorkerLeft { worker });

@@ -32,9 +32,12 @@ impl Scheduler {
     /// Rows of the oldest frame that nobody renders but workers of whom nothing has come yet: who is known goes before the next frame
     /// for them, because nobody knows whether they will be rendered. In the first frame all are new.
     pub(super) fn give_newcomers_rows(&mut self, now: Duration, id: WorkerId, crew: &mut Crew) -> bool {
-        let has_answered = |worker: &Worker| worker.segments_done > 0;
-        let is_known = self.last_frame > Duration::ZERO && self.workers.get(&id).is_some_and(has_answered);
-        let Some(oldest) = self.frames.front().map(|frame| frame.id).filter(|_| is_known) else {
+        let is_known = |worker: &Worker| worker.segments_done > 0;
+        if self.last_frame == Duration::ZERO || self.workers.values().all(is_known) {
+            return false;
+        }
+        let oldest = self.frames.front().map(|frame| frame.id);
+        let Some(oldest) = oldest.filter(|_| self.workers.get(&id).is_some_and(is_known)) else {
             return false;
         };
         let unsure = |known: &Candidate| known.frame == oldest && known.copies == 0;
