@@ -248,7 +248,7 @@ fn pixel_bytes(view: &FrameView) -> u64 {
 fn rays(things: &Things, view: &FrameView) -> Rays {
     let [width, height, samples] = [view.width, view.height, view.samples].map(u64::from);
     let primary = if view.is_adaptive() {
-        // At the corners of each band of rows, at the centre, and all.
+        // At the corners of each band of rows, at the centre, and all; where segments cut bands, some corners twice.
         (width + 1) * (height + height.div_ceil(u64::from(TILE_SIZE))) + width * height * (1 + samples)
     } else {
         width * height * samples

@@ -2,8 +2,8 @@
 //!
 //! Costs multiply and losses add up, knob by knob. That is rough, and good enough to begin with: what the costs really are is
 //! learnt from the frames. The figures are medians of the tables in `models/tradeoff`, which `tradeoff` has written: three of
-//! the project's scenes, a bust, and ten of them. Losses are FLIP against the same picture without the loss. Scenes differ by a factor of four: without
-//! shadows, the room is another room.
+//! the project's scenes, a bust, and ten of them. Losses are FLIP against the same picture without the loss. Scenes differ by
+//! a factor of four, and more: without shadows, the room is another room.
 
 use rayfarm_tracer::scene::{RenderScale, Scene, Shading};
 

@@ -104,7 +104,7 @@ pub fn render_rows_watched<W: Watch>(
             dispatch!(frame.level, simd => regular::render_band(simd, frame, top..bottom, band, &mut *watch))
         };
         if frame.view().quality.colors == ColorDepth::Reduced {
-            image::reduce_colors(frame.level, band);
+            image::reduce_colors(band);
         }
         top = bottom;
     }
