@@ -1,0 +1,149 @@
+//! The bytes of every message. Whoever changes one of these changes the protocol: `PROTOCOL_VERSION` must grow too.
+
+use bytes::Bytes;
+use rayfarm_protocol::envelope::{Kind, read_body, read_header};
+use rayfarm_protocol::message::Message;
+use rayfarm_protocol::passing::{Fetch, ShareKey, Token, ask, token};
+use rayfarm_protocol::{
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, ToMaster, ToWorker,
+    Welcome, codec, limits,
+};
+
+use crate::common::{lease, pixels, wire};
+
+const ID: AssetId = AssetId([0xab; 32]);
+
+/// Both directions: the message has these bytes, and these bytes are the message.
+async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&[u8]]) {
+    let expected = parts.concat();
+    assert_eq!(wire(&message).await, expected);
+    let mut rest = expected.as_slice();
+    let header = read_header(&mut rest).await.unwrap().unwrap();
+    let body = read_body(&mut rest, header).await.unwrap();
+    assert_eq!(M::from_body(header.kind, body).unwrap(), message);
+    assert!(rest.is_empty());
+}
+
+#[test]
+fn these_bytes_belong_to_this_version() {
+    assert_eq!(PROTOCOL_VERSION, 3);
+}
+
+#[tokio::test]
+async fn to_worker() {
+    let view = Bytes::from_static(b"view");
+    let announce = FrameAnnounce { frame: FrameId(7), scene: ID, width: 640, height: 480, view };
+    let frame: [&[u8]; 6] = [
+        &[52, 0, 0, 0, 0x10, 0, 0, 0],
+        &[7, 0, 0, 0, 0, 0, 0, 0],
+        &[0xab; 32],
+        &[0x80, 2, 0, 0],
+        &[0xe0, 1, 0, 0],
+        b"view",
+    ];
+    golden(ToWorker::Frame(announce), &frame).await;
+
+    let segment: [&[u8]; 3] = [
+        &[24, 0, 0, 0, 0x11, 0, 0, 0],
+        &[4, 0, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 1, 0, 0, 0],
+        &[16, 0, 0, 0, 8, 0, 0, 0],
+    ];
+    golden(ToWorker::Segment(lease(9)), &segment).await;
+
+    let number = [5, 0, 0, 0, 0, 0, 0, 0];
+    golden(ToWorker::Cancel { before: FrameId(5) }, &[&[8, 0, 0, 0, 0x12, 0, 0, 0], &number]).await;
+    golden(ToWorker::AssetBegin { id: ID, size: 5 }, &[&[40, 0, 0, 0, 0x13, 0, 0, 0], &ID.0, &number]).await;
+    let chunk = ToWorker::AssetChunk { id: ID, offset: 5, bytes: Bytes::from_static(b"xyz") };
+    golden(chunk, &[&[43, 0, 0, 0, 0x14, 0, 0, 0], &ID.0, &number, b"xyz"]).await;
+    golden(ToWorker::AssetUnknown { id: ID }, &[&[32, 0, 0, 0, 0x15, 0, 0, 0], &ID.0]).await;
+    let peer = ([10, 0, 0, 7], 0x1234).into();
+    let from = ToWorker::AssetFrom { id: ID, size: 5, peer, token: Token([0xcd; 32]) };
+    let v4: &[u8] = &[0, 0, 0, 0, 10, 0, 0, 7, 0x34, 0x12];
+    golden(from, &[&[82, 0, 0, 0, 0x16, 0, 0, 0], &ID.0, &number, v4, &[0xcd; 32]]).await;
+    let key = ToWorker::ShareKey { key: ShareKey([0xef; 32]) };
+    golden(key, &[&[32, 0, 0, 0, 0x17, 0, 0, 0], &[0xef; 32]]).await;
+    golden(ToWorker::Ping { nonce: 5 }, &[&[8, 0, 0, 0, 0x30, 0, 0, 0], &number]).await;
+    golden(ToWorker::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
+    let goodbye = ToWorker::Goodbye { reason: "hé".into(), again: true };
+    golden(goodbye, &[&[4, 0, 0, 0, 0x33, 0, 0, 0], &[1], b"h\xc3\xa9"]).await;
+}
+
+#[tokio::test]
+async fn to_master() {
+    let number = [5, 0, 0, 0, 0, 0, 0, 0];
+    let need = ToMaster::NeedAsset { id: ID, offset: 5, again: true };
+    golden(need, &[&[41, 0, 0, 0, 0x20, 0, 0, 0], &ID.0, &number, &[1]]).await;
+    golden(ToMaster::Sharing { port: 0x1234 }, &[&[2, 0, 0, 0, 0x23, 0, 0, 0], &[0x34, 0x12]]).await;
+    golden(ToMaster::HaveAsset { id: ID }, &[&[32, 0, 0, 0, 0x24, 0, 0, 0], &ID.0]).await;
+    let rows: [&[u8]; 12] = [
+        &[90, 0, 0, 0, 0x21, 0, 0, 0],
+        &[4, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0],
+        &[16, 0, 0, 0, 8, 0, 0, 0],
+        &[0; 8],
+        &number,
+        &[9, 0, 0, 0, 0, 0, 0, 0],
+        &[10, 0, 0, 0, 0, 0, 0, 0],
+        &[11, 0, 0, 0, 0, 0, 0, 0],
+        &[6, 0, 0, 0, 0, 0, 0, 0],
+        &[7, 0, 0, 0, 0, 0, 0, 0],
+        &[8, 0, 0, 0, 0, 0, 0, 0],
+        &[2, 2],
+    ];
+    golden(pixels(2, 2), &rows).await;
+    let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("pixels are pixels") };
+    let codes: [&[u8]; 3] = [&[1, 0, 0, 0, 0, 0, 0, 0], &[2, 0, 0, 0, 0, 0, 0, 0], &[3, 0, 0, 0, 0, 0, 0, 0]];
+    for (encoding, code) in [Encoding::Lz4, Encoding::Narrow, Encoding::NarrowLz4].into_iter().zip(codes) {
+        let mut rows = rows;
+        rows[3] = code;
+        let (header, bytes) = (PixelsHeader { encoding, ..header }, bytes.clone());
+        golden(ToMaster::Pixels { header, bytes }, &rows).await;
+    }
+    golden(ToMaster::Pong { nonce: 5 }, &[&[8, 0, 0, 0, 0x31, 0, 0, 0], &number]).await;
+    let failed = ToMaster::Failed { frame: FrameId(5), reason: "no".into() };
+    golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;
+    golden(ToMaster::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
+    golden(ToMaster::Goodbye { reason: String::new() }, &[&[0, 0, 0, 0, 0x33, 0, 0, 0]]).await;
+}
+
+#[tokio::test]
+async fn what_a_worker_asks_another_for() {
+    let mut bytes = Vec::new();
+    ask(&mut bytes, &Fetch { id: ID, token: Token([0xcd; 32]), offset: 5 }).await.unwrap();
+    let parts: [&[u8]; 4] = [&[72, 0, 0, 0, 0x40, 0, 0, 0], &ID.0, &[0xcd; 32], &[5, 0, 0, 0, 0, 0, 0, 0]];
+    assert_eq!(bytes, parts.concat());
+    let made = token(&ShareKey([0; 32]), ID);
+    assert_eq!(made, Token(blake3::keyed_hash(&[0; 32], &ID.0).into()));
+    assert_ne!(made, token(&ShareKey([1; 32]), ID));
+    assert_eq!(format!("{made:?} {:?}", ShareKey([1; 32])), "Token(..) ShareKey(..)");
+}
+
+#[test]
+fn hello_and_welcome() {
+    let hello = Hello { name: "a".into(), threads: 2, simd: "bc".into(), software: "d".into() };
+    let bytes: [&[u8]; 7] = [
+        &[1, 0, 0, 0, 0, 0, 0, 0, b'a'],
+        &[2, 0, 0, 0],
+        &[2, 0, 0, 0, 0, 0, 0, 0],
+        b"bc",
+        &[1, 0, 0, 0, 0, 0, 0, 0],
+        b"d",
+        &[],
+    ];
+    assert_eq!(codec::encode(&hello).unwrap(), bytes.concat());
+    assert_eq!(codec::decode::<Hello>(&bytes.concat(), limits::MAX_CONTROL_BYTES).unwrap(), hello);
+    assert_eq!(codec::encode(&Welcome { worker: 3 }).unwrap(), [3, 0, 0, 0, 0, 0, 0, 0]);
+}
+
+#[test]
+fn an_asset_is_named_by_its_blake3() {
+    let name = "af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262";
+    assert_eq!(AssetId::of(b"").to_string(), name);
+}
+
+#[test]
+fn a_control_message_never_has_room_for_bulk() {
+    for kind in Kind::ALL {
+        let bulk = matches!(kind, Kind::Pixels | Kind::AssetChunk);
+        assert_eq!(kind.limit_bytes() > 2 * limits::MAX_CONTROL_BYTES, bulk, "{kind}");
+    }
+}

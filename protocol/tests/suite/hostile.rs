@@ -1,0 +1,197 @@
+//! What a peer announces costs nothing until it is checked: measured at the allocator.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use bytes::Bytes;
+use rayfarm_protocol::envelope::{HEADER_BYTES, Header, Kind, read_header};
+use rayfarm_protocol::message::Message;
+use rayfarm_protocol::session::spawn;
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ProtocolError, ToMaster, ToWorker, limits};
+use tokio::io::{AsyncWriteExt, duplex};
+
+thread_local! {
+    static LARGEST: Cell<usize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, remembering the largest request of each thread.
+struct Watching;
+
+// SAFETY: every call is handed to the system allocator unchanged; the thread-local cell is const-initialised and has
+// no destructor, so touching it allocates nothing.
+unsafe impl GlobalAlloc for Watching {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        LARGEST.with(|largest| largest.set(largest.get().max(layout.size())));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are passed on; the pointer came from `System`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Watching = Watching;
+
+fn header(announced: u32, kind: u8) -> [u8; HEADER_BYTES] {
+    let [a, b, c, d] = announced.to_le_bytes();
+    [a, b, c, d, kind, 0, 0, 0]
+}
+
+/// The error that a session gives for these bytes, and the largest allocation on the way there.
+async fn outcome<In: Message, Out: Message>(bytes: &[u8]) -> (Option<ProtocolError>, usize) {
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (_out, mut received, _) = spawn::<_, Out, In>(ours);
+    LARGEST.with(|largest| largest.set(0));
+    theirs.write_all(bytes).await.unwrap();
+    drop(theirs);
+    let result = received.recv().await;
+    (result.and_then(Result::err), LARGEST.with(Cell::get))
+}
+
+#[tokio::test]
+async fn four_gibibytes_are_refused_before_any_allocation() {
+    for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::Fetch) {
+        for announced in [u32::MAX, 1 << 31, kind.limit_bytes() as u32 + 1] {
+            let (error, largest) = if ToWorker::carries(kind) {
+                outcome::<ToWorker, ToMaster>(&header(announced, kind as u8)).await
+            } else {
+                outcome::<ToMaster, ToWorker>(&header(announced, kind as u8)).await
+            };
+            let error = error.unwrap();
+            assert!(matches!(error, ProtocolError::TooLong { .. }), "{error}");
+            assert!(error.to_string().contains(&announced.to_string()), "{error}");
+            assert!(largest < 64 << 10, "{kind} of {announced} bytes made {largest} be allocated");
+        }
+    }
+}
+
+#[tokio::test]
+async fn bulk_for_the_wrong_side_is_refused_before_any_allocation() {
+    let bytes = header(limits::MAX_PIXELS_BYTES as u32, Kind::Pixels as u8);
+    let (error, largest) = outcome::<ToWorker, ToMaster>(&bytes).await;
+    assert!(matches!(error, Some(ProtocolError::Unexpected { kind: Kind::Pixels, .. })));
+    assert!(largest < 64 << 10, "{largest}");
+}
+
+#[tokio::test]
+async fn an_announced_body_costs_its_announced_size_and_no_more() {
+    let announced = Kind::Pixels.limit_bytes();
+    let (error, largest) = outcome::<ToMaster, ToWorker>(&header(announced as u32, Kind::Pixels as u8)).await;
+    assert!(matches!(error, Some(ProtocolError::Closed { .. })));
+    assert_eq!(largest, announced);
+}
+
+#[test]
+fn unknown_types_flags_and_streams_are_named() {
+    for kind in 0..=u8::MAX {
+        let known = Kind::ALL.into_iter().any(|known| known as u8 == kind);
+        match Header::parse(header(0, kind)) {
+            Ok(header) => assert!(known && header.kind as u8 == kind),
+            Err(ProtocolError::UnknownKind { kind: named }) => assert!(!known && named == kind),
+            Err(other) => panic!("{other}"),
+        }
+    }
+    for (at, value) in [(5, 1), (6, 1), (7, 0x80)] {
+        let mut bytes = header(0, Kind::Drain as u8);
+        bytes[at] = value;
+        assert!(matches!(Header::parse(bytes), Err(ProtocolError::Malformed { kind: Kind::Drain, .. })));
+    }
+}
+
+#[tokio::test]
+async fn http_in_place_of_an_envelope_is_an_error() {
+    let error = read_header(&mut b"GET / HTTP/1.1\r\n".as_slice()).await.unwrap_err();
+    assert!(error.to_string().contains("unknown type 0x2f"), "{error}");
+}
+
+fn malformed(kind: Kind, body: &[u8]) -> String {
+    let body = Bytes::copy_from_slice(body);
+    let result = if ToWorker::carries(kind) {
+        ToWorker::from_body(kind, body).map(|_| ())
+    } else {
+        ToMaster::from_body(kind, body).map(|_| ())
+    };
+    match result.unwrap_err() {
+        error @ (ProtocolError::Malformed { .. } | ProtocolError::Codec { .. }) => error.to_string(),
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn bodies_that_break_a_rule_are_refused_with_the_rule() {
+    let short: &[u8] = &[0; 7];
+    for kind in [Kind::Frame, Kind::Segment, Kind::Cancel, Kind::AssetBegin, Kind::AssetChunk, Kind::Ping] {
+        malformed(kind, short);
+    }
+    for kind in [Kind::AssetFrom, Kind::ShareKey, Kind::Sharing, Kind::HaveAsset] {
+        malformed(kind, &[0; 1]);
+    }
+    for kind in [Kind::NeedAsset, Kind::Pixels, Kind::Pong, Kind::Failed] {
+        malformed(kind, short);
+    }
+    assert!(malformed(Kind::Drain, &[0]).contains("1 bytes where none belong"));
+
+    let mut frame = vec![0; 48];
+    assert!(malformed(Kind::Frame, &frame).contains("0 x 0 pixels"));
+    frame[40..48].copy_from_slice(&[1, 0, 0, 0, 1, 0, 1, 0]);
+    assert!(malformed(Kind::Frame, &frame).contains("1 x 65537 pixels"));
+    frame[46] = 0;
+    frame.extend([0; limits::MAX_VIEW_BYTES + 1]);
+    assert!(malformed(Kind::Frame, &frame).contains("a view of 4097 bytes"));
+
+    let mut segment = vec![0; 24];
+    assert!(malformed(Kind::Segment, &segment).contains("no run of rows"));
+    segment[16..24].copy_from_slice(&[0xff; 8]);
+    assert!(malformed(Kind::Segment, &segment).contains("no run of rows"));
+    assert!(malformed(Kind::Segment, &[0; 25]).contains("1 bytes left over"));
+
+    let mut need = vec![0; 41];
+    need[39] = 1;
+    assert!(malformed(Kind::NeedAsset, &need).contains("beyond the end of any asset"));
+    need[39..].copy_from_slice(&[0, 2]);
+    malformed(Kind::NeedAsset, &need);
+    assert!(malformed(Kind::Sharing, &[0, 0]).contains("port 0"));
+    let mut from = vec![0; 82];
+    from[39] = 1;
+    assert!(malformed(Kind::AssetFrom, &from).contains("an asset of 72057594037927936 bytes"));
+    from[39] = 0;
+    from[40] = 9;
+    malformed(Kind::AssetFrom, &from);
+
+    let mut begin = vec![0; 40];
+    begin[39] = 1;
+    assert!(malformed(Kind::AssetBegin, &begin).contains("an asset of 72057594037927936 bytes"));
+
+    assert!(malformed(Kind::AssetChunk, &[0; 40]).contains("a chunk of 0 bytes"));
+    let mut chunk = vec![0; 41];
+    chunk[32..40].copy_from_slice(&u64::MAX.to_le_bytes());
+    assert!(malformed(Kind::AssetChunk, &chunk).contains("beyond the end of any asset"));
+
+    let master_goodbye = ToWorker::from_body(Kind::Goodbye, Bytes::from_static(&[2])).unwrap_err();
+    assert!(master_goodbye.to_string().contains("2 is neither yes nor no"), "{master_goodbye}");
+
+    let mut pixels = vec![0; 88];
+    assert!(malformed(Kind::Pixels, &pixels).contains("no run of rows"));
+    pixels[20] = 1;
+    pixels[24] = 9;
+    assert!(malformed(Kind::Pixels, &pixels).contains("encoding 9 is not known"));
+}
+
+#[test]
+fn our_own_side_obeys_the_same_rules() {
+    let view = Bytes::from(vec![0; limits::MAX_VIEW_BYTES + 1]);
+    let announce = FrameAnnounce { frame: FrameId(1), scene: AssetId([0; 32]), width: 1, height: 1, view };
+    let none = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count: 0 };
+    for message in [
+        ToWorker::Frame(announce.clone()),
+        ToWorker::Frame(FrameAnnounce { width: 0, view: Bytes::new(), ..announce }),
+        ToWorker::Segment(none),
+        ToWorker::AssetBegin { id: AssetId([0; 32]), size: limits::MAX_ASSET_BYTES + 1 },
+        ToWorker::AssetChunk { id: AssetId([0; 32]), offset: 0, bytes: Bytes::new() },
+    ] {
+        assert!(message.to_envelope().is_err());
+    }
+}

@@ -1,0 +1,259 @@
+//! Whatever the values, what is sent is what arrives; whatever the bytes, nothing panics.
+
+use bytes::Bytes;
+use proptest::collection::vec;
+use proptest::prelude::*;
+use rayfarm_protocol::message::Message;
+use rayfarm_protocol::passing::{ShareKey, Token};
+use rayfarm_protocol::session::spawn;
+use rayfarm_protocol::{
+    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelsHeader, ToMaster,
+    ToWorker, Welcome, codec, handshake, limits,
+};
+use tokio::io::{AsyncWriteExt, duplex};
+
+use crate::common::wire;
+
+fn leases() -> impl Strategy<Value = Lease> {
+    (any::<u64>(), any::<u32>(), any::<u32>(), 0..16_000u32, 1..16_000u32).prop_map(
+        |(frame, segment, attempt, first_row, row_count)| Lease {
+            frame: FrameId(frame),
+            segment,
+            attempt,
+            first_row,
+            row_count,
+        },
+    )
+}
+
+fn ids() -> impl Strategy<Value = AssetId> {
+    any::<[u8; 32]>().prop_map(AssetId)
+}
+
+fn bytes(sizes: std::ops::Range<usize>) -> impl Strategy<Value = Bytes> {
+    vec(any::<u8>(), sizes).prop_map(Bytes::from)
+}
+
+/// The wire carries neither a flow nor a scope.
+fn plain(address: std::net::SocketAddr) -> std::net::SocketAddr {
+    (address.ip(), address.port()).into()
+}
+
+fn to_worker() -> impl Strategy<Value = ToWorker> {
+    let side = 1..=limits::MAX_FRAME_SIDE;
+    prop_oneof![
+        (any::<u64>(), ids(), side.clone(), side, bytes(0..300)).prop_map(
+            |(frame, scene, width, height, view)| {
+                ToWorker::Frame(FrameAnnounce { frame: FrameId(frame), scene, width, height, view })
+            }
+        ),
+        leases().prop_map(ToWorker::Segment),
+        any::<u64>().prop_map(|before| ToWorker::Cancel { before: FrameId(before) }),
+        (ids(), 0..=limits::MAX_ASSET_BYTES).prop_map(|(id, size)| ToWorker::AssetBegin { id, size }),
+        (ids(), 0..1u64 << 30, bytes(1..3000)).prop_map(|(id, offset, bytes)| ToWorker::AssetChunk {
+            id,
+            offset,
+            bytes
+        }),
+        ids().prop_map(|id| ToWorker::AssetUnknown { id }),
+        (ids(), 0..=limits::MAX_ASSET_BYTES, any::<std::net::SocketAddr>(), any::<[u8; 32]>()).prop_map(
+            |(id, size, peer, token)| ToWorker::AssetFrom {
+                id,
+                size,
+                peer: plain(peer),
+                token: Token(token)
+            }
+        ),
+        any::<[u8; 32]>().prop_map(|key| ToWorker::ShareKey { key: ShareKey(key) }),
+        any::<u64>().prop_map(|nonce| ToWorker::Ping { nonce }),
+        Just(ToWorker::Drain),
+    ]
+}
+
+fn headers() -> impl Strategy<Value = PixelsHeader> {
+    let encodings = prop_oneof![
+        Just(Encoding::Raw),
+        Just(Encoding::Lz4),
+        Just(Encoding::Narrow),
+        Just(Encoding::NarrowLz4)
+    ];
+    (leases(), encodings, any::<[u64; 7]>()).prop_map(|(lease, encoding, numbers)| {
+        let [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary] = numbers;
+        let cost = Cost { trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary };
+        PixelsHeader { lease, encoding, cost }
+    })
+}
+
+fn to_master() -> impl Strategy<Value = ToMaster> {
+    prop_oneof![
+        (ids(), 0..=limits::MAX_ASSET_BYTES, any::<bool>())
+            .prop_map(|(id, offset, again)| ToMaster::NeedAsset { id, offset, again }),
+        (1..=u16::MAX).prop_map(|port| ToMaster::Sharing { port }),
+        ids().prop_map(|id| ToMaster::HaveAsset { id }),
+        (headers(), bytes(0..3000)).prop_map(|(header, bytes)| ToMaster::Pixels { header, bytes }),
+        any::<u64>().prop_map(|nonce| ToMaster::Pong { nonce }),
+        (any::<u64>(), "[ -~äöü]{0,200}")
+            .prop_map(|(frame, reason)| ToMaster::Failed { frame: FrameId(frame), reason }),
+        Just(ToMaster::Drain),
+    ]
+}
+
+fn hellos() -> impl Strategy<Value = Hello> {
+    let text = "\\PC{0,20}";
+    (text, 1..200u32, text, text).prop_map(|(name, threads, simd, software)| Hello {
+        name,
+        threads,
+        simd,
+        software,
+    })
+}
+
+/// Says these bytes to a master, and then to a worker. Each must come to an end by itself; the worker that the master
+/// took, if any. An error means that somebody waited for ever.
+async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::Elapsed> {
+    let (mut ours, mut theirs) = duplex(4096);
+    theirs.write_all(input).await.unwrap();
+    theirs.shutdown().await.unwrap();
+    let take = |_: &Hello| Ok(Welcome { worker: 1 });
+    let patience = 2 * limits::HANDSHAKE_DEADLINE;
+    let met = tokio::time::timeout(patience, handshake::as_master(&mut ours, take)).await?.ok();
+
+    let (mut ours, mut theirs) = duplex(4096);
+    theirs.write_all(input).await.unwrap();
+    theirs.shutdown().await.unwrap();
+    let hello = Hello { name: String::new(), threads: 1, simd: String::new(), software: String::new() };
+    let _ = tokio::time::timeout(patience, handshake::as_worker(&mut ours, &hello)).await?;
+    Ok(met)
+}
+
+fn block_on<T>(work: impl Future<Output = T>) -> T {
+    tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(work)
+}
+
+/// Feeds bytes to a session, torn into pieces, and returns everything that came out.
+async fn hear<In: Message, Out: Message>(input: Vec<u8>, piece: usize) -> Vec<Result<In, String>> {
+    let (ours, mut theirs) = duplex(97);
+    let (out, mut received, _) = spawn::<_, Out, In>(ours);
+    let feed = tokio::spawn(async move {
+        for part in input.chunks(piece) {
+            if theirs.write_all(part).await.is_err() {
+                return;
+            }
+            tokio::task::yield_now().await;
+        }
+    });
+    let mut heard = Vec::new();
+    while let Some(message) = received.recv().await {
+        heard.push(message.map_err(|error| error.to_string()));
+    }
+    drop((out, received));
+    feed.await.unwrap();
+    heard
+}
+
+async fn stream(messages: &[impl Message]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for message in messages {
+        bytes.extend(wire(message).await);
+    }
+    bytes
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn workers_hear_what_masters_say(messages in vec(to_worker(), 1..8), piece in 1..200usize) {
+        let heard = block_on(async { hear::<ToWorker, ToMaster>(stream(&messages).await, piece).await });
+        prop_assert_eq!(heard, messages.into_iter().map(Ok).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn masters_hear_what_workers_say(messages in vec(to_master(), 1..8), piece in 1..200usize) {
+        let heard = block_on(async { hear::<ToMaster, ToWorker>(stream(&messages).await, piece).await });
+        prop_assert_eq!(heard, messages.into_iter().map(Ok).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn arbitrary_bytes_end_in_at_most_one_error(input in vec(any::<u8>(), 0..400)) {
+        let heard = block_on(hear::<ToMaster, ToWorker>(input, 64));
+        prop_assert!(heard.iter().filter(|message| message.is_err()).count() <= 1);
+        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+    }
+
+    #[test]
+    fn a_mutated_stream_ends_in_at_most_one_error(
+        messages in vec(to_worker(), 1..5),
+        hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let heard = block_on(async {
+            let mut bytes = stream(&messages).await;
+            for (at, value) in hits {
+                let at = at.index(bytes.len());
+                bytes[at] = value;
+            }
+            hear::<ToWorker, ToMaster>(bytes, 64).await
+        });
+        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+    }
+
+    #[test]
+    fn a_mutated_stream_of_a_worker_ends_in_at_most_one_error(
+        messages in vec(to_master(), 1..5),
+        hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let heard = block_on(async {
+            let mut bytes = stream(&messages).await;
+            for (at, value) in hits {
+                let at = at.index(bytes.len());
+                bytes[at] = value;
+            }
+            hear::<ToMaster, ToWorker>(bytes, 64).await
+        });
+        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+    }
+
+    #[test]
+    fn a_handshake_with_arbitrary_bytes_is_refused(input in vec(any::<u8>(), 0..200), is_rayfarm: bool) {
+        let input = if is_rayfarm { [b"RAYFARM\n".as_slice(), &input].concat() } else { input };
+        prop_assert!(block_on(shake_hands(&input)).is_ok());
+    }
+
+    #[test]
+    fn a_mutated_handshake_is_refused_or_still_one(
+        hello in hellos(),
+        hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+    ) {
+        let mut bytes = [b"RAYFARM\n".as_slice(), &PROTOCOL_VERSION.to_le_bytes(), &[2, 0]].concat();
+        let body = codec::encode(&hello).unwrap();
+        bytes.extend((body.len() as u32).to_le_bytes());
+        bytes.extend([0x01, 0, 0, 0]);
+        bytes.extend(body);
+        for (at, value) in hits {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        if let Ok(Some(hello)) = block_on(shake_hands(&bytes)) {
+            let texts = [&hello.name, &hello.simd, &hello.software];
+            prop_assert!(hello.threads > 0);
+            prop_assert!(texts.iter().all(|text| !text.chars().any(char::is_control)));
+        }
+    }
+
+    #[test]
+    fn reasons_of_any_length_and_content_arrive_short_and_printable(reason in "\\PC{0,40}|[\\x00-\\x1f]{0,9}|(ä){3000}") {
+        let sent = ToMaster::Goodbye { reason: reason.clone() };
+        let heard = block_on(async { hear::<ToMaster, ToWorker>(wire(&sent).await, 1000).await });
+        let Some(Ok(ToMaster::Goodbye { reason: arrived })) = heard.into_iter().next() else {
+            return Err(TestCaseError::fail("no goodbye"));
+        };
+        prop_assert!(arrived.len() <= limits::MAX_REASON_BYTES + 2 && !arrived.chars().any(char::is_control));
+        if reason.len() <= limits::MAX_REASON_BYTES && !reason.chars().any(char::is_control) {
+            prop_assert_eq!(arrived, reason);
+        }
+    }
+}

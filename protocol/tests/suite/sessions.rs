@@ -1,0 +1,302 @@
+//! Sessions over in-memory pipes: order, back pressure, endings.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use rayfarm_protocol::session::{Receiver, SendError, Sender, TrySendError, spawn};
+use rayfarm_protocol::{AssetId, FrameId, ProtocolError, ToMaster, ToWorker, limits};
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+
+use crate::common::{lease, pixels, wire};
+
+type Master = (Sender<ToWorker>, Receiver<ToMaster>);
+type Worker = (Sender<ToMaster>, Receiver<ToWorker>);
+
+fn pair(pipe_bytes: usize) -> (Master, Worker) {
+    let (a, b) = duplex(pipe_bytes);
+    let (master_out, master_in, _) = spawn(a);
+    let (worker_out, worker_in, _) = spawn(b);
+    ((master_out, master_in), (worker_out, worker_in))
+}
+
+fn chunk(offset: u64, len: usize) -> ToWorker {
+    ToWorker::AssetChunk { id: AssetId([7; 32]), offset, bytes: Bytes::from(vec![offset as u8; len]) }
+}
+
+#[tokio::test]
+async fn messages_arrive_through_pipes_of_any_width() {
+    for pipe_bytes in [1, 2, 7, 64, 1 << 20] {
+        let ((master_out, mut master_in), (worker_out, mut worker_in)) = pair(pipe_bytes);
+        for segment in 0..20 {
+            master_out.send(ToWorker::Segment(lease(segment))).await.unwrap();
+            worker_out.send(pixels(segment, 301)).await.unwrap();
+        }
+        for segment in 0..20 {
+            assert_eq!(worker_in.recv().await.unwrap().unwrap(), ToWorker::Segment(lease(segment)));
+            assert_eq!(master_in.recv().await.unwrap().unwrap(), pixels(segment, 301));
+        }
+    }
+}
+
+#[tokio::test]
+async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
+    // The peer reads nothing until everything is queued; pipe and write buffer hold less than one chunk.
+    let (ours, theirs) = duplex(64);
+    let (out, _in, _) = spawn::<_, ToWorker, ToMaster>(ours);
+    out.send(ToWorker::Ping { nonce: 1 }).await.unwrap();
+    for index in 0..4 {
+        out.send(chunk(index * 1000, 20_000)).await.unwrap();
+    }
+    tokio::task::yield_now().await;
+    out.send(ToWorker::Cancel { before: FrameId(9) }).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
+
+    let (_out, mut received, _) = spawn::<_, ToMaster, ToWorker>(theirs);
+    let mut order = Vec::new();
+    while let Some(message) = received.recv().await {
+        order.push(message.unwrap());
+    }
+    let at = |wanted: &ToWorker| order.iter().position(|message| message == wanted).unwrap();
+    assert_eq!(at(&ToWorker::Ping { nonce: 1 }), 0);
+    assert!(at(&ToWorker::Cancel { before: FrameId(9) }) < at(&chunk(1000, 20_000)));
+    assert!(at(&chunk(1000, 20_000)) < at(&chunk(2000, 20_000)));
+    assert_eq!(order.last(), Some(&ToWorker::Goodbye { reason: "done".into(), again: false }));
+    assert_eq!(order.len(), 7);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_goodbye_is_flushed_and_closes() {
+    let ((master_out, mut master_in), (worker_out, mut worker_in)) = pair(1 << 16);
+    worker_out.send(pixels(3, 5000)).await.unwrap();
+    worker_out.send(ToMaster::Goodbye { reason: "shutting down".into() }).await.unwrap();
+    assert_eq!(master_in.recv().await.unwrap().unwrap(), pixels(3, 5000));
+    assert_eq!(
+        master_in.recv().await.unwrap().unwrap(),
+        ToMaster::Goodbye { reason: "shutting down".into() }
+    );
+    assert!(master_in.recv().await.is_none());
+    // The other direction is open for a moment: the master can answer, and close.
+    master_out.send(ToWorker::Goodbye { reason: "bye".into(), again: false }).await.unwrap();
+    assert_eq!(
+        worker_in.recv().await.unwrap().unwrap(),
+        ToWorker::Goodbye { reason: "bye".into(), again: false }
+    );
+    assert!(worker_in.recv().await.is_none());
+    worker_out.closed().await;
+    assert!(matches!(worker_out.send(ToMaster::Drain).await, Err(SendError::Closed)));
+    assert!(matches!(worker_out.try_send(ToMaster::Drain), Err(TrySendError::Closed)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn after_a_goodbye_a_peer_that_does_not_close_is_not_waited_for() {
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
+    let begun = tokio::time::Instant::now();
+    out.send(ToMaster::Goodbye { reason: "enough".into() }).await.unwrap();
+    out.closed().await;
+    assert_eq!(begun.elapsed(), limits::LAST_WORD_GRACE);
+    assert!(received.recv().await.is_none());
+    assert!(theirs.write_all(&[0]).await.is_err());
+}
+
+#[tokio::test]
+async fn a_goodbye_survives_though_nobody_reads_what_the_peer_still_sends() {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let connecting = tokio::net::TcpStream::connect(listener.local_addr().unwrap());
+    let (ours, theirs) = tokio::join!(connecting, listener.accept());
+    let (out, received, _) = spawn::<_, ToWorker, ToMaster>(ours.unwrap());
+    let (worker_out, mut worker_in, _) = spawn::<_, ToMaster, ToWorker>(theirs.unwrap().0);
+    drop(received);
+    let busy = tokio::spawn(async move { while worker_out.send(pixels(1, 100_000)).await.is_ok() {} });
+    out.send(ToWorker::Goodbye { reason: "the end".into(), again: false }).await.unwrap();
+    out.closed().await;
+    // Only now does the worker look: the connection is gone, its last word is not.
+    let heard = worker_in.recv().await.unwrap().unwrap();
+    assert_eq!(heard, ToWorker::Goodbye { reason: "the end".into(), again: false });
+    drop(worker_in);
+    busy.await.unwrap();
+}
+
+#[tokio::test]
+async fn dropping_the_senders_writes_what_they_sent() {
+    let ((master_out, _master_in), (_worker_out, mut worker_in)) = pair(16);
+    master_out.send(chunk(0, 4000)).await.unwrap();
+    master_out.clone().send(ToWorker::Drain).await.unwrap();
+    drop(master_out);
+    let mut seen = Vec::new();
+    while let Some(message) = worker_in.recv().await {
+        seen.push(message.unwrap());
+    }
+    seen.sort_by_key(|message| *message == ToWorker::Drain);
+    assert_eq!(seen, [chunk(0, 4000), ToWorker::Drain]);
+}
+
+#[tokio::test]
+async fn a_full_queue_gives_the_message_back() {
+    let (ours, _theirs) = duplex(16);
+    let (out, _in, _) = spawn::<_, ToMaster, ToWorker>(ours);
+    let mut sent = 0;
+    let returned = loop {
+        match out.try_send(pixels(sent, 3000)) {
+            Ok(()) => sent += 1,
+            Err(TrySendError::Full(message)) => break message,
+            Err(other) => panic!("{other}"),
+        }
+        tokio::task::yield_now().await;
+    };
+    assert_eq!(returned, pixels(sent, 3000));
+    assert!(sent as usize <= limits::BULK_QUEUE + 2, "{sent} messages were taken");
+    // Control has a queue of its own.
+    out.try_send(ToMaster::Pong { nonce: 1 }).unwrap();
+}
+
+#[tokio::test]
+async fn a_message_beyond_its_bound_is_not_sent_and_harms_nobody() {
+    let ((master_out, _master_in), (_worker_out, mut worker_in)) = pair(1 << 20);
+    let error = master_out.send(chunk(0, limits::MAX_CHUNK_BYTES + 1)).await.unwrap_err();
+    assert!(error.to_string().contains("262145 bytes"), "{error}");
+    master_out.send(chunk(0, limits::MAX_CHUNK_BYTES)).await.unwrap();
+    assert_eq!(worker_in.recv().await.unwrap().unwrap(), chunk(0, limits::MAX_CHUNK_BYTES));
+}
+
+#[tokio::test]
+async fn aborting_ends_both_directions_at_once() {
+    let ((master_out, mut master_in), (_worker_out, mut worker_in)) = pair(16);
+    master_out.send(chunk(0, 4000)).await.unwrap();
+    master_out.abort();
+    master_out.closed().await;
+    assert!(master_in.recv().await.is_none());
+    let end = worker_in.recv().await;
+    assert!(matches!(end, None | Some(Err(ProtocolError::Closed { .. }))), "{end:?}");
+}
+
+#[tokio::test]
+async fn closing_anywhere_is_an_end_or_a_named_error() {
+    let bytes = wire(&ToMaster::Pong { nonce: 5 }).await;
+    for cut in 0..=bytes.len() {
+        let (ours, mut theirs) = duplex(1 << 16);
+        let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
+        theirs.write_all(&bytes[..cut]).await.unwrap();
+        drop(theirs);
+        match received.recv().await {
+            None => assert_eq!(cut, 0),
+            Some(Ok(message)) => {
+                assert_eq!((cut, message), (bytes.len(), ToMaster::Pong { nonce: 5 }));
+            }
+            Some(Err(error)) => {
+                assert!(matches!(error, ProtocolError::Closed { .. }), "{error}");
+                assert!(cut > 0 && cut < bytes.len());
+            }
+        }
+        assert!(received.recv().await.is_none());
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn silence_is_allowed_and_half_an_envelope_has_a_deadline() {
+    let bytes = wire(&ToMaster::Pong { nonce: 5 }).await;
+    for torn_at in [1, 7, 8, 12] {
+        let (ours, mut theirs) = duplex(1 << 16);
+        let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
+        tokio::time::sleep(Duration::from_secs(3600)).await;
+        theirs.write_all(&bytes).await.unwrap();
+        assert_eq!(received.recv().await.unwrap().unwrap(), ToMaster::Pong { nonce: 5 });
+        theirs.write_all(&bytes[..torn_at]).await.unwrap();
+        let error = received.recv().await.unwrap().unwrap_err();
+        assert!(matches!(error, ProtocolError::Deadline { .. }), "{error}");
+        assert!(received.recv().await.is_none());
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_peer_that_does_not_read_is_given_up() {
+    let (ours, theirs) = duplex(16);
+    let (out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
+    out.send(chunk(0, 4000)).await.unwrap();
+    let error = received.recv().await.unwrap().unwrap_err();
+    assert!(matches!(error, ProtocolError::Deadline { .. }), "{error}");
+    assert!(received.recv().await.is_none());
+    drop(theirs);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_last_word_is_heard_though_the_writer_has_failed() {
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
+    theirs
+        .write_all(&wire(&ToWorker::Goodbye { reason: "kicked".into(), again: false }).await)
+        .await
+        .unwrap();
+    drop(theirs);
+    let _ = out.send(ToMaster::Drain).await;
+    assert_eq!(
+        received.recv().await.unwrap().unwrap(),
+        ToWorker::Goodbye { reason: "kicked".into(), again: false }
+    );
+}
+
+#[tokio::test]
+async fn after_an_error_nothing_more_is_delivered() {
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
+    theirs.write_all(&[0, 0, 0, 0, 0x77, 0, 0, 0]).await.unwrap();
+    theirs.write_all(&wire(&ToMaster::Drain).await).await.unwrap();
+    let error = received.recv().await.unwrap().unwrap_err();
+    assert!(error.to_string().contains("0x77"), "{error}");
+    assert!(received.recv().await.is_none());
+}
+
+#[tokio::test]
+async fn a_message_for_the_other_side_is_named() {
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
+    theirs.write_all(&wire(&ToWorker::Segment(lease(1))).await).await.unwrap();
+    let error = received.recv().await.unwrap().unwrap_err();
+    assert!(error.to_string().contains("a Segment message, where a message from a worker"), "{error}");
+}
+
+#[tokio::test]
+async fn traffic_counts_whole_envelopes() {
+    let (a, b): (DuplexStream, DuplexStream) = duplex(1 << 20);
+    let (out, _in, traffic) = spawn::<_, ToWorker, ToMaster>(a);
+    let mut b = b;
+    out.send(ToWorker::Ping { nonce: 1 }).await.unwrap();
+    out.send(chunk(0, 1000)).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "end".into(), again: false }).await.unwrap();
+    let mut all = Vec::new();
+    b.read_to_end(&mut all).await.unwrap();
+    assert_eq!(traffic.sent_bytes(), all.len() as u64);
+    assert_eq!(traffic.scene_sent_bytes(), 8 + 40 + 1000);
+
+    let (c, mut d) = duplex(1 << 20);
+    let (_out, mut received, traffic) = spawn::<_, ToWorker, ToMaster>(c);
+    let bytes = wire(&pixels(1, 999)).await;
+    d.write_all(&bytes).await.unwrap();
+    received.recv().await.unwrap().unwrap();
+    assert_eq!(traffic.received_bytes(), bytes.len() as u64);
+}
+
+#[tokio::test]
+async fn an_inbox_that_nobody_empties_stops_the_reader() {
+    let (ours, mut theirs) = duplex(1 << 20);
+    let (_out, mut received, traffic) = spawn::<_, ToWorker, ToMaster>(ours);
+    let bytes = wire(&pixels(1, limits::MAX_PIXELS_BYTES)).await;
+    let peer = tokio::spawn(async move {
+        for _ in 0..5 {
+            theirs.write_all(&bytes).await.unwrap();
+        }
+        theirs
+    });
+    let message = received.recv().await.unwrap().unwrap();
+    assert_eq!(message, pixels(1, limits::MAX_PIXELS_BYTES));
+    // One was handed out; at most two more fit before the user takes another.
+    for _ in 0..1000 {
+        tokio::task::yield_now().await;
+    }
+    assert!(traffic.received_bytes() <= 3 * (limits::MAX_PIXELS_BYTES as u64 + 96));
+    for _ in 0..4 {
+        received.recv().await.unwrap().unwrap();
+    }
+    drop(peer.await.unwrap());
+    assert!(received.recv().await.is_none());
+}

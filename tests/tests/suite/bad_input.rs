@@ -1,0 +1,166 @@
+//! Bad input gets a message that names place, problem and remedy, the exit status that is specified, and loses nothing.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::time::Duration;
+
+use rayfarm_tests::{Outcome, Running, Scenes, free_port, master, wait_until, worker};
+
+fn render(scene: &Path, output: &Path, more: &[&str]) -> Outcome {
+    let mut command = master();
+    command.arg("render").arg(scene).arg("-o").arg(output).args(["--listen", "127.0.0.1:0"]).args(more);
+    Running::start(&mut command).finish()
+}
+
+/// Renders the small scene with one text replaced.
+fn render_changed(from: &str, to: &str) -> (Scenes, Outcome) {
+    let scenes = Scenes::new();
+    let text = String::from_utf8(scenes.read("small.toml")).unwrap();
+    assert!(text.contains(from));
+    let scene = scenes.write("changed.toml", text.replacen(from, to, 1));
+    let outcome = render(&scene, &scenes.path("out.png"), &[]);
+    assert!(!scenes.path("out.png").exists());
+    (scenes, outcome)
+}
+
+#[test]
+fn a_missing_scene_is_named() {
+    let scenes = Scenes::new();
+    render(&scenes.path("nowhere.toml"), &scenes.path("out.png"), &[]).expect_failure(2, &["nowhere.toml"]);
+}
+
+#[test]
+fn mistakes_in_a_scene_are_named_with_line_and_remedy() {
+    for (from, to, words) in [
+        ("fov = 45.0", "fow = 45.0", &["changed.toml:", "fow", "fov"][..]),
+        ("material = \"clay\"", "material = \"clya\"", &["changed.toml:", "clya", "clay"]),
+        ("width = 160", "width = 0", &["changed.toml:", "width"]),
+        ("width = 160", "width = 99999", &["changed.toml:", "16384"]),
+        ("kind = \"point\"", "kind = \"area\"", &["changed.toml:", "area"]),
+        ("look_at = [0.0, 0.3, 0.0]", "look_at = [0.0, nan, 0.0]", &["changed.toml:", "look_at"]),
+        ("fov = 45.0", "kind = \"fisheye\"", &["changed.toml:", "fisheye", "not supported yet"]),
+        ("exponent = 30.0", "reflect = 0.5", &["changed.toml:", "reflect", "not supported yet"]),
+        (
+            "diffuse = [0.7, 0.4, 0.3]",
+            "diffuse = { texture = \"clay.png\" }",
+            &["changed.toml:", "[[sphere]]", "texture"],
+        ),
+        ("bumps.obj", "hills.obj", &["hills.obj"]),
+        ("[render]", "[render", &["changed.toml:"]),
+    ] {
+        render_changed(from, to).1.expect_failure(2, words);
+    }
+}
+
+#[test]
+fn a_mesh_with_a_nan_a_bad_index_or_nothing_in_it_is_named_with_its_line() {
+    for (mesh, words) in [
+        ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", &["bumps.obj:2", "not finite"][..]),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", &["bumps.obj:4", "9"]),
+        ("# nothing\n", &["bumps.obj"]),
+        ("\0\u{1}\u{2}garbage", &["bumps.obj"]),
+    ] {
+        let scenes = Scenes::new();
+        scenes.write("bumps.obj", mesh);
+        let outcome = render(&scenes.path("small.toml"), &scenes.path("out.png"), &[]);
+        outcome.expect_failure(2, words);
+    }
+}
+
+#[test]
+fn wrong_use_of_the_command_line_is_status_2() {
+    let scenes = Scenes::new();
+    let scene = scenes.path("small.toml");
+    for (more, words) in [
+        (&["--size", "0x10"][..], &["size"][..]),
+        (&["--size", "axb"], &["size"]),
+        (&["--samples", "3"], &["samples"]),
+        (&["--samples", "1", "--adaptive"], &["--adaptive", "--samples 4"]),
+        (&["--segment", "static:0"], &["segment"]),
+        (&["--segment", "fast"], &["segment"]),
+        (&["--frames", "5"], &["%0"]),
+        (&["--nonsense"], &["--nonsense"]),
+    ] {
+        render(&scene, &scenes.path("out.png"), more).expect_failure(2, words);
+    }
+    render(&scene, &scenes.path("out.gif"), &[]).expect_failure(2, &["out.gif", ".png"]);
+    let nowhere = scenes.path("no/such/folder/out.png");
+    let outcome = render(&scene, &nowhere, &[]);
+    assert!(matches!(outcome.code, Some(1 | 2)) && outcome.stderr.contains("no/such/folder"), "{outcome:?}");
+}
+
+#[test]
+fn a_port_in_use_is_named_with_the_remedy() {
+    let scenes = Scenes::new();
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let outcome = render(&scenes.path("small.toml"), &scenes.path("out.png"), &["--listen", &address]);
+    outcome.expect_failure(1, &[&address, "--listen"]);
+}
+
+#[test]
+fn a_cut_compiled_model_is_refused() {
+    let scenes = Scenes::new();
+    let model = scenes.path("bumps.rfm");
+    let mut compile = master();
+    compile.arg("compile").arg(scenes.path("bumps.obj")).arg("-o").arg(&model);
+    Running::start(&mut compile).finish().expect_success();
+    let bytes = scenes.read("bumps.rfm");
+    scenes.write("bumps.rfm", &bytes[..bytes.len() / 2]);
+    let outcome = render(&model, &scenes.path("out.png"), &[]);
+    outcome.expect_failure(2, &["bumps.rfm", "compile it again"]);
+}
+
+/// Peers that talk nonsense, too much, too little or another version come and go; the run completes all the same.
+#[test]
+fn strangers_at_the_port_do_not_disturb_the_run() {
+    let scenes = Scenes::new();
+    let port = free_port();
+    let mut command = master();
+    command.arg("render").arg(scenes.path("small.toml")).arg("-o").arg(scenes.path("f-%03d.ppm"));
+    command.args(["--frames", "40", "--size", "320x240", "--local-workers", "1"]);
+    command.args(["--listen", &format!("127.0.0.1:{port}")]);
+    let mut master = Running::start(&mut command);
+    wait_until("a frame is written", || scenes.path("f-000.ppm").exists());
+
+    let hello = |version: u16| {
+        // Magic, version, role (2: a worker), nothing.
+        let mut bytes = b"RAYFARM\n".to_vec();
+        bytes.extend(version.to_le_bytes());
+        bytes.extend([2, 0]);
+        bytes
+    };
+    let mut huge = hello(1);
+    huge.extend(u32::MAX.to_le_bytes());
+    huge.extend([1; 64]);
+    for bytes in [b"GET / HTTP/1.1\r\n\r\n".to_vec(), vec![0xff; 4096], hello(999), huge, hello(1)] {
+        let Ok(mut stranger) = TcpStream::connect(("127.0.0.1", port)) else { continue };
+        // The master may hang up while we still talk, or say why it does.
+        let _ = stranger.write_all(&bytes);
+        let _ = stranger.set_read_timeout(Some(Duration::from_millis(200)));
+        let _ = stranger.read(&mut [0; 512]);
+    }
+    master.wait_for("127.0.0.1");
+    let outcome = master.finish().expect_success();
+    assert!(!outcome.stderr.contains("panicked"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("version 999"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_worker_names_a_master_that_is_none() {
+    let port = free_port();
+    let listener = TcpListener::bind(("127.0.0.1", port)).unwrap();
+    let web_server = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\nServer: something\r\n\r\n");
+        let _ = stream.read(&mut [0; 512]);
+    });
+    let mut command = worker();
+    command.args(["--master", &format!("127.0.0.1:{port}"), "--no-reconnect"]);
+    Running::start(&mut command).finish().expect_failure(1, &["127.0.0.1", "no rayfarm master"]);
+    web_server.join().unwrap();
+    let mut wrong = worker();
+    wrong.args(["--master", "no port here"]);
+    Running::start(&mut wrong).finish().expect_failure(2, &["HOST:PORT"]);
+}

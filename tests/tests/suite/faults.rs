@@ -1,0 +1,165 @@
+//! A frame is never lost: workers die, hang and come in the middle of a run, and every picture is the right one.
+
+use std::path::PathBuf;
+
+use rayfarm_tests::{Outcome, Running, Scenes, free_port, master, wait_until, worker};
+
+/// A `render` of some frames by workers that connect to it.
+struct Run {
+    scenes: Scenes,
+    port: u16,
+    frames: usize,
+    master: Running,
+}
+
+impl Run {
+    /// Begins to render when `workers` workers are there.
+    fn start(frames: usize, workers: u32) -> Self {
+        Self::start_on(free_port(), frames, workers)
+    }
+
+    fn start_on(port: u16, frames: usize, workers: u32) -> Self {
+        let scenes = Scenes::new();
+        let mut command = master();
+        command.arg("render").arg(scenes.path("small.toml")).arg("-o").arg(scenes.path("frame-%05d.ppm"));
+        command.args(["--frames", &frames.to_string(), "--spin", "3", "--size", "320x240"]);
+        command.args(["--no-local-workers", "--listen", &format!("127.0.0.1:{port}")]);
+        command.args(["--wait-for-workers", &workers.to_string()]);
+        Self { scenes, port, frames, master: Running::start(&mut command) }
+    }
+
+    fn worker(&self, name: &str) -> Running {
+        start_worker(self.port, name)
+    }
+
+    fn path(&self, frame: usize) -> PathBuf {
+        self.scenes.path(&format!("frame-{frame:05}.ppm"))
+    }
+
+    fn wait_for_frame(&self, frame: usize) {
+        wait_until("a frame is written", || self.path(frame).exists());
+    }
+
+    fn is_over(&self) -> bool {
+        self.path(self.frames - 1).exists()
+    }
+
+    /// Waits for the end; all frames.
+    fn finish(self) -> Vec<Vec<u8>> {
+        let paths: Vec<_> = (0..self.frames).map(|frame| self.path(frame)).collect();
+        self.master.finish().expect_success();
+        paths.iter().map(|path| std::fs::read(path).unwrap()).collect()
+    }
+}
+
+fn start_worker(port: u16, name: &str) -> Running {
+    let mut command = worker();
+    command.args(["--master", &format!("127.0.0.1:{port}"), "--threads", "1", "--name", name]);
+    Running::start(&mut command)
+}
+
+/// What the frames must be: rendered by one worker that nothing happens to.
+fn undisturbed(frames: usize) -> Vec<Vec<u8>> {
+    let run = Run::start(frames, 1);
+    let _worker = run.worker("calm");
+    run.finish()
+}
+
+/// Disturbs a run and compares every frame with the undisturbed ones. What happens to a worker after the last frame
+/// proves nothing, and a test cannot know how fast its machine is: where `disturbed` says that the run was over too
+/// soon, by `None`, it is done again with more frames.
+fn expect_unharmed(disturbed: impl Fn(usize) -> Option<Vec<Vec<u8>>>) {
+    let tries = [100, 400, 1600, 6400].into_iter();
+    let (frames, pictures) = tries
+        .filter_map(|frames| Some((frames, disturbed(frames)?)))
+        .next()
+        .expect("every run was over too soon");
+    assert!(pictures == undisturbed(frames));
+}
+
+#[test]
+fn a_killed_worker_costs_no_frame_and_no_byte() {
+    expect_unharmed(|frames| {
+        let run = Run::start(frames, 2);
+        let (victim, _other) = (run.worker("victim"), run.worker("other"));
+        run.wait_for_frame(2);
+        victim.signal("KILL");
+        (!run.is_over()).then(|| run.finish())
+    });
+}
+
+#[test]
+fn a_hung_worker_costs_no_frame_and_no_byte() {
+    expect_unharmed(|frames| {
+        let run = Run::start(frames, 2);
+        let (victim, _other) = (run.worker("victim"), run.worker("other"));
+        run.wait_for_frame(2);
+        victim.signal("STOP");
+        let pictures = (!run.is_over()).then(|| run.finish());
+        victim.signal("CONT");
+        pictures
+    });
+}
+
+#[test]
+fn when_the_last_worker_dies_the_next_one_goes_on() {
+    expect_unharmed(|frames| {
+        let run = Run::start(frames, 1);
+        let first = run.worker("first");
+        run.wait_for_frame(3);
+        first.signal("KILL");
+        let under_way = !run.is_over();
+        drop(first);
+        let _second = run.worker("second");
+        under_way.then(|| run.finish())
+    });
+}
+
+#[test]
+fn a_worker_waits_for_a_master_that_comes_later_and_is_sent_home_at_the_end() {
+    let port = free_port();
+    let mut early = start_worker(port, "early");
+    early.wait_for("again");
+    assert_eq!(Run::start_on(port, 3, 1).finish().len(), 3);
+    early.finish().expect_success();
+}
+
+#[test]
+fn local_workers_end_with_their_master_however_it_ends() {
+    for name in ["KILL", "INT", "TERM"] {
+        let scenes = Scenes::new();
+        let mut command = master();
+        command.arg("render").arg(scenes.path("small.toml")).arg("-o").arg(scenes.path("f-%05d.ppm"));
+        command.args(["--frames", "10000", "--local-workers", "2", "--listen", "127.0.0.1:0"]);
+        let master = Running::start(&mut command);
+        wait_for_frame_of(&scenes, "f-00001.ppm");
+        let workers = master.children();
+        assert_eq!(workers.len(), 2, "before {name}");
+        master.signal(name);
+        let outcome = master.finish();
+        assert_ne!(outcome.code, Some(0), "{name}: the run was not finished");
+        let alive = |id: &u32| std::path::Path::new(&format!("/proc/{id}/cmdline")).exists();
+        wait_until("the local workers have ended", || !workers.iter().any(alive));
+        assert!(!scenes.names().iter().any(|name| name.contains("tmp")), "{:?}", scenes.names());
+    }
+}
+
+fn wait_for_frame_of(scenes: &Scenes, name: &str) {
+    wait_until("a frame is written", || scenes.path(name).exists());
+}
+
+#[test]
+fn ctrl_c_says_how_far_the_run_came() {
+    let scenes = Scenes::new();
+    let mut command = master();
+    command.arg("render").arg(scenes.path("small.toml")).arg("-o").arg(scenes.path("f-%05d.png"));
+    command.args(["--frames", "10000", "--listen", "127.0.0.1:0"]);
+    let master = Running::start(&mut command);
+    wait_for_frame_of(&scenes, "f-00001.png");
+    master.signal("INT");
+    let Outcome { stderr, .. } = master.finish();
+    assert!(stderr.contains("of 10000 frames"), "{stderr}");
+    for name in scenes.names().iter().filter(|name| name.ends_with(".png")) {
+        rayfarm_tracer::image::load(&scenes.path(name)).unwrap();
+    }
+}

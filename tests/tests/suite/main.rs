@@ -1,0 +1,16 @@
+//! What crosses the crates: real processes, faults, bad input, a window. One program, so that it is linked once.
+
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod accounting;
+mod bad_input;
+mod bench_farm;
+mod command_line;
+mod control;
+mod faults;
+#[cfg(unix)]
+mod launch;
+mod same_picture;
+mod tradeoff;
+mod window;
+mod window_controls;

@@ -1,0 +1,19 @@
+//! What the tracer promises, from outside. One program, so that the tracer is linked once.
+
+#![allow(clippy::panic, clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod adaptive;
+mod build_quality;
+mod common;
+mod cuts;
+mod extremes;
+mod golden;
+mod knobs;
+mod mutated_models;
+mod numerics;
+mod oracle;
+mod physics;
+mod project_scenes;
+mod shadows;
+mod textures;
+mod workloads;

@@ -1,0 +1,132 @@
+//! The project's own scenes against the oracle, from outside, from within, and with lights where they hurt: near a surface,
+//! behind the camera, grazing, many. Every so many pixels: the oracle asks all triangles for each.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::common::{light, point};
+use glam::DVec3;
+use rayfarm_tracer::reference::Oracle;
+use rayfarm_tracer::scene::{Attenuation, Camera, FrameView, Light, LightKind, LoadedScene, Quality, load};
+use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
+
+const WIDTH: u32 = 122;
+const HEIGHT: u32 = 91;
+
+fn loaded(name: &str) -> LoadedScene {
+    load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(name)).unwrap()
+}
+
+/// Pixels that differ from the oracle's by more than one step of a channel; every `step`th is looked at.
+fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
+    let scene = &loaded.scene;
+    let (width, height, quality) = (WIDTH, HEIGHT, Quality::default());
+    let view = FrameView { width, height, samples: 1, camera: *camera, spin: 0.0, quality };
+    let (meshes, textures) = (loaded.meshes.iter().cloned(), loaded.textures.iter().cloned());
+    let compiled = Arc::new(CompiledScene::new(scene.clone(), meshes, textures).unwrap());
+    let frame = PreparedFrame::new(compiled, &view).unwrap();
+    let mut pixels = vec![0; (WIDTH * HEIGHT * 3) as usize];
+    render_rows(&frame, 0..HEIGHT, &mut pixels, &|| false).unwrap();
+    let oracle = Oracle::new(scene, &loaded.meshes, &loaded.textures, &view);
+    let differs = |&i: &u32| {
+        let expected = oracle.encoded_pixel(i % WIDTH, i / WIDTH);
+        pixels[i as usize * 3..][..3].iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 1)
+    };
+    (0..WIDTH * HEIGHT).step_by(step).filter(differs).count()
+}
+
+/// The camera of the scene, one amid its things, and one from the other side.
+fn cameras(loaded: &LoadedScene) -> [Camera; 3] {
+    let own = loaded.scene.camera;
+    let towards = own.look_at - own.position;
+    let up = own.up.normalize() * towards.length();
+    let amid = Camera { position: own.look_at + up * 0.05, look_at: own.position, fov: 75.0, ..own };
+    let opposite = Camera { position: own.look_at + towards * 0.8 + up * 0.3, ..own };
+    [own, amid, opposite]
+}
+
+/// What the camera sees in the middle of its picture.
+fn seen(loaded: &LoadedScene, camera: &Camera) -> DVec3 {
+    let (meshes, textures) = (loaded.meshes.iter().cloned(), loaded.textures.iter().cloned());
+    let compiled = Arc::new(CompiledScene::new(loaded.scene.clone(), meshes, textures).unwrap());
+    let frame = PreparedFrame::new(compiled, &FrameView::of(&loaded.scene)).unwrap();
+    let direction = camera.look_at - camera.position;
+    let t = frame.closest_hit(camera.position, direction, f64::INFINITY).map_or(1.0, |hit| hit.t);
+    camera.position + direction * t
+}
+
+/// Lights that are hard on the shadows of what `camera` sees.
+fn hard_lights(loaded: &LoadedScene, camera: &Camera) -> Vec<(&'static str, Vec<Light>)> {
+    let (eye, seen) = (camera.position, seen(loaded, camera));
+    let to_eye = eye - seen;
+    let side = to_eye.cross(camera.up).normalize() * to_eye.length();
+    let at = |p: DVec3| light(point(p.x, p.y, p.z), 0.7, Attenuation::None);
+    let sun = LightKind::Directional { direction: -(side + camera.up.normalize() * 0.03 * side.length()) };
+    let spot = LightKind::Spot {
+        position: eye + side * 0.5,
+        direction: -to_eye - side * 0.5,
+        beam_angle: 25.0,
+        penumbra: 3.0,
+    };
+    let ring = |i: u32| {
+        let (s, c) = libm::sincos(f64::from(i) * 0.7);
+        at(seen + to_eye * 0.4 + side * (0.6 * c) + camera.up * (0.6 * s))
+    };
+    let dimmed = |light: Light| Light { color: light.color * 0.05, ..light };
+    vec![
+        ("amid", vec![at(seen + to_eye * 0.3)]),
+        ("near a surface", vec![at(seen + to_eye * 1e-3), at(seen + to_eye * 0.02 + side * 0.05)]),
+        ("at a surface, all but", vec![at(seen + to_eye * 1e-6)]),
+        ("behind the camera", vec![at(eye + to_eye * 300.0 + side * 90.0)]),
+        (
+            "grazing, and a spot",
+            vec![light(sun, 0.8, Attenuation::None), light(spot, 0.5, Attenuation::None)],
+        ),
+        ("twenty", (0..20).map(ring).map(dimmed).collect()),
+    ]
+}
+
+fn check(name: &str, step: usize) {
+    let mut loaded = loaded(name);
+    let mut found = Vec::new();
+    for (index, camera) in cameras(&loaded).iter().enumerate() {
+        let count = off(&loaded, camera, step);
+        if count > 0 {
+            found.push(format!("camera {index}: {count}"));
+        }
+    }
+    let camera = loaded.scene.camera;
+    for (what, lights) in hard_lights(&loaded, &camera) {
+        loaded.scene.lights = lights;
+        let count = off(&loaded, &camera, step);
+        if count > 0 {
+            found.push(format!("lights {what}: {count}"));
+        }
+    }
+    assert!(found.is_empty(), "{name}: {found:?}");
+}
+
+#[test]
+fn the_room_is_the_oracles() {
+    check("room.toml", 281);
+}
+
+#[test]
+fn the_lights_are_the_oracles() {
+    check("lights.toml", 23);
+}
+
+#[test]
+fn the_textures_are_the_oracles() {
+    check("textured.toml", 37);
+}
+
+#[test]
+fn the_instances_are_the_oracles() {
+    check("instances.toml", 281);
+}
+
+#[test]
+fn the_product_is_the_oracles() {
+    check("product.toml", 199);
+}

@@ -1,0 +1,195 @@
+//! A master on 127.0.0.1 that does what a test says, and a scene for its worker.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use glam::{DVec3, Vec2, Vec3};
+use rayfarm_protocol::pixels::unpack;
+use rayfarm_protocol::session::{self, Receiver, Sender};
+use rayfarm_protocol::{
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, Lease, ToMaster, ToWorker, Welcome, codec, handshake,
+};
+use rayfarm_tracer::image::RgbImage;
+use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
+use rayfarm_tracer::scene::{
+    Attenuation, Background, Camera, Filter, FrameView, Light, LightKind, Material, Model, NormalMode, Plane,
+    RenderSettings, Scene, Sphere, TextureMap,
+};
+use rayfarm_tracer::texture::Texture;
+use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
+use tokio::net::{TcpListener, TcpStream};
+
+/// A scene with everything that travels: a mesh under a texture, a sphere, a plane, a light with shadows.
+pub(crate) struct Stage {
+    pub(crate) body: Bytes,
+    pub(crate) mesh: Bytes,
+    pub(crate) texture: Bytes,
+    compiled: Arc<CompiledScene>,
+    view: FrameView,
+}
+
+impl Stage {
+    pub(crate) fn new() -> Self {
+        let mesh = pyramid();
+        let texture = stripes();
+        let scene = Scene {
+            ambient: Vec3::splat(0.1),
+            render: RenderSettings { width: 61, height: 45, samples: 4, ..RenderSettings::default() },
+            camera: Camera {
+                position: DVec3::new(0.5, 1.5, 5.0),
+                look_at: DVec3::ZERO,
+                up: DVec3::Y,
+                fov: 45.0,
+                zoom: 1.0,
+            },
+            background: Background::Gradient { bottom: Vec3::ZERO, top: Vec3::new(0.3, 0.5, 0.9) },
+            lights: vec![Light {
+                kind: LightKind::Point { position: DVec3::new(2.0, 4.0, 3.0) },
+                color: Vec3::ONE,
+                attenuation: Attenuation::None,
+                shadows: true,
+            }],
+            materials: vec![Material::NEUTRAL, Material { texture: Some(0), ..Material::NEUTRAL }],
+            models: vec![Model {
+                mesh: mesh.id(),
+                materials: vec![1],
+                normals: NormalMode::Flat,
+                translate: DVec3::new(-0.8, 0.0, 0.0),
+                rotate: DVec3::new(0.0, 30.0, 0.0),
+                scale: DVec3::ONE,
+            }],
+            spheres: vec![Sphere { center: DVec3::new(1.0, 0.0, 0.0), radius: 0.7, material: 0 }],
+            planes: vec![Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 0 }],
+            textures: vec![TextureMap { texture: texture.id(), filter: Filter::Bilinear }],
+            triangles: vec![],
+        };
+        let view = FrameView::of(&scene);
+        let body = codec::encode(&scene).unwrap().into();
+        let mesh_bytes = Bytes::copy_from_slice(mesh.bytes());
+        let texture_bytes = Bytes::copy_from_slice(texture.bytes());
+        let compiled = Arc::new(CompiledScene::new(scene, [Arc::new(mesh)], [Arc::new(texture)]).unwrap());
+        Self { body, mesh: mesh_bytes, texture: texture_bytes, compiled, view }
+    }
+
+    pub(crate) fn height(&self) -> u32 {
+        self.view.height
+    }
+
+    pub(crate) fn view(&self, spin: f64) -> FrameView {
+        FrameView { spin, ..self.view }
+    }
+
+    pub(crate) fn announce(&self, frame: u64, spin: f64) -> ToWorker {
+        ToWorker::Frame(FrameAnnounce {
+            frame: FrameId(frame),
+            scene: AssetId::of(&self.body),
+            width: self.view.width,
+            height: self.view.height,
+            view: codec::encode(&self.view(spin)).unwrap().into(),
+        })
+    }
+
+    /// These rows as this process renders them.
+    pub(crate) fn expected(&self, spin: f64, rows: Range<u32>) -> Vec<u8> {
+        let frame = PreparedFrame::new(Arc::clone(&self.compiled), &self.view(spin)).unwrap();
+        let mut out = vec![0; rows.len() * self.view.width as usize * 3];
+        render_rows(&frame, rows, &mut out, &|| false).unwrap();
+        out
+    }
+}
+
+fn pyramid() -> CompiledMesh {
+    let mesh = Mesh {
+        positions: vec![DVec3::Y, DVec3::X, DVec3::NEG_X, DVec3::Z],
+        triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+        triangle_materials: vec![0; 4],
+        uvs: vec![[Vec2::ZERO, Vec2::new(3.0, 0.5), Vec2::new(0.5, 2.0)]; 4],
+        materials: vec![NamedMaterial { name: "plain".into(), material: Material::NEUTRAL, texture: None }],
+        ..Mesh::default()
+    };
+    CompiledMesh::compile(&mesh).unwrap().0
+}
+
+fn stripes() -> Texture {
+    let pixels = (0..4 * 3 * 3).map(|i: u32| (i * 37 % 256) as u8).collect();
+    Texture::new(&RgbImage { width: 4, height: 3, pixels }).unwrap()
+}
+
+pub(crate) fn lease(frame: u64, rows: Range<u32>) -> Lease {
+    let (first_row, row_count) = (rows.start, rows.end - rows.start);
+    Lease { frame: FrameId(frame), segment: first_row, attempt: 0, first_row, row_count }
+}
+
+pub(crate) async fn listen() -> (TcpListener, String) {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    (listener, address)
+}
+
+/// A session with a worker that connected.
+pub(crate) struct Link {
+    pub(crate) hello: Hello,
+    pub(crate) out: Sender<ToWorker>,
+    pub(crate) inbox: Receiver<ToMaster>,
+    /// Assets that were asked for.
+    pub(crate) asked: usize,
+    /// Segments that came in fewer bytes than they have pixels.
+    pub(crate) packed: usize,
+}
+
+impl Link {
+    pub(crate) async fn accept(listener: &TcpListener) -> Self {
+        let mut stream: TcpStream = listener.accept().await.unwrap().0;
+        let hello = handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
+        let (out, inbox, _) = session::spawn(stream);
+        Self { hello, out, inbox, asked: 0, packed: 0 }
+    }
+
+    /// The next message that is no wish for an asset; those of the stage are sent.
+    pub(crate) async fn hear(&mut self, stage: &Stage) -> Option<ToMaster> {
+        loop {
+            let id = match self.inbox.recv().await?.unwrap() {
+                ToMaster::NeedAsset { id, .. } => id,
+                message => return Some(message),
+            };
+            self.asked += 1;
+            let assets = [&stage.body, &stage.mesh, &stage.texture];
+            let bytes = assets.into_iter().find(|bytes| AssetId::of(bytes) == id).unwrap().clone();
+            self.out.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await.unwrap();
+            self.out.send(ToWorker::AssetChunk { id, offset: 0, bytes }).await.unwrap();
+        }
+    }
+
+    /// Renders a whole frame on the worker, and compares it with this process's own.
+    pub(crate) async fn check_frame(&mut self, stage: &Stage, frame: u64, spin: f64) {
+        self.out.send(stage.announce(frame, spin)).await.unwrap();
+        let height = stage.height();
+        let segments: Vec<_> = (0..height).step_by(11).map(|first| first..(first + 11).min(height)).collect();
+        for rows in &segments {
+            self.out.send(ToWorker::Segment(lease(frame, rows.clone()))).await.unwrap();
+        }
+        for _ in &segments {
+            match self.hear(stage).await {
+                Some(ToMaster::Pixels { header, bytes }) => {
+                    let expected = stage.expected(spin, header.lease.rows().unwrap());
+                    match header.encoding {
+                        Encoding::Raw => assert_eq!(bytes, expected),
+                        Encoding::Narrow | Encoding::NarrowLz4 => panic!("nobody asked for fewer colours"),
+                        Encoding::Lz4 => {
+                            let mut rows = vec![0; expected.len()];
+                            unpack(&bytes, &mut rows).unwrap();
+                            assert!(rows == expected && bytes.len() < rows.len());
+                            self.packed += 1;
+                        }
+                    }
+                    let cost = header.cost;
+                    assert!(cost.primary > 0 && cost.span_ns > 0 && cost.trace_ns > 0);
+                    assert_eq!(cost.encode_ns > 0, self.packed > 0, "what is not encoded takes no time");
+                }
+                other => panic!("pixels were expected, not {other:?}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! The worker against masters over sockets. One program, so that the worker is linked once.
+
+#![allow(clippy::panic, clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+mod process;
+mod tcp;

@@ -1,0 +1,113 @@
+//! The program itself: its exit codes, its messages, how it is ended.
+
+use std::process::{Output, Stdio};
+
+use rayfarm_protocol::{ToMaster, ToWorker};
+use tokio::process::{Child, Command};
+
+use crate::common::{Link, Stage, listen};
+
+fn program(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_rayfarm-worker"));
+    command.args(args).env_remove("RUST_LOG").stdin(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
+    command
+}
+
+fn start(address: &str, more: &[&str]) -> Child {
+    program(&[&["--master", address, "--threads", "2"], more].concat()).spawn().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[tokio::test]
+async fn wrong_use_is_status_2_with_what_was_expected() {
+    for (args, part) in [
+        (&[][..], "--master"),
+        (&["--master", "farm"], "expected HOST:PORT"),
+        (&["--master", "farm:70000"], "no port from 1 to 65535"),
+        (&["--master", "::1:7117"], "expected HOST:PORT"),
+        (&["--master", "farm:7117", "--threads", "0"], "1..=1024"),
+        (&["--master", "farm:7117", "--colour"], "--colour"),
+    ] {
+        let output = program(args).output().await.unwrap();
+        assert_eq!(output.status.code(), Some(2), "{args:?}");
+        assert!(stderr(&output).contains(part), "{args:?}: {}", stderr(&output));
+    }
+}
+
+#[tokio::test]
+async fn nobody_there_is_status_1_with_the_address() {
+    let (listener, address) = listen().await;
+    drop(listener);
+    let output = program(&["--master", &address, "--no-reconnect"]).output().await.unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = stderr(&output);
+    assert!(text.contains(&format!("cannot connect to the master at {address}")), "{text}");
+}
+
+#[tokio::test]
+async fn a_goodbye_is_status_0() {
+    let (listener, address) = listen().await;
+    let worker = start(&address, &["--name", "cellar"]);
+    let mut link = Link::accept(&listener).await;
+    assert_eq!(link.hello.name, "cellar");
+    link.check_frame(&Stage::new(), 0, 0.0).await;
+    link.out.send(ToWorker::Goodbye { reason: "closing time".into(), again: false }).await.unwrap();
+    let output = worker.wait_with_output().await.unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(stderr(&output).contains("closing time"), "{}", stderr(&output));
+}
+
+#[tokio::test]
+async fn it_ends_with_its_standard_input() {
+    let (listener, address) = listen().await;
+    let mut worker = start(&address, &["--exit-with-stdin"]);
+    let mut link = Link::accept(&listener).await;
+    // Before its session it would end without a word.
+    link.check_frame(&Stage::new(), 0, 0.0).await;
+    drop(worker.stdin.take());
+    assert!(matches!(link.hear(&Stage::new()).await, Some(ToMaster::Goodbye { .. })));
+    assert_eq!(worker.wait().await.unwrap().code(), Some(0));
+}
+
+#[cfg(unix)]
+async fn signal(worker: &Child, name: &str) {
+    let id = worker.id().unwrap().to_string();
+    assert!(Command::new("kill").args([name, &id]).status().await.unwrap().success());
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_signal_drains_it_and_it_ends_with_status_0() {
+    for name in ["-TERM", "-INT"] {
+        let (listener, address) = listen().await;
+        let stage = Stage::new();
+        let mut worker = start(&address, &[]);
+        let mut link = Link::accept(&listener).await;
+        // Once it renders, it listens for signals.
+        link.check_frame(&stage, 0, 0.0).await;
+        signal(&worker, name).await;
+        assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
+        // What the master had granted meanwhile is rendered.
+        link.check_frame(&stage, 1, 20.0).await;
+        link.out.send(ToWorker::Goodbye { reason: "all done".into(), again: true }).await.unwrap();
+        assert_eq!(worker.wait().await.unwrap().code(), Some(0));
+    }
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_second_signal_ends_it_at_once_with_a_goodbye() {
+    let (listener, address) = listen().await;
+    let stage = Stage::new();
+    let mut worker = start(&address, &[]);
+    let mut link = Link::accept(&listener).await;
+    link.check_frame(&stage, 0, 0.0).await;
+    signal(&worker, "-TERM").await;
+    assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
+    signal(&worker, "-INT").await;
+    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Goodbye { .. })));
+    assert_eq!(worker.wait().await.unwrap().code(), Some(0));
+}
