@@ -98,6 +98,13 @@ pub enum ProtocolError {
         reason: String,
     },
 
+    /// The master does not take this worker now, and may later.
+    #[error("the master does not take workers now: {reason}")]
+    NotNow {
+        /// Why.
+        reason: String,
+    },
+
     /// An envelope of a type that this version does not know.
     #[error("the peer sent an envelope of unknown type {kind:#04x}: these bytes are no message of rayfarm's")]
     UnknownKind {
@@ -151,7 +158,7 @@ impl ProtocolError {
             Self::NotRayfarm { .. } | Self::SameRole { .. } | Self::Version { .. } | Self::Refused { .. } => {
                 true
             }
-            Self::Io { .. } | Self::Closed { .. } | Self::Deadline { .. } => false,
+            Self::Io { .. } | Self::Closed { .. } | Self::Deadline { .. } | Self::NotNow { .. } => false,
             Self::UnknownKind { .. } | Self::Unexpected { .. } | Self::TooLong { .. } => false,
             Self::Malformed { .. } | Self::Codec { .. } => false,
         }

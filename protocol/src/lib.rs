@@ -15,6 +15,7 @@
 //! 4. [`passing`]: assets from worker to worker, over connections of their own.
 //! 5. [`session`]: one task that writes (control before bulk), one that reads, bounded queues between them and the user.
 
+pub mod address;
 pub mod codec;
 pub mod envelope;
 mod error;
@@ -26,12 +27,11 @@ pub mod passing;
 pub mod pixels;
 pub mod session;
 pub mod tcp;
-mod text;
 
 pub use error::{ProtocolError, Role};
 pub use ids::{AssetId, FrameId, Lease};
-pub use message::{FrameAnnounce, Hello, ToMaster, ToWorker, Welcome};
+pub use message::{FrameAnnounce, Hello, Reconnect, ToMaster, ToWorker, Welcome};
 pub use pixels::{Cost, Encoding, PixelsHeader};
 
 /// Version of everything behind the preamble. It grows with every change that an older peer would misread.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;

@@ -23,6 +23,13 @@ pub fn is_within_machine(stream: &TcpStream) -> bool {
     ends.is_ok_and(|(ours, theirs)| ours == theirs || theirs.is_loopback())
 }
 
+/// Whether a socket that listens on any IPv6 address takes IPv4 connections as well, by this system's default.
+pub fn is_dual_stack() -> bool {
+    use socket2::{Domain, Socket, Type};
+    let socket = Socket::new(Domain::IPV6, Type::STREAM, None);
+    socket.and_then(|socket| socket.only_v6()).is_ok_and(|only| !only)
+}
+
 /// A loopback is never congested, but a system whose default paces what it sends (BBR) spends timers on it: 3 % of
 /// a frame of W1. Every Linux has Reno, and lets everybody use it.
 fn relax_congestion_control(stream: &TcpStream) {

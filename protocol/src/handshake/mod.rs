@@ -2,28 +2,52 @@
 //!
 //! 1. Both sides send a preamble (magic, version, role) and read the other's, before any codec.
 //! 2. Versions differ: both sides know both numbers and say so; the master also sends them as plain text.
-//! 3. The worker sends [`Hello`], the master answers [`Welcome`] or a refusal with its reason.
+//! 3. The worker sends [`Hello`], the master answers [`Welcome`], a refusal with its reason, or a goodbye where it may
+//!    take the worker later.
 //!
 //! All of it has one deadline, [`limits::HANDSHAKE_DEADLINE`], and no envelope in it is longer than
 //! [`limits::MAX_CONTROL_BYTES`]. Not a byte behind the handshake is read.
 
 mod preamble;
 
+use rayfarm_text::{cut, printable_within};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::time::timeout;
 
 use crate::envelope::{Envelope, Kind, read_body, read_header};
-use crate::limits::{HANDSHAKE_DEADLINE, MAX_NAME_BYTES, MAX_REASON_BYTES, MAX_THREADS};
-use crate::message::{decode_control, encode_control, encode_reason};
-use crate::text::{cut, printable};
+use crate::limits::{HANDSHAKE_DEADLINE, MAX_NAME_BYTES, MAX_THREADS};
+use crate::message::{
+    Reconnect, decode_control, decode_goodbye, decode_reason, encode_control, encode_goodbye, encode_reason,
+};
 use crate::{Hello, ProtocolError, Role, Welcome};
 
 use preamble::Preamble;
 
+/// Why a master does not take a worker, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Trying again gives the same answer.
+    Final(String),
+    /// It may take the worker later.
+    NotNow(String),
+}
+
+impl From<String> for Refusal {
+    fn from(reason: String) -> Self {
+        Self::Final(reason)
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(reason: &str) -> Self {
+        Self::Final(reason.to_owned())
+    }
+}
+
 /// Introduces a worker to the master at the other end. Overlong texts in `hello` are cut.
 ///
 /// # Errors
-/// The peer is no master, is of another version, refuses, closes, or is not done within the deadline.
+/// The peer is no master, is of another version, refuses for good or for now, closes, or is not done within the deadline.
 pub async fn as_worker<S>(io: &mut S, hello: &Hello) -> Result<Welcome, ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -51,7 +75,7 @@ where
 pub async fn as_master<S, D>(io: &mut S, decide: D) -> Result<Hello, ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
-    D: FnOnce(&Hello) -> Result<Welcome, String>,
+    D: FnOnce(&Hello) -> Result<Welcome, Refusal>,
 {
     within_deadline(async {
         if let Err(error) = agree(io, Role::Master).await {
@@ -62,15 +86,22 @@ where
         }
         let body = receive(io, Kind::Hello, "a hello").await?;
         let answer = checked_hello(decode_control(Kind::Hello, &body)?)
+            .map_err(Refusal::Final)
             .and_then(|hello| decide(&hello).map(|welcome| (hello, welcome)));
         match answer {
             Ok((hello, welcome)) => {
                 send(io, encode_control(Kind::Welcome, &welcome)?).await?;
                 Ok(hello)
             }
-            Err(reason) => {
+            Err(Refusal::Final(reason)) => {
                 tell(io, &reason).await;
                 Err(ProtocolError::Refused { by: Role::Master, reason })
+            }
+            Err(Refusal::NotNow(reason)) => {
+                // Best effort, as for a refusal.
+                let _ = send(io, encode_goodbye(&reason, Reconnect::Now)?).await;
+                let _ = io.shutdown().await;
+                Err(ProtocolError::NotNow { reason })
             }
         }
     })
@@ -106,11 +137,12 @@ fn checked_hello(hello: Hello) -> Result<Hello, String> {
             hello.threads
         ));
     }
+    let shown = |text: &str| printable_within(text, MAX_NAME_BYTES).into_owned();
     Ok(Hello {
-        name: printable(&hello.name),
+        name: shown(&hello.name),
         threads: hello.threads,
-        simd: printable(&hello.simd),
-        software: printable(&hello.software),
+        simd: shown(&hello.simd),
+        software: shown(&hello.software),
     })
 }
 
@@ -136,9 +168,12 @@ async fn receive(
     match header.kind {
         kind if kind == wanted => read_body(io, header).await,
         Kind::Refused => {
-            let body = read_body(io, header).await?;
-            let reason = printable(cut(&String::from_utf8_lossy(&body), MAX_REASON_BYTES));
+            let reason = decode_reason(&read_body(io, header).await?);
             Err(ProtocolError::Refused { by: Role::Master, reason })
+        }
+        Kind::Goodbye if wanted == Kind::Welcome => {
+            let (reason, _) = decode_goodbye(read_body(io, header).await?)?;
+            Err(ProtocolError::NotNow { reason })
         }
         kind => Err(ProtocolError::Unexpected { kind, expected }),
     }

@@ -6,9 +6,9 @@
 //! | RAYFARM\n | version | role | 0 |
 //! ```
 
+use rayfarm_text::printable;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
-use crate::text::printable;
 use crate::{PROTOCOL_VERSION, ProtocolError, Role};
 
 pub(crate) const PREAMBLE_BYTES: usize = 12;
@@ -88,7 +88,8 @@ async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Pream
 
 /// Names the usual things that listen on, or knock at, a wrong port.
 fn describe(bytes: &[u8]) -> String {
-    let text = printable(&String::from_utf8_lossy(bytes));
+    let text = String::from_utf8_lossy(bytes);
+    let text = printable(&text);
     let starts = |words: &[&str]| words.iter().any(|word| bytes.starts_with(word.as_bytes()));
     let looks = if starts(&["HTTP/", "GET ", "POST ", "HEAD ", "PUT ", "OPTIONS ", "CONNECT ", "PRI * "]) {
         ", which is HTTP"
@@ -99,7 +100,7 @@ fn describe(bytes: &[u8]) -> String {
     } else {
         ""
     };
-    format!("it began with {text:?}{looks}")
+    format!("it began with \"{text}\"{looks}")
 }
 
 #[cfg(test)]

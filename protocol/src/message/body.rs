@@ -1,12 +1,12 @@
 //! Bodies of messages: through the codec, or behind a hand-laid head.
 
 use bytes::Bytes;
+use rayfarm_text::{cut, printable_within};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_CONTROL_BYTES, MAX_REASON_BYTES};
-use crate::text::{cut, printable};
 use crate::{ProtocolError, codec};
 
 pub(crate) fn encode_control<T: Serialize>(kind: Kind, value: &T) -> Result<Envelope, ProtocolError> {
@@ -23,9 +23,9 @@ pub(crate) fn encode_reason(kind: Kind, head: &[u8], reason: &str) -> Result<Env
     Envelope::new(kind, head, Bytes::copy_from_slice(cut(reason, MAX_REASON_BYTES).as_bytes()))
 }
 
-/// A peer's reason: whatever it sent, made printable and cut to its bound.
+/// A peer's reason: whatever it sent, made printable within its bound.
 pub(crate) fn decode_reason(body: &[u8]) -> String {
-    printable(cut(&String::from_utf8_lossy(body), MAX_REASON_BYTES))
+    printable_within(&String::from_utf8_lossy(body), MAX_REASON_BYTES).into_owned()
 }
 
 /// Takes a hand-laid head of `N` bytes off the front.

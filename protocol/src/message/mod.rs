@@ -13,7 +13,8 @@ use crate::{AssetId, FrameId, ProtocolError};
 pub use to_master::ToMaster;
 pub use to_worker::ToWorker;
 
-pub(crate) use body::{decode_control, encode_control, encode_reason};
+pub(crate) use body::{decode_control, decode_reason, encode_control, encode_reason};
+pub(crate) use to_worker::{decode_goodbye, encode_goodbye};
 
 /// A worker says who it is. Texts are at most [`crate::limits::MAX_NAME_BYTES`] each.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,6 +34,17 @@ pub struct Hello {
 pub struct Welcome {
     /// The worker's number in this run of the master.
     pub worker: u64,
+}
+
+/// When a worker whose session has ended may connect again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reconnect {
+    /// Not to this master: the worker was meant to leave.
+    Never,
+    /// Now: this session has failed, and the master goes on.
+    Now,
+    /// When another master listens there: this one ends.
+    NextMaster,
 }
 
 /// A frame that leases may follow for. The same bytes go to every worker: `view` is serialised once and shared.

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use bytes::{Buf, BufMut, Bytes};
 
 use super::body::{decode_control, decode_reason, encode_control, encode_reason, nothing, split_head};
-use super::{FrameAnnounce, Message};
+use super::{FrameAnnounce, Message, Reconnect};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
 use crate::passing::{ShareKey, Token};
@@ -71,8 +71,8 @@ pub enum ToWorker {
     Goodbye {
         /// Why.
         reason: String,
-        /// Whether the worker may connect again: this session has failed, the master goes on.
-        again: bool,
+        /// When the worker may connect again.
+        reconnect: Reconnect,
     },
 }
 
@@ -107,7 +107,7 @@ impl Message for ToWorker {
             Self::ShareKey { key } => encode_control(Kind::ShareKey, key),
             Self::Ping { nonce } => encode_control(Kind::Ping, nonce),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
-            Self::Goodbye { reason, again } => encode_reason(Kind::Goodbye, &[u8::from(*again)], reason),
+            Self::Goodbye { reason, reconnect } => encode_goodbye(reason, *reconnect),
         }
     }
 
@@ -129,7 +129,10 @@ impl Message for ToWorker {
             Kind::ShareKey => Self::ShareKey { key: decode_control(kind, &body)? },
             Kind::Ping => Self::Ping { nonce: decode_control(kind, &body)? },
             Kind::Drain => nothing(kind, &body).map(|()| Self::Drain)?,
-            Kind::Goodbye => decode_goodbye(body)?,
+            Kind::Goodbye => {
+                let (reason, reconnect) = decode_goodbye(body)?;
+                Self::Goodbye { reason, reconnect }
+            }
             Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => return Err(unexpected(kind)),
             Kind::Sharing | Kind::HaveAsset | Kind::Fetch => return Err(unexpected(kind)),
@@ -191,15 +194,26 @@ fn checked_frame(announce: &FrameAnnounce) -> Result<&FrameAnnounce, ProtocolErr
     Ok(announce)
 }
 
-fn decode_goodbye(mut body: Bytes) -> Result<ToWorker, ProtocolError> {
-    let again = match split_head::<1>(Kind::Goodbye, &mut body)? {
-        [0] => false,
-        [1] => true,
+pub(crate) fn encode_goodbye(reason: &str, reconnect: Reconnect) -> Result<Envelope, ProtocolError> {
+    let code = match reconnect {
+        Reconnect::Never => 0,
+        Reconnect::Now => 1,
+        Reconnect::NextMaster => 2,
+    };
+    encode_reason(Kind::Goodbye, &[code], reason)
+}
+
+pub(crate) fn decode_goodbye(mut body: Bytes) -> Result<(String, Reconnect), ProtocolError> {
+    let reconnect = match split_head::<1>(Kind::Goodbye, &mut body)? {
+        [0] => Reconnect::Never,
+        [1] => Reconnect::Now,
+        [2] => Reconnect::NextMaster,
         [other] => {
-            return Err(ProtocolError::malformed(Kind::Goodbye, format!("{other} is neither yes nor no")));
+            let problem = format!("{other} does not say when to connect again");
+            return Err(ProtocolError::malformed(Kind::Goodbye, problem));
         }
     };
-    Ok(ToWorker::Goodbye { reason: decode_reason(&body), again })
+    Ok((decode_reason(&body), reconnect))
 }
 
 fn encode_chunk(id: AssetId, offset: u64, bytes: &Bytes) -> Result<Envelope, ProtocolError> {

@@ -5,8 +5,8 @@ use rayfarm_protocol::envelope::{Kind, read_body, read_header};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::passing::{Fetch, ShareKey, Token, ask, token};
 use rayfarm_protocol::{
-    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, ToMaster, ToWorker,
-    Welcome, codec, limits,
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, Reconnect, ToMaster,
+    ToWorker, Welcome, codec, limits,
 };
 
 use crate::common::{lease, pixels, wire};
@@ -26,7 +26,7 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 
 #[test]
 fn these_bytes_belong_to_this_version() {
-    assert_eq!(PROTOCOL_VERSION, 3);
+    assert_eq!(PROTOCOL_VERSION, 4);
 }
 
 #[tokio::test]
@@ -64,8 +64,12 @@ async fn to_worker() {
     golden(key, &[&[32, 0, 0, 0, 0x17, 0, 0, 0], &[0xef; 32]]).await;
     golden(ToWorker::Ping { nonce: 5 }, &[&[8, 0, 0, 0, 0x30, 0, 0, 0], &number]).await;
     golden(ToWorker::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
-    let goodbye = ToWorker::Goodbye { reason: "hé".into(), again: true };
+    let goodbye = ToWorker::Goodbye { reason: "hé".into(), reconnect: Reconnect::Now };
     golden(goodbye, &[&[4, 0, 0, 0, 0x33, 0, 0, 0], &[1], b"h\xc3\xa9"]).await;
+    for (reconnect, code) in [(Reconnect::Never, 0), (Reconnect::NextMaster, 2)] {
+        let goodbye = ToWorker::Goodbye { reason: "no".into(), reconnect };
+        golden(goodbye, &[&[3, 0, 0, 0, 0x33, 0, 0, 0], &[code], b"no"]).await;
+    }
 }
 
 #[tokio::test]
@@ -102,7 +106,7 @@ async fn to_master() {
     let failed = ToMaster::Failed { frame: FrameId(5), reason: "no".into() };
     golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;
     golden(ToMaster::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
-    golden(ToMaster::Goodbye { reason: String::new() }, &[&[0, 0, 0, 0, 0x33, 0, 0, 0]]).await;
+    golden(ToMaster::Goodbye { reason: "x".into() }, &[&[1, 0, 0, 0, 0x33, 0, 0, 0], b"x"]).await;
 }
 
 #[tokio::test]

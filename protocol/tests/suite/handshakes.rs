@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use rayfarm_protocol::handshake::{as_master, as_worker};
+use rayfarm_protocol::handshake::{Refusal, as_master, as_worker};
 use rayfarm_protocol::{Hello, PROTOCOL_VERSION, ProtocolError, Role, ToMaster, ToWorker, Welcome, session};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
@@ -10,7 +10,7 @@ fn hello() -> Hello {
     Hello { name: "attic".into(), threads: 4, simd: "baseline".into(), software: "0.1.0".into() }
 }
 
-fn take(_: &Hello) -> Result<Welcome, String> {
+fn take(_: &Hello) -> Result<Welcome, Refusal> {
     Ok(Welcome { worker: 12 })
 }
 
@@ -94,13 +94,25 @@ async fn two_masters_or_two_workers_are_named() {
 #[tokio::test]
 async fn a_refusal_brings_its_reason() {
     let (mut master, mut worker) = duplex(64);
-    let refuse = |_: &Hello| Err("the farm is full\x1b[2J".to_owned());
+    let refuse = |_: &Hello| Err("the farm is full\x1b[2J".into());
     let hello = hello();
     let (met, welcome) = tokio::join!(as_master(&mut master, refuse), as_worker(&mut worker, &hello));
     assert!(matches!(met, Err(ProtocolError::Refused { .. })));
     let error = welcome.unwrap_err();
     assert!(error.is_final());
-    assert_eq!(error.to_string(), "refused by the master: the farm is full\u{fffd}[2J");
+    assert_eq!(error.to_string(), "refused by the master: the farm is full\\u{1b}[2J");
+}
+
+#[tokio::test]
+async fn a_refusal_for_now_is_not_final() {
+    let (mut master, mut worker) = duplex(64);
+    let refuse = |_: &Hello| Err(Refusal::NotNow("the master ends\x1b[2J".to_owned()));
+    let hello = hello();
+    let (met, welcome) = tokio::join!(as_master(&mut master, refuse), as_worker(&mut worker, &hello));
+    assert!(matches!(met, Err(ProtocolError::NotNow { .. })));
+    let error = welcome.unwrap_err();
+    assert!(!error.is_final());
+    assert_eq!(error.to_string(), "the master does not take workers now: the master ends\\u{1b}[2J");
 }
 
 #[tokio::test]
@@ -190,7 +202,7 @@ async fn absurd_hellos_are_refused_and_long_names_cut_by_honest_workers() {
     let long = Hello { name: "\n".repeat(9000), ..hello() };
     let (met, welcome) = tokio::join!(as_master(&mut master, take), as_worker(&mut worker, &long));
     welcome.unwrap();
-    assert_eq!(met.unwrap().name, "\u{fffd}".repeat(255));
+    assert_eq!(met.unwrap().name, "\\n".repeat(126) + "…");
 }
 
 #[tokio::test(start_paused = true)]

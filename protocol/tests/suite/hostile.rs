@@ -170,8 +170,8 @@ fn bodies_that_break_a_rule_are_refused_with_the_rule() {
     chunk[32..40].copy_from_slice(&u64::MAX.to_le_bytes());
     assert!(malformed(Kind::AssetChunk, &chunk).contains("beyond the end of any asset"));
 
-    let master_goodbye = ToWorker::from_body(Kind::Goodbye, Bytes::from_static(&[2])).unwrap_err();
-    assert!(master_goodbye.to_string().contains("2 is neither yes nor no"), "{master_goodbye}");
+    let master_goodbye = ToWorker::from_body(Kind::Goodbye, Bytes::from_static(&[3])).unwrap_err();
+    assert!(master_goodbye.to_string().contains("3 does not say when to connect again"), "{master_goodbye}");
 
     let mut pixels = vec![0; 88];
     assert!(malformed(Kind::Pixels, &pixels).contains("no run of rows"));

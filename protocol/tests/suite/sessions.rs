@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{Receiver, SendError, Sender, TrySendError, spawn};
-use rayfarm_protocol::{AssetId, FrameId, ProtocolError, ToMaster, ToWorker, limits};
+use rayfarm_protocol::{AssetId, FrameId, ProtocolError, Reconnect, ToMaster, ToWorker, limits};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
 use crate::common::{lease, pixels, wire};
@@ -49,7 +49,7 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     }
     tokio::task::yield_now().await;
     out.send(ToWorker::Cancel { before: FrameId(9) }).await.unwrap();
-    out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never }).await.unwrap();
 
     let (_out, mut received, _) = spawn::<_, ToMaster, ToWorker>(theirs);
     let mut order = Vec::new();
@@ -60,7 +60,7 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     assert_eq!(at(&ToWorker::Ping { nonce: 1 }), 0);
     assert!(at(&ToWorker::Cancel { before: FrameId(9) }) < at(&chunk(1000, 20_000)));
     assert!(at(&chunk(1000, 20_000)) < at(&chunk(2000, 20_000)));
-    assert_eq!(order.last(), Some(&ToWorker::Goodbye { reason: "done".into(), again: false }));
+    assert_eq!(order.last(), Some(&ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never }));
     assert_eq!(order.len(), 7);
 }
 
@@ -76,10 +76,10 @@ async fn a_goodbye_is_flushed_and_closes() {
     );
     assert!(master_in.recv().await.is_none());
     // The other direction is open for a moment: the master can answer, and close.
-    master_out.send(ToWorker::Goodbye { reason: "bye".into(), again: false }).await.unwrap();
+    master_out.send(ToWorker::Goodbye { reason: "bye".into(), reconnect: Reconnect::Never }).await.unwrap();
     assert_eq!(
         worker_in.recv().await.unwrap().unwrap(),
-        ToWorker::Goodbye { reason: "bye".into(), again: false }
+        ToWorker::Goodbye { reason: "bye".into(), reconnect: Reconnect::Never }
     );
     assert!(worker_in.recv().await.is_none());
     worker_out.closed().await;
@@ -108,11 +108,11 @@ async fn a_goodbye_survives_though_nobody_reads_what_the_peer_still_sends() {
     let (worker_out, mut worker_in, _) = spawn::<_, ToMaster, ToWorker>(theirs.unwrap().0);
     drop(received);
     let busy = tokio::spawn(async move { while worker_out.send(pixels(1, 100_000)).await.is_ok() {} });
-    out.send(ToWorker::Goodbye { reason: "the end".into(), again: false }).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "the end".into(), reconnect: Reconnect::Never }).await.unwrap();
     out.closed().await;
     // Only now does the worker look: the connection is gone, its last word is not.
     let heard = worker_in.recv().await.unwrap().unwrap();
-    assert_eq!(heard, ToWorker::Goodbye { reason: "the end".into(), again: false });
+    assert_eq!(heard, ToWorker::Goodbye { reason: "the end".into(), reconnect: Reconnect::Never });
     drop(worker_in);
     busy.await.unwrap();
 }
@@ -224,14 +224,14 @@ async fn the_last_word_is_heard_though_the_writer_has_failed() {
     let (ours, mut theirs) = duplex(1 << 16);
     let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
     theirs
-        .write_all(&wire(&ToWorker::Goodbye { reason: "kicked".into(), again: false }).await)
+        .write_all(&wire(&ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }).await)
         .await
         .unwrap();
     drop(theirs);
     let _ = out.send(ToMaster::Drain).await;
     assert_eq!(
         received.recv().await.unwrap().unwrap(),
-        ToWorker::Goodbye { reason: "kicked".into(), again: false }
+        ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }
     );
 }
 
@@ -262,7 +262,7 @@ async fn traffic_counts_whole_envelopes() {
     let mut b = b;
     out.send(ToWorker::Ping { nonce: 1 }).await.unwrap();
     out.send(chunk(0, 1000)).await.unwrap();
-    out.send(ToWorker::Goodbye { reason: "end".into(), again: false }).await.unwrap();
+    out.send(ToWorker::Goodbye { reason: "end".into(), reconnect: Reconnect::Never }).await.unwrap();
     let mut all = Vec::new();
     b.read_to_end(&mut all).await.unwrap();
     assert_eq!(traffic.sent_bytes(), all.len() as u64);

@@ -9,7 +9,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::session::{Receiver, Sender, spawn};
-use rayfarm_protocol::{AssetId, FrameId, ToMaster, ToWorker};
+use rayfarm_protocol::{AssetId, FrameId, Reconnect, ToMaster, ToWorker};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, ReadHalf, WriteHalf, duplex, split};
 use tokio::time::{sleep, timeout};
 
@@ -177,7 +177,7 @@ async fn play(seed: u64) {
     let count = 1 + random.below(30);
     let down: Vec<_> = (0..count).map(|n| to_worker(&mut random, n)).collect();
     let up: Vec<_> = (0..count).map(|n| to_master(&mut random, n)).collect();
-    let farewell = ToWorker::Goodbye { reason: "enough".into(), again: false };
+    let farewell = ToWorker::Goodbye { reason: "enough".into(), reconnect: Reconnect::Never };
     let answer = ToMaster::Goodbye { reason: "likewise".into() };
 
     // Who has said goodbye does not listen for long. Where nothing closes, all is to arrive, so goodbye comes afterwards.
