@@ -95,7 +95,8 @@ say "building"
 options=()
 
 # bench NAME ARGUMENT...: one of the benchmarks in tracer/benches.
-bench() { (cd "$root" && cargo bench --quiet "${options[@]}" --package rayfarm-tracer --bench "$1" -- "${@:2}"); }
+# With names and lines, which callgrind and perf need and programs to copy do not have.
+bench() { (cd "$root" && cargo bench --quiet --profile profiling "${options[@]}" --package rayfarm-tracer --bench "$1" -- "${@:2}"); }
 
 export CRITERION_HOME=$work/criterion
 say "whole frames"
@@ -104,6 +105,9 @@ say "stages"
 bench stages --frames "$stage_frames" "${scenes[@]}" >"$work/stages.tsv"
 say "features"
 bench features "${criterion[@]}" >&2
+
+say "trees over patterns"
+bench builds >&2 || say "a pattern takes too long, or the machine is busy"
 
 if [ "$instructions" = yes ]; then
     say "instructions: some minutes"

@@ -29,7 +29,7 @@ pub(crate) fn mesh(steps: u32, centers: &[DVec3]) -> Mesh {
         }
     }
     mesh.triangle_materials = vec![0; mesh.triangles.len()];
-    mesh.materials = vec![NamedMaterial { name: "skin".into(), material: Material::NEUTRAL, texture: None }];
+    mesh.materials = vec![NamedMaterial::plain("skin", Material::NEUTRAL)];
     mesh
 }
 

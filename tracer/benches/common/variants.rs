@@ -88,7 +88,7 @@ pub(crate) const VARIANTS: [Variant; 17] = [
 ];
 
 const MATERIAL: Material =
-    Material { diffuse: Vec3::new(0.7, 0.6, 0.45), specular: Vec3::ZERO, exponent: 1.0, texture: None };
+    Material { diffuse: Vec3::new(0.7, 0.6, 0.45), specular: Vec3::ZERO, exponent: 1.0, ..Material::NEUTRAL };
 
 const LIGHT: Light = Light {
     kind: LightKind::Point { position: DVec3::ZERO },
@@ -163,7 +163,7 @@ impl Setting {
         }
         match Texture::new(&picture) {
             Ok(texture) => {
-                self.scene.textures.push(TextureMap { texture: texture.id(), filter });
+                self.scene.textures.push(TextureMap::new(texture.id(), filter));
                 self.textures.push(Arc::new(texture));
             }
             Err(error) => stop(&error),
@@ -198,7 +198,14 @@ impl Setting {
         };
         self.scene.models = places.iter().map(model).collect();
         let warnings = vec![];
-        compile(LoadedScene { scene: self.scene, meshes: vec![mesh], textures: self.textures, warnings })
+        let mesh_files = Vec::new();
+        compile(LoadedScene {
+            scene: self.scene,
+            meshes: vec![mesh],
+            mesh_files,
+            textures: self.textures,
+            warnings,
+        })
     }
 }
 

@@ -1,15 +1,15 @@
-//! Builds trees with `obvhs` (PLOC with reinsertion: Meister and Bittner 2018 and 2017), and lays them out depth first.
-
-use std::time::Duration;
+//! Builds trees: clusters of boxes (`cluster.rs`), whose nodes move to better places (`reinsert.rs`), laid out depth first.
 
 use glam::Vec3;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
-use obvhs::{Boundable, BvhBuildParams};
+use obvhs::bvh2::Bvh2;
 
+use super::cluster::Clustering;
+use super::divide::Bounds;
 use super::fill::fill;
-use super::wide::{WideTree, widen};
+use super::reinsert::improve;
+use super::wide::{WideTree, widen, widen_evenly};
 use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
+use crate::cancel::{Cancelled, IsCancelled, go_on};
 
 /// A tree, and the order that it wants its primitives in.
 #[derive(Clone, Debug)]
@@ -34,16 +34,23 @@ pub enum BuildQuality {
     High,
 }
 
+/// What a builder does for a quality.
+pub(super) struct Effort {
+    pub clustering: Clustering,
+    /// Shares of the nodes: see [`improve`].
+    pub reinsertion: &'static [f32],
+}
+
 impl BuildQuality {
-    /// Leaves stay single: [`super::widen`] puts them together as it needs them.
-    fn params(self) -> BvhBuildParams {
-        let preset = match self {
-            BuildQuality::Fast => BvhBuildParams::very_fast_build(),
-            BuildQuality::Default => BvhBuildParams::medium_build(),
-            BuildQuality::High => BvhBuildParams::very_slow_build(),
+    pub(super) fn effort(self) -> Effort {
+        let (clustering, reinsertion): (_, &[f32]) = match self {
+            BuildQuality::Fast => (Clustering { reach: 1, short_rounds: 0, fine_order: false }, &[0.01]),
+            BuildQuality::Default => {
+                (Clustering { reach: 14, short_rounds: 3, fine_order: false }, &[0.05, 0.1])
+            }
+            BuildQuality::High => (Clustering { reach: 14, short_rounds: 1, fine_order: true }, &[1.0, 1.0]),
         };
-        // A split triangle would stand in two leaves.
-        BvhBuildParams { max_prims_per_leaf: 1, pre_split: false, ..preset }
+        Effort { clustering, reinsertion }
     }
 }
 
@@ -52,40 +59,40 @@ const MEDIAN_LEAF: usize = 4;
 
 /// Builds a tree over boxes (least and greatest corner; finite, within 1e15). No boxes: a root with nothing in it.
 ///
-/// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (many boxes in one place),
+/// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (boxes that double in size),
 /// the tree is built by the median instead, whose depth is logarithmic whatever the boxes are.
-pub(super) fn build(boxes: &[(Vec3, Vec3)], quality: BuildQuality) -> Tree {
-    let primitives = primitives_of(boxes);
-    if primitives.is_empty() {
-        return Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 };
+pub(super) fn build(
+    boxes: &[Bounds],
+    quality: BuildQuality,
+    cancelled: &IsCancelled<'_>,
+) -> Result<Tree, Cancelled> {
+    if boxes.is_empty() {
+        return Ok(Tree { nodes: vec![Node::EMPTY], order: Vec::new(), depth: 1 });
     }
-    let source = build_bvh2(&primitives, quality.params(), &mut Duration::default());
-    lay_out(&source).unwrap_or_else(|| median(&primitives))
+    let Effort { clustering, reinsertion } = quality.effort();
+    let (mut source, _) = clustering.of(boxes, cancelled)?;
+    improve(&mut source, reinsertion, cancelled)?;
+    go_on(cancelled)?;
+    Ok(lay_out(&source).unwrap_or_else(|| median(boxes)))
 }
 
 /// Builds a tree of sixteen children a node, and at most `leaf` primitives a leaf, most of them full. Where it ends deeper
 /// than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
-pub(crate) fn build_wide(boxes: &[(Vec3, Vec3)], leaf: usize, quality: BuildQuality) -> WideTree {
-    let tree = build(boxes, quality);
+///
+/// # Errors
+/// [`Cancelled`]: the question is asked between the steps, each a fraction of the whole.
+pub(crate) fn build_wide(
+    boxes: &[Bounds],
+    leaf: usize,
+    quality: BuildQuality,
+    cancelled: &IsCancelled<'_>,
+) -> Result<WideTree, Cancelled> {
+    let tree = build(boxes, quality, cancelled)?;
     // Single primitives fill their leaves anyway.
-    let tree = if leaf > 1 { fill(&tree, boxes, leaf) } else { tree };
+    let tree = if leaf > 1 { fill(&tree, boxes, leaf, cancelled)? } else { tree };
+    go_on(cancelled)?;
     let wide = widen(&tree, leaf);
-    if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen(&median(&primitives_of(boxes)), leaf) }
-}
-
-fn primitives_of(boxes: &[(Vec3, Vec3)]) -> Vec<Primitive> {
-    boxes.iter().map(|&(lo, hi)| Primitive { lo, hi }).collect()
-}
-
-struct Primitive {
-    lo: Vec3,
-    hi: Vec3,
-}
-
-impl Boundable for Primitive {
-    fn aabb(&self) -> Aabb {
-        Aabb { min: self.lo.into(), max: self.hi.into() }
-    }
+    Ok(if wide.depth as usize <= MAX_WIDE_DEPTH { wide } else { widen_evenly(&median(boxes), leaf) })
 }
 
 impl Tree {
@@ -150,24 +157,24 @@ fn leaf_of(source: &Bvh2, index: u32) -> impl Iterator<Item = u32> {
     source.primitive_indices[first..first + node.prim_count as usize].iter().copied()
 }
 
-/// Halves the primitives by the median of their centres along the widest axis, until few are left.
-fn median(primitives: &[Primitive]) -> Tree {
-    let mut tree = Tree::new(primitives.len());
-    let mut indices: Vec<u32> = (0..primitives.len() as u32).collect();
+/// Halves the boxes by the median of their centres along the widest axis, until few are left.
+fn median(boxes: &[Bounds]) -> Tree {
+    let mut tree = Tree::new(boxes.len());
+    let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
     tree.nodes.push(Node::EMPTY);
     if indices.len() <= MEDIAN_LEAF {
-        let bounds = bounds_of(primitives, &indices);
+        let bounds = bounds_of(boxes, &indices);
         let leaf = tree.leaf(indices);
         tree.nodes[0].set(0, bounds, leaf);
     } else {
-        split(primitives, &mut indices, &mut tree, 0, 1);
+        split(boxes, &mut indices, &mut tree, 0, 1);
     }
     tree
 }
 
-fn split(primitives: &[Primitive], indices: &mut [u32], tree: &mut Tree, own: usize, depth: u32) {
+fn split(boxes: &[Bounds], indices: &mut [u32], tree: &mut Tree, own: usize, depth: u32) {
     tree.depth = tree.depth.max(depth);
-    let center = |i: u32| primitives[i as usize].lo + primitives[i as usize].hi;
+    let center = |i: u32| boxes[i as usize].0 + boxes[i as usize].1;
     let (lo, hi) = indices
         .iter()
         .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &i| (lo.min(center(i)), hi.max(center(i))));
@@ -180,7 +187,7 @@ fn split(primitives: &[Primitive], indices: &mut [u32], tree: &mut Tree, own: us
     });
     let (left, right) = indices.split_at_mut(middle);
     for (side, half) in [left, right].into_iter().enumerate() {
-        let bounds = bounds_of(primitives, half);
+        let bounds = bounds_of(boxes, half);
         if half.len() <= MEDIAN_LEAF {
             let leaf = tree.leaf(half.iter().copied());
             tree.nodes[own].set(side, bounds, leaf);
@@ -188,20 +195,21 @@ fn split(primitives: &[Primitive], indices: &mut [u32], tree: &mut Tree, own: us
             let node = tree.nodes.len();
             tree.nodes.push(Node::EMPTY);
             tree.nodes[own].set(side, bounds, Child::Inner(node as u32));
-            split(primitives, half, tree, node, depth + 1);
+            split(boxes, half, tree, node, depth + 1);
         }
     }
 }
 
-fn bounds_of(primitives: &[Primitive], indices: &[u32]) -> (Vec3, Vec3) {
+fn bounds_of(boxes: &[Bounds], indices: &[u32]) -> Bounds {
     indices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), &i| {
-        (lo.min(primitives[i as usize].lo), hi.max(primitives[i as usize].hi))
+        (lo.min(boxes[i as usize].0), hi.max(boxes[i as usize].1))
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cancel::never;
 
     fn grid(n: usize) -> Vec<(Vec3, Vec3)> {
         (0..n)
@@ -247,28 +255,26 @@ mod tests {
     #[test]
     fn every_primitive_stands_in_one_leaf() {
         for count in [1, 2, 3, 5, 100, 5000] {
-            check(&build(&grid(count), BuildQuality::Default), count);
+            check(&build(&grid(count), BuildQuality::Default, &never).unwrap(), count);
         }
     }
 
     #[test]
     fn twenty_thousand_boxes_in_one_place_stay_shallow() {
-        let tree = build(&[(Vec3::ZERO, Vec3::ONE); 20_000], BuildQuality::Default);
+        let tree = build(&[(Vec3::ZERO, Vec3::ONE); 20_000], BuildQuality::Default, &never).unwrap();
         check(&tree, 20_000);
         assert!(tree.depth as usize <= MAX_DEPTH, "depth {}", tree.depth);
     }
 
     #[test]
     fn the_median_build_is_logarithmic_and_valid() {
-        let primitives: Vec<Primitive> =
-            grid(3000).into_iter().map(|(lo, hi)| Primitive { lo, hi }).collect();
-        let tree = median(&primitives);
+        let tree = median(&grid(3000));
         check(&tree, 3000);
         assert!(tree.depth <= 12, "depth {}", tree.depth);
     }
 
     #[test]
     fn no_boxes_make_an_empty_root() {
-        assert_eq!(build(&[], BuildQuality::Default).nodes, [Node::EMPTY]);
+        assert_eq!(build(&[], BuildQuality::Default, &never).unwrap().nodes, [Node::EMPTY]);
     }
 }

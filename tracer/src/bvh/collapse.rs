@@ -89,14 +89,14 @@ impl<'a> Collapse<'a> {
     }
 
     /// Calls `emit(node, side)` for each of the best children of a node that is no leaf: what hangs there becomes a child.
-    pub(super) fn children(&self, node: u32, emit: &mut impl FnMut(u32, usize)) {
+    pub(super) fn children(&self, node: u32, emit: &mut dyn FnMut(u32, usize)) {
         let left = self.of(Child::Inner(node)).map_or(1, |best| usize::from(best.own));
         self.cut(node, 0, left, emit);
         self.cut(node, 1, WIDTH - left, emit);
     }
 
     /// What hangs on one side, as at most `count` children. Recursion is at most as deep as there are children.
-    fn cut(&self, node: u32, side: usize, mut count: usize, emit: &mut impl FnMut(u32, usize)) {
+    fn cut(&self, node: u32, side: usize, mut count: usize, emit: &mut dyn FnMut(u32, usize)) {
         let child = self.tree.nodes[node as usize].child(side);
         if let (Some(best), Child::Inner(inner)) = (self.of(child), child) {
             while count > 1 && best.left[count - 1] == 0 {

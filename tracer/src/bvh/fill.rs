@@ -13,6 +13,7 @@ use super::build::Tree;
 use super::divide::{Bounds, Division, Price};
 use super::wide::{WIDTH, primitives_below, subtree_sizes};
 use super::{Child, Node};
+use crate::cancel::{Cancelled, IsCancelled, go_on};
 
 /// Subtrees of up to this many primitives are divided anew: three full levels. More gained nothing.
 const LARGEST: usize = WIDTH * WIDTH * WIDTH;
@@ -20,20 +21,29 @@ const LARGEST: usize = WIDTH * WIDTH * WIDTH;
 /// The same tree with its bottom divided anew where that is better, into leaves of at most `leaf` primitives, most of them full.
 ///
 /// O(n log n), on all threads.
-pub(super) fn fill(tree: &Tree, boxes: &[Bounds], leaf: usize) -> Tree {
+///
+/// # Errors
+/// [`Cancelled`]: the question is asked before each subtree.
+pub(super) fn fill(
+    tree: &Tree,
+    boxes: &[Bounds],
+    leaf: usize,
+    cancelled: &IsCancelled<'_>,
+) -> Result<Tree, Cancelled> {
     let price = Price::within(tree.nodes[0].bounds());
     let filling = Filling { tree, sizes: subtree_sizes(&tree.nodes), boxes, leaf, price };
     let root = Child::Inner(0);
     if filling.size(root) <= LARGEST {
-        return filling.bottom(root, LARGEST);
+        return Ok(filling.bottom(root, LARGEST));
     }
     let kept: Vec<u32> =
         (0..tree.nodes.len() as u32).filter(|&i| filling.size(Child::Inner(i)) > LARGEST).collect();
     let children = kept.iter().flat_map(|&node| [0, 1].map(|side| tree.nodes[node as usize].child(side)));
     let small: Vec<Child> =
         children.filter(|&child| child != Child::Empty && filling.size(child) <= LARGEST).collect();
-    let bottoms: Vec<Tree> = small.par_iter().map(|&child| filling.bottom(child, LARGEST)).collect();
-    filling.join(&kept, bottoms)
+    let bottom = |&child: &Child| go_on(cancelled).map(|()| filling.bottom(child, LARGEST));
+    let bottoms = small.par_iter().map(bottom).collect::<Result<Vec<Tree>, Cancelled>>()?;
+    Ok(filling.join(&kept, bottoms))
 }
 
 /// A tree whose bottom is being filled.
@@ -163,6 +173,7 @@ mod tests {
     use super::super::BuildQuality;
     use super::super::build::build;
     use super::*;
+    use crate::cancel::never;
 
     /// Boxes on a bent sheet, as triangles of a mesh stand.
     fn sheet(count: usize) -> Vec<Bounds> {
@@ -207,11 +218,16 @@ mod tests {
         leaves
     }
 
+    fn filled(boxes: &[Bounds]) -> Tree {
+        let tree = build(boxes, BuildQuality::Default, &never).unwrap();
+        fill(&tree, boxes, 16, &never).unwrap()
+    }
+
     #[test]
     fn leaves_are_full() {
         for count in [1, 16, 17, 300, 4_096, 4_097, 30_000] {
             let boxes = sheet(count);
-            let filled = fill(&build(&boxes, BuildQuality::Default), &boxes, 16);
+            let filled = filled(&boxes);
             let leaves = leaves_of(&filled, &boxes, 16);
             // Subtrees of fewer than a thousand are few, and each has one leaf that is not full.
             assert!(leaves as f64 <= (count as f64 / 15.5).ceil(), "{leaves} leaves for {count}");
@@ -221,7 +237,7 @@ mod tests {
     #[test]
     fn boxes_in_one_place_are_divided_all_the_same() {
         let boxes = vec![(Vec3::ZERO, Vec3::ONE); 5_000];
-        let filled = fill(&build(&boxes, BuildQuality::Default), &boxes, 16);
+        let filled = filled(&boxes);
         leaves_of(&filled, &boxes, 16);
     }
 }

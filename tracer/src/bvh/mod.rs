@@ -1,13 +1,17 @@
-//! Bounding volume hierarchies: built by `obvhs`, kept in an own layout, walked by an own traversal.
+//! Bounding volume hierarchies: built bottom up and improved by `obvhs`, kept in an own layout, walked by an own traversal.
 //!
 //! Binary trees are widened, over the items of a scene (those never travel) as over the triangles of a mesh, so that one vector
 //! operation looks at sixteen boxes.
 
 mod build;
+mod cluster;
 mod collapse;
 mod divide;
 mod fill;
 mod node;
+#[cfg(test)]
+mod patterns;
+mod reinsert;
 mod wide;
 
 pub use build::BuildQuality;

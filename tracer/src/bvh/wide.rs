@@ -139,15 +139,52 @@ impl WideTree {
     }
 }
 
-/// Widens a binary tree. Subtrees with no more than `leaf` primitives become leaves, and so do leaves with more.
+/// Widens a binary tree so that a ray meets as few nodes as possible. Subtrees with no more than `leaf` primitives become
+/// leaves, and so do leaves with more.
 pub(crate) fn widen(tree: &Tree, leaf: usize) -> WideTree {
     let sizes = subtree_sizes(&tree.nodes);
     let collapse = Collapse::new(tree, |node| sizes[node as usize] as usize <= leaf);
+    widen_by(tree, leaf, &sizes, |node, emit| collapse.children(node, emit))
+}
+
+/// Widens a binary tree so that it is as shallow as possible: four of its levels become one.
+pub(crate) fn widen_evenly(tree: &Tree, leaf: usize) -> WideTree {
+    let sizes = subtree_sizes(&tree.nodes);
+    let is_inner = |node: u32| sizes[node as usize] as usize > leaf;
+    widen_by(tree, leaf, &sizes, |node, emit| grandchildren(tree, node, WIDTH.ilog2(), &is_inner, emit))
+}
+
+/// Calls `emit(node, side)` for the nodes that number of levels below a node, or ends sooner.
+fn grandchildren(
+    tree: &Tree,
+    node: u32,
+    levels: u32,
+    is_inner: &impl Fn(u32) -> bool,
+    emit: &mut dyn FnMut(u32, usize),
+) {
+    for side in 0..2 {
+        match tree.nodes[node as usize].child(side) {
+            Child::Empty => {}
+            Child::Inner(inner) if levels > 1 && is_inner(inner) => {
+                grandchildren(tree, inner, levels - 1, is_inner, emit);
+            }
+            _ => emit(node, side),
+        }
+    }
+}
+
+/// Widens a binary tree. `children` calls its second argument with the parent and the side of each child of a wide node.
+fn widen_by(
+    tree: &Tree,
+    leaf: usize,
+    sizes: &[u32],
+    children: impl Fn(u32, &mut dyn FnMut(u32, usize)),
+) -> WideTree {
     let mut wide = WideTree { nodes: vec![WideNode::zeroed()], blocks: Vec::new(), depth: 1 };
     let mut pending = vec![(0_u32, 0_u32, 1_u32)];
     while let Some((own, source, depth)) = pending.pop() {
         wide.depth = wide.depth.max(depth);
-        collapse.children(source, &mut |parent, side| {
+        children(source, &mut |parent, side| {
             let node = &tree.nodes[parent as usize];
             let child = node.child(side);
             let link = match child {

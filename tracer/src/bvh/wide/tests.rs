@@ -1,5 +1,6 @@
 use super::super::{BuildQuality, build_wide};
 use super::*;
+use crate::cancel::never;
 
 fn boxes(n: usize) -> Vec<(Vec3, Vec3)> {
     (0..n)
@@ -21,7 +22,7 @@ fn node(children: &[u32]) -> WideNode {
 fn every_primitive_stands_in_one_block_inside_the_boxes_above() {
     for count in [1, 2, 16, 17, 300, 5000] {
         let all = boxes(count);
-        let tree = build_wide(&all, WIDTH, BuildQuality::Default);
+        let tree = build_wide(&all, WIDTH, BuildQuality::Default, &never).unwrap();
         assert_eq!(validate_wide(&tree.nodes, tree.blocks.len() as u32).unwrap(), tree.depth);
         let mut seen: Vec<u32> = tree.blocks.iter().flatten().copied().collect();
         seen.sort_unstable();
@@ -34,7 +35,7 @@ fn every_primitive_stands_in_one_block_inside_the_boxes_above() {
 
 #[test]
 fn nodes_are_well_filled() {
-    let tree = build_wide(&boxes(20_000), WIDTH, BuildQuality::Default);
+    let tree = build_wide(&boxes(20_000), WIDTH, BuildQuality::Default, &never).unwrap();
     let children: u32 = tree.nodes.iter().map(|node| node.count).sum();
     let mean = f64::from(children) / tree.nodes.len() as f64;
     assert!(mean > 10.0, "{mean} children a node");
@@ -42,7 +43,7 @@ fn nodes_are_well_filled() {
 
 #[test]
 fn two_thousand_boxes_in_one_place_stay_shallow() {
-    let tree = build_wide(&[(Vec3::ZERO, Vec3::ONE); 2_000], WIDTH, BuildQuality::Default);
+    let tree = build_wide(&[(Vec3::ZERO, Vec3::ONE); 2_000], WIDTH, BuildQuality::Default, &never).unwrap();
     assert!(tree.depth as usize <= MAX_WIDE_DEPTH, "depth {}", tree.depth);
 }
 
