@@ -2,7 +2,8 @@
 //!
 //! A texture is one immutable blob of bytes, named by its BLAKE3 hash, as compiled meshes are: made on the master from a
 //! picture, sent to every worker as it is. Sixteen bytes of header (magic, version, width, height, little endian), then
-//! three sRGB bytes a texel, rows from bottom to top: that is how v counts.
+//! three sRGB bytes a texel, rows from bottom to top: that is how v counts. Version 2 goes on with a byte of alpha a texel;
+//! only pictures that are transparent somewhere have it.
 
 use std::fmt;
 
@@ -15,8 +16,14 @@ use crate::image::{MAX_SIDE, RgbImage};
 /// First bytes of a texture.
 pub const MAGIC: [u8; 6] = *b"RFTEXM";
 
-/// Version of the layout of textures.
+/// Version of the layout of opaque textures.
 pub const FORMAT_VERSION: u16 = 1;
+
+/// Version of the layout of textures with alpha.
+const WITH_ALPHA: u16 = 2;
+
+/// The least alpha that is seen: what is below one half is cut out.
+pub(crate) const LEAST_ALPHA: u8 = 128;
 
 /// Most texels of one texture: 8192 x 8192, 192 MiB.
 pub const MAX_TEXELS: u64 = 1 << 26;
@@ -94,12 +101,17 @@ impl Header {
             return format(format!("{} bytes are too few for a header", bytes.len()));
         };
         let header: Header = bytemuck::pod_read_unaligned(fixed);
-        if header.version != FORMAT_VERSION {
-            let version = header.version;
-            return format(format!("it has format version {version}, this program reads {FORMAT_VERSION}"));
-        }
+        let bytes_a_texel = match header.version {
+            FORMAT_VERSION => 3,
+            WITH_ALPHA => 4,
+            version => {
+                let known = format!("this program reads {FORMAT_VERSION} and {WITH_ALPHA}");
+                return format(format!("it has format version {version}, {known}"));
+            }
+        };
         check_size(header.width, header.height)?;
-        let needed = HEADER_BYTES as u64 + 3 * u64::from(header.width) * u64::from(header.height);
+        let texels = u64::from(header.width) * u64::from(header.height);
+        let needed = HEADER_BYTES as u64 + bytes_a_texel * texels;
         if bytes.len() as u64 != needed {
             return format(format!("its header announces {needed} bytes, there are {}", bytes.len()));
         }
@@ -117,11 +129,13 @@ pub(crate) fn check_size(width: u32, height: u32) -> Result<(), TextureError> {
     if too_large { Err(TextureError::TooLarge { width, height }) } else { Ok(()) }
 }
 
-/// A picture for surfaces. It repeats without end in both directions.
+/// A picture for surfaces.
 pub struct Texture {
     bytes: Vec<u8>,
     width: u32,
     height: u32,
+    /// Where the alpha begins in `bytes`, if there is any.
+    alpha: Option<usize>,
     id: TextureId,
 }
 
@@ -137,12 +151,31 @@ impl Texture {
     /// # Errors
     /// A picture that is empty or too large.
     pub fn new(picture: &RgbImage) -> Result<Self, TextureError> {
+        Self::laid_out(FORMAT_VERSION, picture, &[])
+    }
+
+    /// Makes a texture of a picture with a byte of alpha a pixel. Where nothing would be cut out it is the same as without.
+    ///
+    /// # Errors
+    /// As [`Texture::new`].
+    pub fn with_alpha(picture: &RgbImage, alpha: &[u8]) -> Result<Self, TextureError> {
+        let complete = alpha.len() as u64 == u64::from(picture.width) * u64::from(picture.height);
+        if !complete || alpha.iter().all(|&alpha| alpha >= LEAST_ALPHA) {
+            return Self::new(picture);
+        }
+        check_size(picture.width, picture.height)?;
+        Self::laid_out(WITH_ALPHA, &bleed(picture, alpha), alpha)
+    }
+
+    fn laid_out(version: u16, picture: &RgbImage, alpha: &[u8]) -> Result<Self, TextureError> {
         let RgbImage { width, height, ref pixels } = *picture;
         check_size(width, height)?;
-        let header = Header { magic: MAGIC, version: FORMAT_VERSION, width, height };
-        let mut bytes = Vec::with_capacity(HEADER_BYTES + pixels.len());
+        let header = Header { magic: MAGIC, version, width, height };
+        let mut bytes = Vec::with_capacity(HEADER_BYTES + pixels.len() + alpha.len());
         bytes.extend_from_slice(bytemuck::bytes_of(&header));
-        for row in pixels.chunks_exact(width as usize * 3).rev() {
+        for row in
+            pixels.chunks_exact(width as usize * 3).rev().chain(alpha.chunks_exact(width as usize).rev())
+        {
             bytes.extend_from_slice(row);
         }
         Self::from_vec(bytes)
@@ -159,9 +192,10 @@ impl Texture {
     }
 
     fn from_vec(bytes: Vec<u8>) -> Result<Self, TextureError> {
-        let Header { width, height, .. } = Header::read(&bytes)?;
+        let Header { width, height, version, .. } = Header::read(&bytes)?;
         let id = TextureId(*blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes());
-        Ok(Self { bytes, width, height, id })
+        let alpha = HEADER_BYTES + 3 * width as usize * height as usize;
+        Ok(Self { bytes, width, height, alpha: (version == WITH_ALPHA).then_some(alpha), id })
     }
 
     /// The bytes, as they are sent.
@@ -194,20 +228,68 @@ impl Texture {
             _ => [0; 3],
         }
     }
+
+    /// Whether some of it is transparent.
+    pub fn has_alpha(&self) -> bool {
+        self.alpha.is_some()
+    }
+
+    /// The alpha of the texel in column `x`, from the left, of row `y`, from the bottom; opaque outside, and where there is
+    /// no alpha.
+    pub(crate) fn alpha(&self, x: u32, y: u32) -> u8 {
+        let at = |first| first + y as usize * self.width as usize + x as usize;
+        self.alpha.and_then(|first| self.bytes.get(at(first))).copied().unwrap_or(u8::MAX)
+    }
+}
+
+/// The picture with colours for pixels that are wholly transparent: the mean of their neighbours that are not. Programs leave
+/// any colour there, and a filter would mix it into what is seen along the border.
+fn bleed(picture: &RgbImage, alpha: &[u8]) -> RgbImage {
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    let mut bled = picture.clone();
+    for (index, pixel) in bled.pixels.chunks_exact_mut(3).enumerate().filter(|(index, _)| alpha[*index] == 0)
+    {
+        let (x, y) = (index % width, index / width);
+        let (mut sum, mut count) = ([0_u32; 3], 0);
+        for row in [y + height - 1, y, y + 1].map(|row| row % height) {
+            for neighbour in [x + width - 1, x, x + 1].map(|column| row * width + column % width) {
+                let Some(&[r, g, b]) = picture.pixels.get(3 * neighbour..3 * neighbour + 3) else { continue };
+                if alpha[neighbour] > 0 {
+                    count += 1;
+                    for (sum, channel) in sum.iter_mut().zip([r, g, b]) {
+                        *sum += u32::from(channel);
+                    }
+                }
+            }
+        }
+        for (channel, sum) in pixel.iter_mut().zip(sum) {
+            *channel = (sum + count / 2).checked_div(count).map_or(*channel, |mean| mean as u8);
+        }
+    }
+    bled
 }
 
 /// Texture coordinates of a triangle with whole repeats of the picture taken off, so that the least of each is in [0, 1) and
 /// `f32` keeps its digits; `None` when one is not finite or beyond [`MAX_UV`].
 pub fn without_repeats(uvs: [DVec2; 3]) -> Option<[Vec2; 3]> {
-    let fits = uvs.iter().all(|uv| uv.abs().cmple(DVec2::splat(MAX_UV)).all());
-    let whole = uvs[0].min(uvs[1]).min(uvs[2]).floor();
-    fits.then(|| uvs.map(|uv| (uv - whole).as_vec2()))
+    apart_from_repeats(uvs).map(|(uvs, _)| uvs)
 }
 
-/// Whether a texture coordinate from elsewhere is one that [`without_repeats`] may have made.
+/// As [`without_repeats`], with what was taken off: both together are the coordinates again.
+pub fn apart_from_repeats(uvs: [DVec2; 3]) -> Option<([Vec2; 3], Vec2)> {
+    let whole = uvs[0].min(uvs[1]).min(uvs[2]).floor();
+    are_usable(&uvs).then(|| (uvs.map(|uv| (uv - whole).as_vec2()), whole.as_vec2()))
+}
+
+/// Whether texture coordinates are finite and within [`MAX_UV`].
+pub fn are_usable(uvs: &[DVec2; 3]) -> bool {
+    uvs.iter().all(|uv| uv.abs().cmple(DVec2::splat(MAX_UV)).all())
+}
+
+/// Whether a texture coordinate from elsewhere is one that a loader may have made.
 pub(crate) fn is_usable(uv: Vec2) -> bool {
     // False for NaN.
-    uv.to_array().iter().all(|c| (0.0..=MAX_STORED_UV).contains(c))
+    uv.to_array().iter().all(|c| c.abs() <= MAX_STORED_UV)
 }
 
 #[cfg(test)]
@@ -231,6 +313,31 @@ mod tests {
         assert_eq!(texture.texel(0, 3), [0; 3]);
         let again = Texture::from_bytes(texture.bytes()).unwrap();
         assert_eq!((again.id(), again.width(), again.height()), (texture.id(), 5, 3));
+    }
+
+    #[test]
+    fn alpha_is_kept_where_it_cuts_and_colours_reach_past_the_border() {
+        let picture = picture(4, 3);
+        let mut alpha = vec![255; 12];
+        alpha[5] = LEAST_ALPHA;
+        let opaque = Texture::with_alpha(&picture, &alpha).unwrap();
+        assert!(!opaque.has_alpha() && opaque.id() == Texture::new(&picture).unwrap().id());
+        assert_eq!(opaque.alpha(1, 1), 255);
+        alpha[5] = LEAST_ALPHA - 1;
+        alpha[0] = 0;
+        let cut = Texture::from_bytes(Texture::with_alpha(&picture, &alpha).unwrap().bytes()).unwrap();
+        assert!(cut.has_alpha() && cut.bytes().len() == 16 + 4 * 12);
+        for (x, y) in (0..3).flat_map(|y| (0..4).map(move |x| (x, y))) {
+            assert_eq!(cut.alpha(x, 2 - y), alpha[(4 * y + x) as usize]);
+            let own = picture.pixel(x, y).unwrap();
+            assert_eq!(cut.texel(x, 2 - y) == own, (x, y) != (0, 0), "{x} {y}");
+        }
+        // The mean of the eight around it, across the picture's border.
+        let around = [(3, 2), (0, 2), (1, 2), (3, 0), (1, 0), (3, 1), (0, 1), (1, 1)];
+        let red: u32 = around.iter().map(|&(x, y)| u32::from(picture.pixel(x, y).unwrap()[0])).sum();
+        assert_eq!(u32::from(cut.texel(0, 2)[0]), (red + 4) / 8);
+        assert_eq!(cut.alpha(0, 3), 255);
+        assert!(Texture::from_bytes(&cut.bytes()[..60]).is_err());
     }
 
     #[test]
@@ -268,12 +375,14 @@ mod tests {
             assert_eq!(without_repeats(uvs(whole + 0.125)), Some(near));
         }
         assert!(near.into_iter().all(is_usable));
+        let whole = apart_from_repeats(uvs(-7.875)).unwrap();
+        assert_eq!(whole, (near, Vec2::new(-8.0, -1.0)));
         for odd in [f64::NAN, f64::INFINITY, 1.1e6, -1e300] {
             assert_eq!(without_repeats(uvs(odd)), None);
         }
         let wide = without_repeats([DVec2::splat(-1e6), DVec2::splat(1e6), DVec2::ZERO]).unwrap();
         assert!(wide.into_iter().all(is_usable));
-        assert!(![f32::NAN, -0.1, 1e7].into_iter().any(|c| is_usable(Vec2::new(0.5, c))));
+        assert!(![f32::NAN, f32::INFINITY, -1e7, 1e7].into_iter().any(|c| is_usable(Vec2::new(0.5, c))));
     }
 
     proptest! {

@@ -12,13 +12,17 @@ use std::path::PathBuf;
 
 pub use compare::{Difference, compare};
 pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip};
-pub use load::{load, size};
+pub(crate) use load::ends_early;
+pub use load::{load, load_with_alpha, size};
 pub(crate) use reduced::reduce_colors;
 pub use resize::{Resizer, resize};
 pub use save::{KNOWN_EXTENSIONS, save};
 
 /// Pixels per row, and rows, that a picture has at most.
 pub const MAX_SIDE: u32 = 16_384;
+
+/// Formats of pictures that are read.
+pub const READ_FORMATS: &str = "PNG, JPEG, TGA, BMP, GIF, TIFF, WebP or PPM";
 
 /// A picture as it is shown: three sRGB bytes a pixel, rows from top to bottom.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -127,7 +131,7 @@ pub enum ImageError {
         source: std::io::Error,
     },
     /// The file is no picture, a broken one, or one beyond the limits.
-    #[error("cannot decode {} as PNG, JPEG or PPM of at most {MAX_SIDE} x {MAX_SIDE} pixels: {source}", path.display())]
+    #[error("cannot decode {} as {READ_FORMATS} of at most {MAX_SIDE} x {MAX_SIDE} pixels: {source}", path.display())]
     Decode {
         /// The file asked for.
         path: PathBuf,

@@ -1,16 +1,14 @@
 //! Writing pictures. A file appears whole or not at all: the bytes go to a temporary name in the same folder, which
 //! is renamed when it is complete and removed when it is not.
 
-use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::path::Path;
 
 use ::image::codecs::png::PngEncoder;
 use ::image::{ExtendedColorType, ImageEncoder};
 
 use super::{ImageError, RgbImage};
+use crate::files::Temporary;
 
 /// The extensions that [`save`] knows, for messages.
 pub const KNOWN_EXTENSIONS: &str = ".png, .ppm";
@@ -62,50 +60,10 @@ fn write_ppm(out: &mut impl Write, image: &RgbImage) -> io::Result<()> {
     out.write_all(&image.pixels)
 }
 
-/// A file that is removed unless it is renamed.
-struct Temporary {
-    path: Option<PathBuf>,
-}
-
-impl Temporary {
-    fn create_beside(target: &Path) -> io::Result<(Self, File)> {
-        // The process and a counter make the name unique, so that no two savings share a temporary file.
-        static COUNTER: AtomicU32 = AtomicU32::new(0);
-        loop {
-            let mut name = OsString::from(".");
-            name.push(target.file_name().ok_or(io::ErrorKind::InvalidInput)?);
-            let serial = COUNTER.fetch_add(1, Ordering::Relaxed);
-            name.push(format!(".{}-{serial}.partial", std::process::id()));
-            let path = target.with_file_name(name);
-            match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => return Ok((Self { path: Some(path) }, file)),
-                // Left by a process that was killed and had our number: in containers numbers come again soon.
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && serial < u32::MAX => {}
-                Err(error) => return Err(error),
-            }
-        }
-    }
-
-    fn rename_to(mut self, target: &Path) -> io::Result<()> {
-        if let Some(path) = &self.path {
-            fs::rename(path, target)?;
-        }
-        self.path = None;
-        Ok(())
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        if let Some(path) = &self.path {
-            // Nothing is left to be done when this fails as well: the cause has been reported already.
-            let _ = fs::remove_file(path);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::load;
     use super::*;
 

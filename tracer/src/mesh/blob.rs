@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-use super::{FORMAT_VERSION, MAGIC, MeshError};
+use super::{FORMAT_VERSION, MAGIC, MeshError, OLDEST_FORMAT_VERSION};
 use crate::bvh::{WIDTH, WideNode};
 use crate::simd::{Lanes, three};
 
@@ -85,7 +85,11 @@ pub(super) struct Header {
     pub material_bytes: u32,
     /// Lanes with texture coordinates: all of them, or none.
     pub uv_count: u32,
-    pub reserved: [u32; 3],
+    /// Lanes with the whole repeats of their texture coordinates: all of them, or none.
+    pub repeat_count: u32,
+    /// Lanes with colours: all of them, or none.
+    pub color_count: u32,
+    pub reserved: u32,
 }
 
 const _: () = assert!(size_of::<Header>() == 128);
@@ -110,12 +114,16 @@ impl Header {
         let Some(fixed) = bytes.get(..size_of::<Header>()) else {
             return Err(MeshError::Format(format!("{} bytes are too few for a header", bytes.len())));
         };
-        let header: Header = bytemuck::pod_read_unaligned(fixed);
-        if header.version != FORMAT_VERSION {
+        let mut header: Header = bytemuck::pod_read_unaligned(fixed);
+        if !(OLDEST_FORMAT_VERSION..=FORMAT_VERSION).contains(&header.version) {
             return Err(MeshError::Format(format!(
-                "it has format version {}, this program reads version {FORMAT_VERSION}",
+                "it has format version {}, this program reads versions {OLDEST_FORMAT_VERSION} to {FORMAT_VERSION}",
                 header.version
             )));
+        }
+        if header.version == OLDEST_FORMAT_VERSION {
+            // What stands there was reserved.
+            (header.repeat_count, header.color_count) = (0, 0);
         }
         if !(-220..=220).contains(&header.exponent) {
             return Err(MeshError::Format(format!("its scale 2^{} is out of range", header.exponent)));
@@ -124,12 +132,17 @@ impl Header {
         if numbers.into_iter().any(|number| !number.is_finite()) {
             return Err(MeshError::Format("its centre or bounds are not finite".into()));
         }
-        if header.uv_count != 0 && header.uv_count != header.slots() {
-            return Err(MeshError::Format(format!(
-                "it has texture coordinates for {} lanes of {}",
-                header.uv_count,
-                header.slots()
-            )));
+        for (what, count) in [
+            ("texture coordinates", header.uv_count),
+            ("whole repeats", header.repeat_count),
+            ("colours", header.color_count),
+        ] {
+            if count != 0 && count != header.slots() {
+                return Err(MeshError::Format(format!(
+                    "it has {what} for {count} lanes of {}",
+                    header.slots()
+                )));
+            }
         }
         let needed = header.sections().end as u64;
         if bytes.len() as u64 != needed {
@@ -164,6 +177,8 @@ impl Header {
             indices: place(with_normals, 12),
             normals: place(self.normal_count, 12),
             uvs: place(self.uv_count, 24),
+            repeats: place(self.repeat_count, 8),
+            colors: place(self.color_count, 9),
             materials: place(self.material_bytes, 1),
             end,
         }
@@ -187,6 +202,10 @@ pub(super) struct Sections {
     pub normals: usize,
     /// Three `Vec2` per lane; empty without texture coordinates.
     pub uvs: usize,
+    /// `Vec2` per lane; empty where no texture tells whole repeats apart.
+    pub repeats: usize,
+    /// Three times three sRGB bytes per lane; empty without colours of vertices.
+    pub colors: usize,
     /// Material slots: see [`super::compiled`].
     pub materials: usize,
     /// Length of the whole.

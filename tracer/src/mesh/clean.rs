@@ -9,13 +9,13 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{MAX_COORDINATE, MAX_MATERIALS, MAX_TRIANGLES, Mesh, MeshError, MeshReport};
+use super::{MAX_COORDINATE, MAX_MATERIALS, MAX_TRIANGLES, Mesh, MeshError, MeshReport, Smoothing, normals};
 
 /// A mesh that is fit to be traced.
 pub(super) struct CleanMesh {
     /// Corners in mesh space, within [-1, 1].
     pub corners: Vec<[Vec3; 3]>,
-    /// Corners as indices into `normals`; the source's positions.
+    /// Corners as indices into `normals`; the source's positions where there are none.
     pub indices: Vec<[u32; 3]>,
     /// Position of each kept triangle in the source.
     pub sources: Vec<u32>,
@@ -23,7 +23,11 @@ pub(super) struct CleanMesh {
     pub slots: Vec<u16>,
     /// Texture coordinates of each kept triangle; empty where the source has none.
     pub uvs: Vec<[Vec2; 3]>,
-    /// Unit normal per source position; empty unless asked for.
+    /// Whole repeats of each kept triangle; empty where the source has none.
+    pub uv_repeats: Vec<Vec2>,
+    /// Colours of each kept triangle; empty where the source has none.
+    pub colors: Vec<[[u8; 3]; 3]>,
+    /// Unit normals; empty unless asked for, and where all triangles are flat.
     pub normals: Vec<Vec3>,
     /// model = center + mesh * 2^exponent.
     pub center: DVec3,
@@ -52,6 +56,8 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
         sources: Vec::with_capacity(finite.len()),
         slots: Vec::with_capacity(finite.len()),
         uvs: Vec::with_capacity(if mesh.uvs.is_empty() { 0 } else { finite.len() }),
+        uv_repeats: Vec::new(),
+        colors: Vec::new(),
         normals: Vec::new(),
         center,
         exponent,
@@ -59,7 +65,7 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
     };
     let all: Vec<[Vec3; 3]> =
         finite.par_iter().map(|&source| mesh.triangles[source as usize].map(to_mesh)).collect();
-    let repeated = repeated(&all);
+    let repeated = repeated(&all, |first, copy| sides_differ(mesh, &all, &finite, first, copy));
     for ((source, corners), is_repeated) in finite.into_iter().zip(all).zip(repeated) {
         let indices = mesh.triangles[source as usize];
         if is_degenerate(&corners) {
@@ -72,14 +78,15 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
             kept.sources.push(source);
             kept.slots.push(mesh.triangle_materials[source as usize]);
             kept.uvs.extend(mesh.uvs.get(source as usize));
+            kept.uv_repeats.extend(mesh.uv_repeats.get(source as usize));
+            kept.colors.extend(mesh.colors.get(source as usize));
         }
     }
     if kept.corners.is_empty() {
         return Err(MeshError::Empty { dropped: report.dropped() });
     }
     if with_normals {
-        kept.normals =
-            if mesh.normals.is_empty() { averaged_normals(mesh, &kept) } else { given_normals(mesh) };
+        normals::fill_in(mesh, &mut kept);
     }
     Ok((kept, report))
 }
@@ -103,17 +110,28 @@ fn check_shape(mesh: &Mesh) -> Result<(), MeshError> {
             mesh.triangle_materials.len()
         )));
     }
-    if !mesh.uvs.is_empty() && mesh.uvs.len() != triangles {
-        return Err(MeshError::Inconsistent(format!(
-            "{triangles} triangles but texture coordinates for {}",
-            mesh.uvs.len()
-        )));
+    for (what, count) in [
+        ("texture coordinates", mesh.uvs.len()),
+        ("whole repeats of texture coordinates", mesh.uv_repeats.len()),
+        ("colours of vertices", mesh.colors.len()),
+    ] {
+        if count != 0 && count != triangles {
+            return Err(MeshError::Inconsistent(format!("{triangles} triangles but {what} for {count}")));
+        }
     }
     if !mesh.normals.is_empty() && mesh.normals.len() != mesh.positions.len() {
         return Err(MeshError::Inconsistent(format!(
             "{} positions but {} normals",
             mesh.positions.len(),
             mesh.normals.len()
+        )));
+    }
+    if let Smoothing::Groups(groups) = &mesh.smoothing
+        && groups.len() != triangles
+    {
+        return Err(MeshError::Inconsistent(format!(
+            "{triangles} triangles but smoothing groups for {}",
+            groups.len()
         )));
     }
     if let Some(index) = mesh.triangles.iter().flatten().find(|&&v| v as usize >= mesh.positions.len()) {
@@ -160,11 +178,12 @@ fn is_degenerate(corners: &[Vec3; 3]) -> bool {
     (b - a).cross(c - a) == DVec3::ZERO
 }
 
-/// Which triangles are copies of one that comes earlier.
+/// Which triangles are copies of one that comes earlier, and are not needed as its other side: `differ` tells of two that are
+/// wound the opposite way whether they look different.
 ///
 /// Sorted by a hash, copies stand together; where different triangles have the same one, their corners decide. So the time is
 /// O(n log n) whatever the triangles are.
-fn repeated(triangles: &[[Vec3; 3]]) -> Vec<bool> {
+fn repeated(triangles: &[[Vec3; 3]], differ: impl Fn(usize, usize) -> bool) -> Vec<bool> {
     let mut by_hash: Vec<(u64, u32)> =
         (0_u32..).zip(triangles).map(|(i, corners)| (hash(&identity(corners)), i)).collect();
     by_hash.par_sort_unstable();
@@ -172,11 +191,46 @@ fn repeated(triangles: &[[Vec3; 3]]) -> Vec<bool> {
     for alike in by_hash.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() > 1) {
         let mut alike: Vec<_> = alike.iter().map(|&(_, i)| (identity(&triangles[i as usize]), i)).collect();
         alike.sort_unstable();
-        for pair in alike.windows(2) {
-            repeated[pair[1].1 as usize] = pair[0].0 == pair[1].0;
+        for copies in alike.chunk_by(|a, b| a.0 == b.0) {
+            let mut copies = copies.iter().map(|&(_, i)| i as usize);
+            let Some(first) = copies.next() else { continue };
+            let mut has_other_side = false;
+            for copy in copies {
+                let is_other_side = is_turned(&triangles[first], &triangles[copy]);
+                let needed = is_other_side && !has_other_side && differ(first, copy);
+                has_other_side |= needed;
+                repeated[copy] = !needed;
+            }
         }
     }
     repeated
+}
+
+/// Where each corner of one triangle is among those of another with the same corners.
+fn matching(a: &[Vec3; 3], b: &[Vec3; 3]) -> [usize; 3] {
+    a.map(|corner| b.iter().position(|&other| other == corner).unwrap_or(0))
+}
+
+/// Whether two triangles with the same corners are wound the opposite way.
+fn is_turned(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
+    let [first, second, _] = matching(a, b);
+    second != (first + 1) % 3
+}
+
+/// Whether two triangles with the same corners, as two sides of one face, look different: by material, texture coordinates, or
+/// normals, on whichever side these are.
+fn sides_differ(mesh: &Mesh, corners: &[[Vec3; 3]], sources: &[u32], a: usize, b: usize) -> bool {
+    let places = matching(&corners[a], &corners[b]);
+    let [a, b] = [a, b].map(|i| sources[i] as usize);
+    let normal = |triangle: usize, corner: usize| mesh.normals[mesh.triangles[triangle][corner] as usize];
+    let other_normal = |corner: usize| {
+        let (own, others) = (normal(a, corner), normal(b, places[corner]));
+        own != others && own != -others
+    };
+    mesh.triangle_materials[a] != mesh.triangle_materials[b]
+        || !mesh.uvs.is_empty() && (0..3).any(|k| mesh.uvs[a][k] != mesh.uvs[b][places[k]])
+        || !mesh.colors.is_empty() && (0..3).any(|k| mesh.colors[a][k] != mesh.colors[b][places[k]])
+        || !mesh.normals.is_empty() && (0..3).any(other_normal)
 }
 
 /// Multiplies and folds, a number at a time.
@@ -193,21 +247,4 @@ fn identity(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     let mut bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
     bits.sort_unstable();
     bits
-}
-
-fn given_normals(mesh: &Mesh) -> Vec<Vec3> {
-    mesh.normals.iter().map(|normal| normal.as_dvec3().normalize_or_zero().as_vec3()).collect()
-}
-
-/// Normals averaged over the faces that share a position, weighted by area.
-fn averaged_normals(mesh: &Mesh, kept: &CleanMesh) -> Vec<Vec3> {
-    let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
-    for (indices, corners) in kept.indices.iter().zip(&kept.corners) {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
-        let weighted = (b - a).cross(c - a);
-        for &vertex in indices {
-            sums[vertex as usize] += weighted;
-        }
-    }
-    sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
 }

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use super::blob::{AlignedBytes, Header, NO_TRIANGLE, Sections, TriangleBlock};
 use super::clean::{CleanMesh, clean};
 use super::materials::{decode_materials, encode_materials};
-use super::{MAX_COORDINATE, Mesh, MeshError, MeshId, NamedMaterial};
+use super::{FORMAT_VERSION, MAX_COORDINATE, Mesh, MeshError, MeshId, NamedMaterial};
 use crate::bvh::{self, BuildQuality, WIDTH, WideNode, WideTree};
+use crate::cancel::never;
 use crate::simd::Lanes;
 use crate::texture;
 
@@ -32,7 +33,7 @@ impl Default for CompileOptions {
 pub struct MeshReport {
     /// Triangles without an area.
     pub dropped_degenerate: usize,
-    /// Copies of a triangle that comes earlier.
+    /// Copies of a triangle that comes earlier, but for one as its other side that looks different.
     pub dropped_duplicate: usize,
     /// Triangles with a corner that is not finite, or farther out than [`super::MAX_COORDINATE`].
     pub dropped_not_finite: usize,
@@ -76,7 +77,7 @@ impl CompiledMesh {
     pub fn compile_with(mesh: &Mesh, options: CompileOptions) -> Result<(Self, MeshReport), MeshError> {
         let (clean, report) = clean(mesh, options.normals)?;
         let boxes: Vec<_> = clean.corners.iter().map(bounds_of_corners).collect();
-        let tree = bvh::build_wide(&boxes, WIDTH, options.quality);
+        let tree = bvh::build_wide(&boxes, WIDTH, options.quality, &never)?;
         let materials = encode_materials(&mesh.materials);
 
         let mut header = Header::new(clean.center, clean.exponent, clean.bounds);
@@ -86,6 +87,8 @@ impl CompiledMesh {
         header.triangle_count = clean.corners.len() as u32;
         header.normal_count = clean.normals.len() as u32;
         header.uv_count = if clean.uvs.is_empty() { 0 } else { header.slots() };
+        header.repeat_count = if clean.uv_repeats.is_empty() { 0 } else { header.slots() };
+        header.color_count = if clean.colors.is_empty() { 0 } else { header.slots() };
         header.material_count = mesh.materials.len() as u32;
         header.material_bytes = materials.len() as u32;
         let bytes = lay_out(&header, &clean, &tree, &materials);
@@ -111,6 +114,7 @@ impl CompiledMesh {
         let materials = decode_materials(
             &bytes.as_slice()[start..start + header.material_bytes as usize],
             header.material_count,
+            header.version,
         )?;
         let mesh = Self { bytes, header, sections, materials, id };
         mesh.check()?;
@@ -146,7 +150,10 @@ impl CompiledMesh {
             return broken("a normal is longer than 1".into());
         }
         if !self.uvs().iter().flatten().copied().all(texture::is_usable) {
-            return broken("a texture coordinate is not finite, negative or too large".into());
+            return broken("a texture coordinate is not finite or too large".into());
+        }
+        if !self.uv_repeats().iter().copied().all(texture::is_usable) {
+            return broken("a number of whole repeats is not finite or too large".into());
         }
         Ok(())
     }
@@ -198,6 +205,7 @@ impl CompiledMesh {
     pub(crate) fn with_materials(&self, materials: &[NamedMaterial]) -> Result<Self, MeshError> {
         let encoded = encode_materials(materials);
         let mut header = self.header;
+        header.version = FORMAT_VERSION;
         header.material_count = materials.len() as u32;
         header.material_bytes = encoded.len() as u32;
         // They are the last section: the others stay where they are.
@@ -223,6 +231,11 @@ impl CompiledMesh {
     /// Whether textures can be laid on it.
     pub fn has_uvs(&self) -> bool {
         self.header.uv_count > 0
+    }
+
+    /// Whether its vertices have colours.
+    pub fn has_colors(&self) -> bool {
+        self.header.color_count > 0
     }
 
     /// model = `center` + mesh * 2^`exponent`.
@@ -260,7 +273,7 @@ impl CompiledMesh {
         self.blocks()[i as usize / WIDTH].corners(i as usize % WIDTH)
     }
 
-    /// Position of triangle `i` in the source file: ties between equal distances are decided by it.
+    /// Position of triangle `i` in the source file. Where it coincides with others, the first of them is seen.
     pub fn source(&self, i: u32) -> u32 {
         self.sources()[i as usize]
     }
@@ -279,6 +292,21 @@ impl CompiledMesh {
     /// Texture coordinates at the corners of triangle `i`, where the mesh carries them.
     pub fn corner_uvs(&self, i: u32) -> Option<[Vec2; 3]> {
         self.uvs().get(i as usize).copied()
+    }
+
+    /// The whole repeats that were taken off the texture coordinates of triangle `i`; zero where the mesh does not carry them.
+    pub fn whole_repeats(&self, i: u32) -> Vec2 {
+        self.uv_repeats().get(i as usize).copied().unwrap_or_default()
+    }
+
+    /// Colours at the corners of triangle `i`, sRGB, where the mesh carries them.
+    pub fn corner_colors(&self, i: u32) -> Option<[[u8; 3]; 3]> {
+        self.colors().get(i as usize).copied()
+    }
+
+    #[cfg(test)]
+    pub(super) fn header(&self) -> &Header {
+        &self.header
     }
 
     fn lanes(&self) -> usize {
@@ -304,6 +332,16 @@ impl CompiledMesh {
     /// Texture coordinates of all lanes; empty where the mesh carries none.
     pub(crate) fn uvs(&self) -> &[[Vec2; 3]] {
         self.section(self.sections.uvs, self.header.uv_count as usize)
+    }
+
+    /// Whole repeats of all lanes; empty where the mesh carries none.
+    pub(crate) fn uv_repeats(&self) -> &[Vec2] {
+        self.section(self.sections.repeats, self.header.repeat_count as usize)
+    }
+
+    /// Colours of all lanes; empty where the mesh carries none.
+    pub(crate) fn colors(&self) -> &[[[u8; 3]; 3]] {
+        self.section(self.sections.colors, self.header.color_count as usize)
     }
 
     /// The section that starts at `start`. `Header::read` made sure that all sections lie inside, and they start on
@@ -352,6 +390,12 @@ fn lay_out(header: &Header, clean: &CleanMesh, tree: &WideTree, materials: &[u8]
     }
     if !clean.uvs.is_empty() {
         put(out, sections.uvs, &in_lanes(tree, &clean.uvs, [Vec2::ZERO; 3]));
+    }
+    if !clean.uv_repeats.is_empty() {
+        put(out, sections.repeats, &in_lanes(tree, &clean.uv_repeats, Vec2::ZERO));
+    }
+    if !clean.colors.is_empty() {
+        put(out, sections.colors, &in_lanes(tree, &clean.colors, [[u8::MAX; 3]; 3]));
     }
     out[sections.materials..sections.materials + materials.len()].copy_from_slice(materials);
     bytes

@@ -1,56 +1,68 @@
 //! The material slots of a compiled mesh, as bytes.
 //!
-//! Per slot: diffuse, specular, exponent (seven `f32`), the length of the name in bytes (`u8`), the name, the length of the
-//! texture's file name in bytes (`u16`, 0 for none), that name.
+//! Per slot: diffuse, specular, exponent, emission (ten `f32`), flags (`u8`: 1 unlit), the length of the name in
+//! bytes (`u8`), the name, and three textures: diffuse, cut-out, emission. A texture is the length of its file's
+//! name in bytes (`u16`, 0 for none), the name, its wrap (`u8`), scale and offset (four `f32`). Version 3 has neither
+//! emission nor flags, and of one texture the name alone.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use super::{MAX_MATERIALS, MAX_TEXTURE_NAME, MeshError, NamedMaterial};
-use crate::scene::Material;
+use super::{MAX_MATERIALS, MAX_TEXTURE_NAME, MeshError, NamedMaterial, OLDEST_FORMAT_VERSION, TextureFile};
+use crate::scene::{Material, Tiling, Wrap};
 
 /// Longest name of a material slot, in bytes; longer ones are cut.
 const MAX_NAME: usize = 255;
 
+const UNLIT: u8 = 1;
+
 pub(super) fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    for NamedMaterial { name, material, texture } in materials {
-        let numbers = material.diffuse.to_array().into_iter().chain(material.specular.to_array());
-        for number in numbers.chain([material.exponent]) {
-            bytes.extend_from_slice(&number.to_le_bytes());
-        }
+    for NamedMaterial { name, material, texture, cutout, emission_texture } in materials {
+        let colors = [material.diffuse, material.specular].map(|color| color.to_array()).concat();
+        let numbers = colors.into_iter().chain([material.exponent]).chain(material.emission.to_array());
+        numbers.for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+        bytes.push(if material.unlit { UNLIT } else { 0 });
         let name = &name[..name.floor_char_boundary(MAX_NAME)];
         bytes.push(name.len() as u8);
         bytes.extend_from_slice(name.as_bytes());
-        // Half a path is none.
-        let texture = texture.as_deref().filter(|name| name.len() <= MAX_TEXTURE_NAME).unwrap_or_default();
-        bytes.extend_from_slice(&(texture.len() as u16).to_le_bytes());
-        bytes.extend_from_slice(texture.as_bytes());
+        [texture, cutout, emission_texture]
+            .into_iter()
+            .for_each(|texture| encode_texture(texture.as_ref(), &mut bytes));
     }
     bytes
 }
 
-pub(super) fn decode_materials(bytes: &[u8], count: u32) -> Result<Vec<NamedMaterial>, MeshError> {
+fn encode_texture(texture: Option<&TextureFile>, bytes: &mut Vec<u8>) {
+    // Half a path is none.
+    let Some(TextureFile { file, tiling }) = texture.filter(|texture| texture.file.len() <= MAX_TEXTURE_NAME)
+    else {
+        return bytes.extend_from_slice(&[0; 2]);
+    };
+    bytes.extend_from_slice(&(file.len() as u16).to_le_bytes());
+    bytes.extend_from_slice(file.as_bytes());
+    if !file.is_empty() {
+        bytes.push(WRAPS.iter().position(|wrap| *wrap == tiling.wrap).unwrap_or_default() as u8);
+        let numbers = tiling.scale.to_array().into_iter().chain(tiling.offset.to_array());
+        numbers.for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+    }
+}
+
+/// By their number in the bytes.
+const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror];
+
+/// Slots in the layout of a version of compiled meshes.
+pub(super) fn decode_materials(
+    bytes: &[u8],
+    count: u32,
+    version: u16,
+) -> Result<Vec<NamedMaterial>, MeshError> {
     if count as usize > MAX_MATERIALS {
         return Err(MeshError::Format(format!("it announces {count} materials")));
     }
     let mut reader = Reader(bytes);
     let mut materials = Vec::new();
     for _ in 0..count {
-        let numbers: [f32; 7] = bytemuck::pod_read_unaligned(reader.take(7 * 4)?);
-        if numbers.iter().any(|number| !(0.0..=1e9).contains(number)) {
-            return Err(MeshError::Format("a material has a number that is not in 0..1e9".into()));
-        }
-        let [dr, dg, db, sr, sg, sb, exponent] = numbers;
-        let length = reader.take(1)?[0];
-        let name = reader.text(length.into())?;
-        let length: u16 = bytemuck::pod_read_unaligned(reader.take(2)?);
-        if usize::from(length) > MAX_TEXTURE_NAME {
-            return Err(MeshError::Format(format!("a texture's file name has {length} bytes")));
-        }
-        let texture = Some(reader.text(length.into())?).filter(|name| !name.is_empty());
-        let (diffuse, specular) = (Vec3::new(dr, dg, db), Vec3::new(sr, sg, sb));
-        let material = Material { diffuse, specular, exponent, texture: None };
-        materials.push(NamedMaterial { name, material, texture });
+        materials.push(if version == OLDEST_FORMAT_VERSION { reader.old_slot()? } else { reader.slot()? });
     }
     match reader.0.len() {
         0 => Ok(materials),
@@ -70,5 +82,73 @@ impl<'b> Reader<'b> {
 
     fn text(&mut self, length: usize) -> Result<String, MeshError> {
         Ok(String::from_utf8_lossy(self.take(length)?).into_owned())
+    }
+
+    fn slot(&mut self) -> Result<NamedMaterial, MeshError> {
+        let material = self.phong()?;
+        let emission = Vec3::from_array(self.numbers()?);
+        let flags = self.byte()?;
+        let unlit = flags & UNLIT != 0;
+        let length = self.byte()?;
+        let name = self.text(length.into())?;
+        let material = Material { emission, unlit, ..material };
+        let [texture, cutout, emission_texture] = [self.texture()?, self.texture()?, self.texture()?];
+        Ok(NamedMaterial { name, material, texture, cutout, emission_texture })
+    }
+
+    fn old_slot(&mut self) -> Result<NamedMaterial, MeshError> {
+        let material = self.phong()?;
+        let length = self.byte()?;
+        let name = self.text(length.into())?;
+        let texture = Some(self.file_name()?).filter(|name| !name.is_empty()).map(TextureFile::new);
+        Ok(NamedMaterial { texture, ..NamedMaterial::plain(name, material) })
+    }
+
+    fn phong(&mut self) -> Result<Material, MeshError> {
+        let [dr, dg, db, sr, sg, sb, exponent] = self.numbers()?;
+        let (diffuse, specular) = (Vec3::new(dr, dg, db), Vec3::new(sr, sg, sb));
+        Ok(Material { diffuse, specular, exponent, ..Material::NEUTRAL })
+    }
+
+    fn texture(&mut self) -> Result<Option<TextureFile>, MeshError> {
+        let file = self.file_name()?;
+        if file.is_empty() {
+            return Ok(None);
+        }
+        let broken = || MeshError::Format("a texture is laid on in a way that is not known".into());
+        let wrap = *WRAPS.get(usize::from(self.byte()?)).ok_or_else(broken)?;
+        let [u, v, right, up] = self.floats()?;
+        let tiling = Tiling { wrap, scale: Vec2::new(u, v), offset: Vec2::new(right, up) };
+        if tiling.is_usable() { Ok(Some(TextureFile { file, tiling })) } else { Err(broken()) }
+    }
+
+    fn file_name(&mut self) -> Result<String, MeshError> {
+        let length: u16 = bytemuck::pod_read_unaligned(self.take(2)?);
+        if usize::from(length) > MAX_TEXTURE_NAME {
+            return Err(MeshError::Format(format!("a texture's file name has {length} bytes")));
+        }
+        self.text(length.into())
+    }
+
+    fn byte(&mut self) -> Result<u8, MeshError> {
+        Ok(self.take(1)?[0])
+    }
+
+    fn floats<const N: usize>(&mut self) -> Result<[f32; N], MeshError> {
+        let bytes = self.take(N * size_of::<f32>())?;
+        let mut numbers = [0.0; N];
+        for (number, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(size_of::<f32>())) {
+            *number = bytemuck::pod_read_unaligned(bytes);
+        }
+        Ok(numbers)
+    }
+
+    /// Colours and exponents.
+    fn numbers<const N: usize>(&mut self) -> Result<[f32; N], MeshError> {
+        let numbers = self.floats()?;
+        if numbers.iter().any(|number| !(0.0..=1e9).contains(number)) {
+            return Err(MeshError::Format("a material has a number that is not in 0..1e9".into()));
+        }
+        Ok(numbers)
     }
 }

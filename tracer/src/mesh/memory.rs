@@ -18,6 +18,8 @@ pub struct MeshMemory {
     pub normal_bytes: usize,
     /// Bytes of the texture coordinates; zero where the mesh carries none.
     pub uv_bytes: usize,
+    /// Bytes of the colours of vertices; zero where the mesh carries none.
+    pub color_bytes: usize,
     /// Bytes of the rest: header, material slots, positions in the source.
     pub rest_bytes: usize,
 }
@@ -25,12 +27,22 @@ pub struct MeshMemory {
 impl MeshMemory {
     /// All of it.
     pub fn total_bytes(&self) -> usize {
-        self.node_bytes + self.triangle_bytes + self.normal_bytes + self.uv_bytes + self.rest_bytes
+        self.node_bytes
+            + self.triangle_bytes
+            + self.normal_bytes
+            + self.uv_bytes
+            + self.color_bytes
+            + self.rest_bytes
     }
 
     /// What normals would take at least, were they there: the three numbers of each triangle that name them.
     pub fn least_normal_bytes(&self) -> usize {
         self.lanes * size_of::<[u32; 3]>()
+    }
+
+    /// What colours of vertices would take, were they there.
+    pub fn full_color_bytes(&self) -> usize {
+        self.lanes * size_of::<[[u8; 3]; 3]>()
     }
 
     /// What texture coordinates would take, were they there.
@@ -45,8 +57,9 @@ impl CompiledMesh {
         let node_bytes = size_of_val(self.nodes());
         let triangle_bytes = size_of_val(self.blocks());
         let normal_bytes = size_of_val(self.indices()) + size_of_val(self.normals());
-        let uv_bytes = size_of_val(self.uvs());
-        let named = node_bytes + triangle_bytes + normal_bytes + uv_bytes;
+        let uv_bytes = size_of_val(self.uvs()) + size_of_val(self.uv_repeats());
+        let color_bytes = size_of_val(self.colors());
+        let named = node_bytes + triangle_bytes + normal_bytes + uv_bytes + color_bytes;
         MeshMemory {
             nodes: self.nodes().len(),
             lanes: self.blocks().len() * WIDTH,
@@ -54,6 +67,7 @@ impl CompiledMesh {
             triangle_bytes,
             normal_bytes,
             uv_bytes,
+            color_bytes,
             rest_bytes: self.bytes().len() - named,
         }
     }

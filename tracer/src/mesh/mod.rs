@@ -6,8 +6,10 @@
 mod blob;
 mod clean;
 mod compiled;
+mod fans;
 mod materials;
 mod memory;
+mod normals;
 #[cfg(test)]
 mod tests;
 
@@ -17,7 +19,8 @@ use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 pub use crate::bvh::BuildQuality;
-use crate::scene::Material;
+use crate::cancel::Cancelled;
+use crate::scene::{Material, Tiling};
 pub(crate) use blob::TriangleBlock;
 pub use compiled::{CompileOptions, CompiledMesh, MeshReport};
 pub use memory::MeshMemory;
@@ -26,7 +29,10 @@ pub use memory::MeshMemory;
 pub const MAGIC: [u8; 6] = *b"RFMESH";
 
 /// Version of the layout of compiled meshes.
-pub const FORMAT_VERSION: u16 = 3;
+pub const FORMAT_VERSION: u16 = 4;
+
+/// The oldest version that is read: its slots know neither emission nor cut-outs, its triangles no colours.
+pub const OLDEST_FORMAT_VERSION: u16 = 3;
 
 /// Most triangles that one mesh may have: they fill at most 2^28 lanes of blocks, and their indices stay inside `u32`.
 pub const MAX_TRIANGLES: usize = 1 << 27;
@@ -61,16 +67,36 @@ impl fmt::Debug for MeshId {
 pub struct Mesh {
     /// Vertex positions.
     pub positions: Vec<DVec3>,
-    /// One normal per position, or empty where the file gives none (they are then averaged over the faces).
+    /// One normal per position, zero where it is missing; or empty where the file gives none. What is missing is averaged
+    /// over the faces, as `smoothing` says.
     pub normals: Vec<Vec3>,
     /// Corners as indices into `positions`.
     pub triangles: Vec<[u32; 3]>,
+    /// How normals are averaged where there are none.
+    pub smoothing: Smoothing,
     /// One index into `materials` per triangle.
     pub triangle_materials: Vec<u16>,
     /// Texture coordinates of the corners of each triangle, as [`crate::texture::without_repeats`] leaves them; or empty.
     pub uvs: Vec<[Vec2; 3]>,
+    /// The whole repeats that were taken off `uvs`, for each triangle; or empty where no texture tells them apart.
+    pub uv_repeats: Vec<Vec2>,
+    /// Colours of the corners of each triangle, sRGB; or empty.
+    pub colors: Vec<[[u8; 3]; 3]>,
     /// Material slots; never empty when there are triangles.
     pub materials: Vec<NamedMaterial>,
+}
+
+/// Over which faces a missing normal is averaged. Both sides of a surface that is there twice, once for each side, are
+/// never averaged into one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Smoothing {
+    /// All that share the position's index.
+    #[default]
+    Full,
+    /// Those that are connected at the corner by edges where faces meet at this angle at most, in degrees.
+    CreaseAngle(f64),
+    /// Those that are connected at the corner by edges between faces of one group. A group for each triangle; 0 is flat.
+    Groups(Vec<u32>),
 }
 
 /// A material slot of a mesh.
@@ -78,10 +104,47 @@ pub struct Mesh {
 pub struct NamedMaterial {
     /// Name in the file, for messages.
     pub name: String,
-    /// What the file says of it, but for its texture: an index there means nothing without a scene.
+    /// What the file says of it, but for its textures: an index there means nothing without a scene.
     pub material: Material,
-    /// The file of its texture: a path with `/` between its parts, relative to the model's folder, or absolute.
-    pub texture: Option<String>,
+    /// The texture of its diffuse colour.
+    pub texture: Option<TextureFile>,
+    /// The picture that says where it is cut out; without it the alpha of `texture` does.
+    pub cutout: Option<TextureFile>,
+    /// The texture of its emission.
+    pub emission_texture: Option<TextureFile>,
+}
+
+impl NamedMaterial {
+    /// A slot without textures.
+    pub fn plain(name: impl Into<String>, material: Material) -> Self {
+        Self { name: name.into(), material, texture: None, cutout: None, emission_texture: None }
+    }
+
+    /// Its textures.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureFile> {
+        [&self.texture, &self.cutout, &self.emission_texture].into_iter().flatten()
+    }
+
+    /// Its textures, to be changed.
+    pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureFile> {
+        [&mut self.texture, &mut self.cutout, &mut self.emission_texture].into_iter().flatten()
+    }
+}
+
+/// The file of a texture, and how it is laid on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureFile {
+    /// A path with `/` between its parts, relative to the model's folder, or absolute.
+    pub file: String,
+    /// Where it lies.
+    pub tiling: Tiling,
+}
+
+impl TextureFile {
+    /// A picture that repeats once a unit.
+    pub fn new(file: impl Into<String>) -> Self {
+        Self { file: file.into(), tiling: Tiling::default() }
+    }
 }
 
 /// Why a mesh cannot be compiled, or bytes are no compiled mesh.
@@ -108,6 +171,9 @@ pub enum MeshError {
     /// An index points outside, or two arrays that belong together differ in length.
     #[error("the mesh is inconsistent: {0}")]
     Inconsistent(String),
+    /// The result was not wanted any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The bytes are no compiled mesh of this version.
     #[error(
         "not a compiled model that this version reads: {0}; compile it again with `rayfarm-master compile MODEL -o FILE`"

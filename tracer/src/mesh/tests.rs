@@ -4,11 +4,12 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::*;
+use crate::scene::Wrap;
 use crate::texture::without_repeats;
 
 fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = vec![0; triangles.len()];
-    let materials = vec![NamedMaterial { name: "clay".into(), material: Material::NEUTRAL, texture: None }];
+    let materials = vec![NamedMaterial::plain("clay", Material::NEUTRAL)];
     Mesh { positions, triangles, triangle_materials, materials, ..Mesh::default() }
 }
 
@@ -33,7 +34,7 @@ fn textured(n: u32) -> Mesh {
     let mut mesh = sheet(n);
     let uv = |v: u32| DVec2::new(mesh.positions[v as usize].x, mesh.positions[v as usize].z * 0.5);
     mesh.uvs = mesh.triangles.iter().map(|t| without_repeats(t.map(uv)).unwrap()).collect();
-    mesh.materials[0].texture = Some("maps/clay.png".into());
+    mesh.materials[0].texture = Some(TextureFile::new("maps/clay.png"));
     mesh
 }
 
@@ -133,7 +134,7 @@ fn texture_coordinates_and_names_come_back() {
     for triangle in again.triangles() {
         assert_eq!(again.corner_uvs(triangle), Some(source.uvs[again.source(triangle) as usize]));
     }
-    assert_eq!(again.materials()[0].texture.as_deref(), Some("maps/clay.png"));
+    assert_eq!(again.materials()[0].texture, Some(TextureFile::new("maps/clay.png")));
     let (plain, _) = CompiledMesh::compile(&sheet(9)).unwrap();
     assert_eq!((plain.has_uvs(), plain.corner_uvs(0)), (false, None));
     assert!(plain.bytes().len() < compiled.bytes().len());
@@ -143,12 +144,91 @@ fn texture_coordinates_and_names_come_back() {
 fn other_material_slots_change_nothing_else() {
     let (compiled, _) = CompiledMesh::compile(&textured(5)).unwrap();
     let mut materials = compiled.materials();
-    materials[0].texture = Some("../elsewhere/a much longer name than before.png".into());
+    materials[0].texture = Some(TextureFile::new("../elsewhere/a much longer name than before.png"));
     let changed = compiled.with_materials(&materials).unwrap();
     assert_eq!(changed.materials(), materials);
     assert_eq!(corners(&changed), corners(&compiled));
     assert_eq!(changed.corner_uvs(3), compiled.corner_uvs(3));
     assert_eq!(changed.with_materials(&compiled.materials()).unwrap().id(), compiled.id());
+}
+
+/// Everything that a slot and a triangle may carry.
+fn rich(n: u32) -> Mesh {
+    let mut mesh = textured(n);
+    mesh.uv_repeats = (0..mesh.triangles.len()).map(|i| Vec2::new(i as f32 - 3.0, 7.0)).collect();
+    mesh.colors =
+        (0..mesh.triangles.len()).map(|i| [[i as u8, 1, 2], [3, i as u8, 5], [6, 7, i as u8]]).collect();
+    let tiling = Tiling { wrap: Wrap::Mirror, scale: Vec2::new(3.0, -1.5), offset: Vec2::new(0.25, 0.0) };
+    let slot = &mut mesh.materials[0];
+    slot.cutout = Some(TextureFile { file: "maps/holes.png".into(), tiling });
+    slot.emission_texture = Some(TextureFile::new("lamp.png"));
+    slot.material = Material { emission: Vec3::new(9.0, 0.5, 0.0), unlit: true, ..slot.material };
+    mesh
+}
+
+#[test]
+fn repeats_colours_and_all_that_slots_say_come_back() {
+    let mut source = rich(9);
+    source.triangles[5] = [0; 3];
+    let (compiled, _) = CompiledMesh::compile(&source).unwrap();
+    let again = CompiledMesh::from_bytes(compiled.bytes()).unwrap();
+    assert!(again.has_colors());
+    for triangle in again.triangles() {
+        let from = again.source(triangle) as usize;
+        assert_eq!(again.whole_repeats(triangle), source.uv_repeats[from]);
+        assert_eq!(again.corner_colors(triangle), Some(source.colors[from]));
+    }
+    assert_eq!(again.materials(), source.materials);
+    assert_eq!(again.memory().color_bytes, again.memory().full_color_bytes());
+    let (plain, _) = CompiledMesh::compile(&textured(9)).unwrap();
+    assert_eq!(
+        (plain.has_colors(), plain.corner_colors(0), plain.whole_repeats(0)),
+        (false, None, Vec2::ZERO)
+    );
+    assert_eq!(plain.memory().color_bytes, 0);
+    for (spoil, what) in [
+        (&(|mesh: &mut Mesh| mesh.colors.truncate(7)) as &dyn Fn(&mut Mesh), "colours of vertices for 7"),
+        (&|mesh| mesh.uv_repeats.truncate(7), "whole repeats of texture coordinates for 7"),
+        (&|mesh| mesh.uv_repeats[1].x = f32::NAN, "a number of whole repeats is not finite"),
+        (&|mesh| mesh.materials[0].cutout.as_mut().unwrap().tiling.scale.x = 1e7, "laid on in a way"),
+        (&|mesh| mesh.materials[0].material.emission.x = -1.0, "not in 0..1e9"),
+    ] {
+        let mut mesh = rich(2);
+        spoil(&mut mesh);
+        let error = CompiledMesh::compile(&mesh).unwrap_err().to_string();
+        assert!(error.contains(what), "{error}");
+    }
+}
+
+#[test]
+fn the_version_before_is_still_read() {
+    let (compiled, _) = CompiledMesh::compile(&textured(4)).unwrap();
+    let start = compiled.bytes().len() - compiled.header().material_bytes as usize;
+    let mut old = compiled.bytes()[..start].to_vec();
+    for number in [0.25_f32, 0.5, 0.75, 0.0, 0.125, 1.0, 12.0] {
+        old.extend_from_slice(&number.to_le_bytes());
+    }
+    old.extend_from_slice(b"\x04clay\x0d\x00maps/clay.png");
+    let mut header = blob::Header { version: OLDEST_FORMAT_VERSION, ..*compiled.header() };
+    header.material_bytes = (old.len() - start) as u32;
+    // What was reserved then means nothing.
+    (header.repeat_count, header.color_count) = (7, 9);
+    old[..size_of::<blob::Header>()].copy_from_slice(bytemuck::bytes_of(&header));
+    let read = CompiledMesh::from_bytes(&old).unwrap();
+    assert_eq!((corners(&read), read.corner_uvs(3)), (corners(&compiled), compiled.corner_uvs(3)));
+    let slot = &read.materials()[0];
+    assert_eq!((slot.name.as_str(), &slot.texture), ("clay", &Some(TextureFile::new("maps/clay.png"))));
+    let material = Material {
+        diffuse: Vec3::new(0.25, 0.5, 0.75),
+        specular: Vec3::new(0.0, 0.125, 1.0),
+        exponent: 12.0,
+        ..Material::NEUTRAL
+    };
+    assert_eq!(slot.material, material);
+    // Changed, it is written anew.
+    let changed = read.with_materials(&rich(1).materials).unwrap();
+    assert_eq!(changed.materials(), rich(1).materials);
+    assert!(!changed.has_colors());
 }
 
 #[test]
@@ -157,7 +237,7 @@ fn broken_texture_coordinates_are_refused() {
     short.uvs.pop();
     let error = CompiledMesh::compile(&short).unwrap_err().to_string();
     assert!(error.contains("8 triangles but texture coordinates for 7"), "{error}");
-    for odd in [f32::NAN, f32::INFINITY, -0.5, 1e8] {
+    for odd in [f32::NAN, f32::INFINITY, -1e8, 1e8] {
         let mut mesh = textured(2);
         mesh.uvs[3][1] = Vec2::new(0.5, odd);
         let error = CompiledMesh::compile(&mesh).unwrap_err().to_string();

@@ -3,13 +3,14 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::printed::escaped;
 use crate::mesh::MeshError;
 
 /// Why a scene or model cannot be loaded. All of them are the input's fault and name the place.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// A place in a scene file.
-    #[error("{}:{line}:{column}: {message}", path.display())]
+    #[error("{}:{line}:{column}: {}", shown(path), escaped(message))]
     InScene {
         /// The scene file.
         path: PathBuf,
@@ -21,7 +22,7 @@ pub enum SceneError {
         message: String,
     },
     /// A line of a model file.
-    #[error("{}:{line}: {message}", path.display())]
+    #[error("{}:{line}: {}", shown(path), escaped(message))]
     InModel {
         /// The model file.
         path: PathBuf,
@@ -31,7 +32,7 @@ pub enum SceneError {
         message: String,
     },
     /// A file as a whole.
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {}", shown(path), escaped(message))]
     InFile {
         /// The file.
         path: PathBuf,
@@ -39,7 +40,7 @@ pub enum SceneError {
         message: String,
     },
     /// A file that cannot be opened or read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}: {source}", shown(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -47,13 +48,18 @@ pub enum SceneError {
         source: io::Error,
     },
     /// A model that cannot be compiled, or a compiled one that is broken.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", shown(path))]
     Mesh {
         /// The model file.
         path: PathBuf,
         /// What is wrong with it.
         source: MeshError,
     },
+}
+
+/// A path as messages print it.
+pub(super) fn shown(path: &Path) -> String {
+    escaped(&path.display().to_string())
 }
 
 impl SceneError {

@@ -6,13 +6,19 @@
 
 mod error;
 mod file;
+mod foreign;
 mod framing;
 mod load;
+mod lookup;
+mod map;
 mod moved;
 mod obj;
+mod options;
+mod printed;
 pub mod quality;
 mod read;
 pub mod rotation;
+mod text;
 mod textures;
 mod validate;
 mod warnings;
@@ -21,10 +27,11 @@ use glam::{DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::MeshId;
-use crate::texture::TextureId;
 
 pub use error::SceneError;
-pub use load::{LoadedScene, compile_model, load};
+pub use load::{LoadedScene, compile_model, compile_model_with, load, load_with};
+pub use map::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};
+pub use options::{DEFAULT_CREASE_ANGLE, LoadOptions, Up};
 pub use quality::{ColorDepth, ExponentPrecision, Quality, RenderScale, Shading};
 pub use validate::{
     MAX_COORDINATE, MAX_DEPTH, MAX_EXPONENT, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES,
@@ -188,12 +195,42 @@ pub struct Material {
     pub exponent: f32,
     /// Index into [`Scene::textures`]. Only what has texture coordinates may have such a material.
     pub texture: Option<u32>,
+    /// Index into [`Scene::textures`]: where the alpha of that texture is below one half, there is nothing.
+    pub cutout: Option<u32>,
+    /// Linear RGB, added on the front side of triangles and planes and outside of spheres; a factor of the texel where there
+    /// is a texture. It lights nothing else.
+    pub emission: Vec3,
+    /// Index into [`Scene::textures`].
+    pub emission_texture: Option<u32>,
+    /// c_d is what is seen: neither lights nor shadows nor the ambient term change it, and there are no highlights.
+    pub unlit: bool,
+    /// The colours of a mesh's vertices, if it has any, are a factor of c_d.
+    pub vertex_colors: bool,
 }
 
 impl Material {
     /// What a model without a material gets.
-    pub const NEUTRAL: Material =
-        Material { diffuse: Vec3::splat(0.7), specular: Vec3::splat(0.2), exponent: 32.0, texture: None };
+    pub const NEUTRAL: Material = Material {
+        diffuse: Vec3::splat(0.7),
+        specular: Vec3::splat(0.2),
+        exponent: 32.0,
+        texture: None,
+        cutout: None,
+        emission: Vec3::ZERO,
+        emission_texture: None,
+        unlit: false,
+        vertex_colors: false,
+    };
+
+    /// Its textures, as indices into [`Scene::textures`].
+    pub fn textures(&self) -> impl Iterator<Item = u32> {
+        [self.texture, self.cutout, self.emission_texture].into_iter().flatten()
+    }
+
+    /// Whether it emits light of its own.
+    pub fn is_emissive(&self) -> bool {
+        self.emission != Vec3::ZERO
+    }
 
     /// Whether it has a specular colour.
     pub fn is_specular(&self) -> bool {
@@ -213,24 +250,6 @@ pub(crate) fn is_squared(exponent: f32) -> bool {
     const MOST_SQUARED: u32 = 256;
     let whole = exponent as u32;
     whole as f32 == exponent && whole <= MOST_SQUARED
-}
-
-/// A texture and how it is looked up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct TextureMap {
-    /// The picture.
-    pub texture: TextureId,
-    /// What lies between its texels.
-    pub filter: Filter,
-}
-
-/// What lies between the centres of texels, at ((i + 0.5) / width, (j + 0.5) / height).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Filter {
-    /// The nearest texel.
-    Nearest,
-    /// The four texels around, weighted by nearness, in linear light.
-    Bilinear,
 }
 
 /// How a model's normals are made.

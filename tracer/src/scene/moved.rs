@@ -13,13 +13,19 @@ pub(super) fn texture_names(
 ) -> Result<Option<CompiledMesh>, MeshError> {
     let mut materials = mesh.materials();
     let (from, to) = (absolute(from), absolute(to));
-    if from == to || materials.iter().all(|slot| slot.texture.is_none()) {
+    if from == to || materials.iter().all(|slot| slot.textures().next().is_none()) {
         return Ok(None);
     }
-    for slot in &mut materials {
-        slot.texture = slot.texture.take().map(|name| name_from(&to, &from.join(name)));
+    for texture in materials.iter_mut().flat_map(|slot| slot.textures_mut()) {
+        texture.file = name_from(&to, &from.join(&texture.file));
     }
     mesh.with_materials(&materials).map(Some)
+}
+
+/// Whether a picture of the mesh's materials is outside of the folder that the mesh is in.
+pub(super) fn leads_out(mesh: &CompiledMesh) -> bool {
+    let outside = |file: &str| file.starts_with("../") || Path::new(file).is_absolute();
+    mesh.materials().iter().any(|slot| slot.textures().any(|texture| outside(&texture.file)))
 }
 
 /// With links followed, as the way back through `..` will follow them.

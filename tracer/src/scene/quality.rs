@@ -21,6 +21,8 @@ pub struct Quality {
     pub exponent: ExponentPrecision,
     /// The colours that a pixel can have.
     pub colors: ColorDepth,
+    /// Whether pixels are dithered where light becomes bytes: a pattern in place of bands.
+    pub dither: bool,
 }
 
 impl Default for Quality {
@@ -32,6 +34,7 @@ impl Default for Quality {
             filter: None,
             exponent: ExponentPrecision::Exact,
             colors: ColorDepth::Exact,
+            dither: false,
         }
     }
 }
@@ -66,6 +69,10 @@ pub enum ColorDepth {
 /// The part of a picture's width and height at which it is rendered, to be enlarged for whoever looks at it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum RenderScale {
+    /// A sixteenth of the pixels.
+    Quarter,
+    /// A ninth of the pixels.
+    Third,
     /// A quarter of the pixels.
     Half,
     /// Nine sixteenths of the pixels.
@@ -97,11 +104,22 @@ impl Filter {
 
 impl RenderScale {
     /// All scales, the smallest first.
-    pub const ALL: [Self; 3] = [Self::Half, Self::ThreeQuarters, Self::Full];
+    pub const ALL: [Self; 5] = [Self::Quarter, Self::Third, Self::Half, Self::ThreeQuarters, Self::Full];
+
+    /// Each scale with its word.
+    pub const WORDS: [(&'static str, Self); 5] = [
+        ("1", Self::Full),
+        ("3/4", Self::ThreeQuarters),
+        ("1/2", Self::Half),
+        ("1/3", Self::Third),
+        ("1/4", Self::Quarter),
+    ];
 
     /// Rendered pixels per pixel along a side.
     pub fn factor(self) -> f64 {
         match self {
+            Self::Quarter => 0.25,
+            Self::Third => 1.0 / 3.0,
             Self::Half => 0.5,
             Self::ThreeQuarters => 0.75,
             Self::Full => 1.0,
@@ -110,16 +128,14 @@ impl RenderScale {
 
     /// As people write it.
     pub fn word(self) -> &'static str {
-        match self {
-            Self::Half => "1/2",
-            Self::ThreeQuarters => "3/4",
-            Self::Full => "1",
-        }
+        word_of(&Self::WORDS, &self)
     }
 
     /// Pixels that are rendered along a side of so many, rounded up: at least one.
     pub fn of(self, side: u32) -> u32 {
         match self {
+            Self::Quarter => side.div_ceil(4),
+            Self::Third => side.div_ceil(3),
             Self::Half => side.div_ceil(2),
             Self::ThreeQuarters => side - side / 4,
             Self::Full => side,
@@ -139,14 +155,24 @@ mod tests {
     #[test]
     fn a_scale_leaves_its_part_of_each_side_rounded_up() {
         for side in [1_u32, 2, 3, 4, 5, 767, 768, 1023, 16_384] {
-            for scale in RenderScale::ALL {
-                assert_eq!(
-                    scale.of(side),
-                    (f64::from(side) * scale.factor()).ceil() as u32,
-                    "{side} {scale:?}"
-                );
+            for (scale, part, parts) in [
+                (RenderScale::Full, 1, 1),
+                (RenderScale::ThreeQuarters, 3, 4),
+                (RenderScale::Half, 1, 2),
+                (RenderScale::Third, 1, 3),
+                (RenderScale::Quarter, 1, 4),
+            ] {
+                assert_eq!(scale.of(side), (side * part).div_ceil(parts), "{side} {scale:?}");
+                assert!((scale.factor() - f64::from(part) / f64::from(parts)).abs() < 1e-15);
             }
         }
+    }
+
+    #[test]
+    fn scales_are_in_order_and_each_has_a_word() {
+        let factors = RenderScale::ALL.map(RenderScale::factor);
+        assert!(factors.is_sorted(), "{factors:?}");
+        assert_eq!(RenderScale::ALL.map(RenderScale::word), ["1/4", "1/3", "1/2", "3/4", "1"]);
     }
 
     #[test]

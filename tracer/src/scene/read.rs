@@ -1,10 +1,11 @@
 //! Reading whole files within a bound, and telling apart what they are.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 use super::SceneError;
+use super::foreign::{Wanted, head, recognised};
+use crate::files::read_within;
 use crate::mesh;
 
 /// Bytes of a scene file.
@@ -28,8 +29,12 @@ pub(super) enum Kind {
 impl Kind {
     /// A compiled model is known by its content, whatever its name; the others by their extension.
     pub(super) fn of(path: &Path) -> Result<Self, SceneError> {
-        if first_bytes(path).map_err(|source| unreadable(path, source))? == mesh::MAGIC {
+        let head = head(path).map_err(|source| unreadable(path, source))?;
+        if head.starts_with(&mesh::MAGIC) {
             return Ok(Self::Compiled);
+        }
+        if let Some(foreign) = recognised(&head) {
+            return Err(SceneError::in_file(path, foreign.refusal(Wanted::Model)));
         }
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         match extension.as_deref() {
@@ -38,18 +43,16 @@ impl Kind {
             Some("gltf" | "glb") => {
                 Err(SceneError::in_file(path, "glTF models are not supported yet; convert it to .obj"))
             }
+            Some("mtl") => Err(SceneError::in_file(
+                path,
+                "a material library, not a model: give the model (.obj) that it belongs to",
+            )),
             _ => Err(SceneError::in_file(
                 path,
                 "neither a scene (.toml) nor a model (.obj, or one made by `rayfarm-master compile`)",
             )),
         }
     }
-}
-
-fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let mut head = Vec::new();
-    File::open(path)?.take(mesh::MAGIC.len() as u64).read_to_end(&mut head)?;
-    Ok(head)
 }
 
 fn unreadable(path: &Path, source: io::Error) -> SceneError {
@@ -59,20 +62,7 @@ fn unreadable(path: &Path, source: io::Error) -> SceneError {
 /// All bytes of a file of at most `limit` bytes. A larger one is refused before any of it is read.
 pub(super) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, SceneError> {
     let too_large = || SceneError::in_file(path, format!("the file is larger than {limit} bytes, the limit"));
-    let read = || {
-        let file = File::open(path)?;
-        // Room for all of it at once: a compiled model may have hundreds of megabytes.
-        let announced = file.metadata()?.len();
-        if announced > limit {
-            return Ok(None);
-        }
-        let mut bytes = Vec::new();
-        bytes.try_reserve_exact(usize::try_from(announced).unwrap_or(usize::MAX))?;
-        // What announces nothing (a pipe) or grows meanwhile is counted as it comes.
-        file.take(limit + 1).read_to_end(&mut bytes)?;
-        Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= limit))
-    };
-    read().map_err(|source| unreadable(path, source))?.ok_or_else(too_large)
+    read_within(path, limit).map_err(|source| unreadable(path, source))?.ok_or_else(too_large)
 }
 
 #[cfg(test)]
@@ -93,6 +83,7 @@ mod tests {
             ("a.OBJ", b"v 0 0 0", Kind::Obj),
             ("a.obj", b"RFMESH..", Kind::Compiled),
             ("a", b"RFMESH", Kind::Compiled),
+            ("a.obj", b"", Kind::Obj),
         ] {
             let (_folder, path) = file(name, content);
             assert_eq!(Kind::of(&path).unwrap(), kind, "{name}");
@@ -101,14 +92,19 @@ mod tests {
 
     #[test]
     fn other_files_are_refused_with_what_is_known() {
-        let (_folder, path) = file("a.glb", b"glTF");
-        assert!(Kind::of(&path).unwrap_err().to_string().contains("not supported yet"));
-        let (_folder, path) = file("a.stl", b"solid");
-        let message = Kind::of(&path).unwrap_err().to_string();
-        assert!(
-            message.contains("a.stl") && message.contains(".toml") && message.contains(".obj"),
-            "{message}"
-        );
+        for (name, content, words) in [
+            ("a.gltf", &b"{}"[..], "glTF models are not supported yet"),
+            ("a.glb", b"glTF\x02", "this is a glTF model (.glb)"),
+            ("a.stl", b"solid", "neither a scene (.toml) nor a model (.obj"),
+            ("a.obj", b"\x1f\x8b\x08", "this is a gzip archive"),
+            ("a.toml", b"<!DOCTYPE html>", "this is a web page"),
+            ("a", b"%PDF-1.4", "a model (.obj) or a scene (.toml) was expected"),
+            ("a.mtl", b"newmtl a", "give the model (.obj) that it belongs to"),
+        ] {
+            let (_folder, path) = file(name, content);
+            let message = Kind::of(&path).unwrap_err().to_string();
+            assert!(message.contains(name) && message.contains(words), "{message}");
+        }
         let message = Kind::of(Path::new("no/such.toml")).unwrap_err().to_string();
         assert!(message.starts_with("cannot read no/such.toml: "), "{message}");
     }

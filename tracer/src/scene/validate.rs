@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     Attenuation, Background, Camera, FrameView, Light, LightKind, Material, Model, RenderSettings, Scene,
-    Triangle,
+    TextureMap, Triangle,
 };
 use crate::image::MAX_SIDE;
 use crate::mesh::MeshId;
@@ -97,6 +97,7 @@ impl Scene {
         check_camera(&self.camera)?;
         check_background(&self.background)?;
         each("lights", &self.lights, check_light)?;
+        each("textures", &self.textures, check_texture)?;
         each("materials", &self.materials, |material, name| self.check_material(material, name))?;
         each("models", &self.models, |model, name| self.check_model(model, name))?;
         each("spheres", &self.spheres, |sphere, name| {
@@ -145,24 +146,20 @@ impl Scene {
         let finite = triangle.vertices.iter().all(|v| is_point(*v));
         require(finite, || format!("{name}.vertices"), FINITE)?;
         let Some(uvs) = triangle.uvs else { return self.check_plain_material(triangle.material, name) };
-        require(
-            uvs.into_iter().all(texture::is_usable),
-            || format!("{name}.uvs"),
-            "finite, not negative and small",
-        )?;
+        require(uvs.into_iter().all(texture::is_usable), || format!("{name}.uvs"), "finite and small")?;
         self.check_material_index(triangle.material, name)
     }
 
     fn check_material(&self, material: &Material, name: &str) -> Check {
         check_material(material, name)?;
-        let listed = material.texture.is_none_or(|index| (index as usize) < self.textures.len());
+        let listed = material.textures().all(|index| (index as usize) < self.textures.len());
         require(listed, || format!("{name}.texture"), "one of the scene's textures")
     }
 
     /// The material of something without texture coordinates.
     fn check_plain_material(&self, index: u32, name: &str) -> Check {
         self.check_material_index(index, name)?;
-        let plain = self.materials[index as usize].texture.is_none();
+        let plain = self.materials[index as usize].textures().next().is_none();
         require(plain, || format!("{name}.material"), "without a texture: there are no texture coordinates")
     }
 
@@ -265,9 +262,15 @@ fn check_light(light: &Light, name: &str) -> Check {
     }
 }
 
+fn check_texture(map: &TextureMap, name: &str) -> Check {
+    require(map.tiling.is_usable(), || format!("{name}.tiling"), "made of finite numbers up to 1e6")
+}
+
 fn check_material(material: &Material, name: &str) -> Check {
     require(is_color(material.diffuse, 1.0), || format!("{name}.diffuse"), "from 0 to 1")?;
     require(is_color(material.specular, 1.0), || format!("{name}.specular"), "from 0 to 1")?;
+    let emission = is_color(material.emission, MAX_LIGHT);
+    require(emission, || format!("{name}.emission"), "finite, not negative, at most 1e30")?;
     let exponent = (0.0..=MAX_EXPONENT).contains(&material.exponent);
     require(exponent, || format!("{name}.exponent"), "from 0 to 1e6")
 }

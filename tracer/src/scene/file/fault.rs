@@ -3,6 +3,8 @@
 use toml::Spanned;
 use toml::de::DeValue;
 
+use super::super::printed::excerpt;
+
 /// Something wrong at a place of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Fault {
@@ -96,11 +98,7 @@ fn nearest<'k>(word: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&
 /// What a message prints of text from the file.
 pub(super) fn shortened(text: &str) -> String {
     const MAX_CHARS: usize = 60;
-    let mut short: String = text.chars().take(MAX_CHARS).collect();
-    if short.len() < text.len() {
-        short.push_str("...");
-    }
-    short
+    excerpt(text, MAX_CHARS)
 }
 
 #[cfg(test)]
@@ -128,6 +126,12 @@ mod tests {
         assert_eq!(nearest("fv", known), Some("fov"));
         assert_eq!(nearest("zzz", known), None);
         assert_eq!(nearest(&"c".repeat(100_000), known), None);
+    }
+
+    #[test]
+    fn text_of_the_file_is_printable_and_short() {
+        assert_eq!(shortened("a\u{1b}[31mb\u{202e}\n"), r"a\u{1b}[31mb\u{202e}\n");
+        assert_eq!(shortened(&"ä".repeat(100)), format!("{}...", "ä".repeat(60)));
     }
 
     #[test]

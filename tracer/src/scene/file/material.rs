@@ -5,17 +5,18 @@ use std::path::PathBuf;
 
 use glam::Vec3;
 
-use super::super::{Filter, MAX_EXPONENT, Material};
+use super::super::{Filter, MAX_EXPONENT, MAX_LIGHT, MAX_TILING, Material, Tiling, Wrap};
 use super::fault::{Read, shortened, suggestion};
 use super::table::Table;
 use super::value::Value;
 
-pub(super) const MATERIAL_KEYS: &[&str] = &["diffuse", "specular", "exponent", "reflect", "transmit", "ior"];
+pub(super) const MATERIAL_KEYS: &[&str] =
+    &["diffuse", "specular", "exponent", "reflect", "transmit", "ior", "emission", "emission_strength"];
 
 /// The exponent of a material that gives only a specular colour.
 const DEFAULT_EXPONENT: f32 = 50.0;
 
-const TEXTURE_KEYS: &[&str] = &["texture", "filter"];
+const TEXTURE_KEYS: &[&str] = &["texture", "filter", "wrap", "scale", "offset"];
 
 /// A texture whose picture has not been loaded.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,38 +26,68 @@ pub(crate) struct TextureText {
     /// Offset of the file's name in the text, for messages.
     pub(crate) at: usize,
     pub(crate) filter: Filter,
+    pub(crate) tiling: Tiling,
 }
 
-pub(super) fn material(table: Table<'_>) -> Read<(Material, Option<TextureText>)> {
+/// The textures of a material; one at least.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct TexturesText {
+    pub(crate) diffuse: Option<TextureText>,
+    pub(crate) emission: Option<TextureText>,
+}
+
+impl TexturesText {
+    /// Whether one of them wants the whole repeats of texture coordinates.
+    pub(crate) fn tell_repeats_apart(&self) -> bool {
+        [&self.diffuse, &self.emission].into_iter().flatten().any(|text| text.tiling.tells_repeats_apart())
+    }
+}
+
+pub(super) fn material(table: Table<'_>) -> Read<(Material, Option<TexturesText>)> {
     refuse_bounces(table)?;
     let exponent = |value: Value<'_>| {
         value.number("from 0 to 1e6", |n| (0.0..=f64::from(MAX_EXPONENT)).contains(&n)).map(|n| n as f32)
     };
-    let (diffuse, texture) = table.read("diffuse", diffuse)?.unwrap_or((Material::NEUTRAL.diffuse, None));
+    let diffuse = table.read("diffuse", |value| color_or_texture(value, 1.0))?;
+    let (diffuse, texture) = diffuse.unwrap_or((Material::NEUTRAL.diffuse, None));
+    let emission = table.read("emission", |value| color_or_texture(value, MAX_LIGHT))?;
+    let (emission, emission_texture) = emission.unwrap_or((Vec3::ZERO, None));
+    let strength = table.read("emission_strength", |value| {
+        let brightest = emission.max_element().max(1.0);
+        let most = f64::from(MAX_LIGHT / brightest);
+        value.number("not negative, and times `emission` up to 1e30", |n| (0.0..=most).contains(&n))
+    })?;
     let material = Material {
         diffuse,
         specular: table.read("specular", |value| value.color(1.0))?.unwrap_or(Vec3::ZERO),
         exponent: table.read("exponent", exponent)?.unwrap_or(DEFAULT_EXPONENT),
-        texture: None,
+        emission: emission * strength.unwrap_or(1.0) as f32,
+        ..Material::NEUTRAL
     };
-    Ok((material, texture))
+    let textures = TexturesText { diffuse: texture, emission: emission_texture };
+    let any = textures.diffuse.is_some() || textures.emission.is_some();
+    Ok((material, any.then_some(textures)))
 }
 
 /// A colour, or white with a texture.
-fn diffuse(value: Value<'_>) -> Read<(Vec3, Option<TextureText>)> {
+fn color_or_texture(value: Value<'_>, limit: f32) -> Read<(Vec3, Option<TextureText>)> {
     if !value.table() {
-        return Ok((value.color(1.0)?, None));
+        return Ok((value.color(limit)?, None));
     }
     let name = value.to_string();
     let table = Table::open(&name, value.value, TEXTURE_KEYS)?;
     let file = table.required("texture")?;
-    if file.text()?.is_empty() {
-        return Err(file.must_be("the name of a picture file"));
-    }
+    let usual = Tiling::default();
+    let pair = |value: Value<'_>| value.pair(MAX_TILING);
     let texture = TextureText {
-        file: PathBuf::from(file.text()?),
+        file: PathBuf::from(file.file_name("the name of a picture file")?),
         at: file.start(),
         filter: table.read("filter", |value| value.word(&Filter::WORDS))?.unwrap_or(Filter::Bilinear),
+        tiling: Tiling {
+            wrap: table.read("wrap", |value| value.word(&Wrap::WORDS))?.unwrap_or(usual.wrap),
+            scale: table.read("scale", pair)?.unwrap_or(usual.scale),
+            offset: table.read("offset", pair)?.unwrap_or(usual.offset),
+        },
     };
     Ok((Vec3::ONE, Some(texture)))
 }
@@ -75,10 +106,10 @@ fn refuse_bounces(table: Table<'_>) -> Read<()> {
 /// The scene's materials, found by name.
 #[derive(Default)]
 pub(super) struct Materials {
-    names: Vec<String>,
+    names: BTreeMap<String, u32>,
     values: Vec<Material>,
     /// By the index of their material.
-    textures: BTreeMap<u32, TextureText>,
+    textures: BTreeMap<u32, TexturesText>,
     neutral: Option<u32>,
 }
 
@@ -86,13 +117,14 @@ impl Materials {
     /// Materials of these names; their values follow by [`Materials::define`], the neutral one until then.
     pub(super) fn named(names: Vec<String>) -> Self {
         let values = vec![Material::NEUTRAL; names.len()];
+        let names = names.into_iter().zip(0..).collect();
         Self { names, values, ..Self::default() }
     }
 
-    pub(super) fn define(&mut self, index: usize, (material, texture): (Material, Option<TextureText>)) {
+    pub(super) fn define(&mut self, index: usize, (material, textures): (Material, Option<TexturesText>)) {
         if let Some(value) = self.values.get_mut(index) {
             *value = material;
-            self.textures.extend(texture.map(|texture| (index as u32, texture)));
+            self.textures.extend(textures.map(|textures| (index as u32, textures)));
         }
     }
 
@@ -100,14 +132,18 @@ impl Materials {
         self.textures.contains_key(&index)
     }
 
+    /// Whether a texture of a material wants the whole repeats of texture coordinates.
+    pub(super) fn tells_repeats_apart(&self, index: u32) -> bool {
+        self.textures.get(&index).is_some_and(TexturesText::tell_repeats_apart)
+    }
+
     /// The index that the `material` of a table refers to, if it has one.
     pub(super) fn referred(&self, table: Table<'_>) -> Read<Option<u32>> {
         table.read("material", |value| {
             let name = value.text()?;
-            let found = self.names.iter().position(|known| known == name);
-            found.map(|index| index as u32).ok_or_else(|| {
+            self.names.get(name).copied().ok_or_else(|| {
                 let name = shortened(name);
-                let known = self.names.iter().map(String::as_str);
+                let known = self.names.keys().map(String::as_str);
                 let hint = suggestion(&name, known, |list| {
                     let list = if list.is_empty() { "none".into() } else { list };
                     format!("; the file defines {list}. Add [material.{name}], or use one of those")
@@ -141,7 +177,7 @@ impl Materials {
     }
 
     /// The materials, and the textures of some by their index.
-    pub(super) fn into_parts(self) -> (Vec<Material>, BTreeMap<u32, TextureText>) {
+    pub(super) fn into_parts(self) -> (Vec<Material>, BTreeMap<u32, TexturesText>) {
         (self.values, self.textures)
     }
 }

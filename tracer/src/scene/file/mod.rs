@@ -21,14 +21,17 @@ use glam::Vec3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Background, Light, MAX_LIGHT, Material, Plane, RenderSettings, Sphere, Triangle};
+use super::{
+    Background, Light, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES,
+    MAX_TRIANGLES, Material, Plane, RenderSettings, Sphere, Triangle,
+};
 use fault::{FirstFault, Read};
 use material::Materials;
 use table::{Table, tables_of};
 use value::Value;
 
 pub(super) use fault::{Fault, place};
-pub(super) use material::TextureText;
+pub(super) use material::{TextureText, TexturesText};
 pub(super) use objects::ModelText;
 pub(super) use view::{Aim, CameraText};
 
@@ -57,7 +60,7 @@ pub(super) struct SceneText {
     pub(super) lights: Vec<Light>,
     pub(super) materials: Vec<Material>,
     /// By the index of their material.
-    pub(super) textures: BTreeMap<u32, TextureText>,
+    pub(super) textures: BTreeMap<u32, TexturesText>,
     pub(super) models: Vec<ModelText>,
     pub(super) spheres: Vec<Sphere>,
     pub(super) planes: Vec<Plane>,
@@ -84,9 +87,12 @@ impl Reading {
 /// The fault that stands first in the text: no TOML, an unknown key, a value of the wrong type or out of range, an
 /// unknown material, a feature that is not built yet.
 pub(super) fn read(text: &str) -> Read<SceneText> {
+    check_size(text)?;
     let document = DeTable::parse(text).map_err(|e| {
         let at = e.span().map_or(0, |span| span.start);
-        Fault { at, message: format!("not valid TOML: {}", e.message()) }
+        let message = e.message().trim().replace('\n', ", ");
+        let hint = if has_escape(text, at) { format!("; {}", value::ESCAPES) } else { String::new() };
+        Fault { at, message: format!("not valid TOML: {message}{hint}") }
     })?;
     let top = Table::of("the scene file", 0, document.get_ref(), KEYS)?;
     let mut first = FirstFault::default();
@@ -94,6 +100,40 @@ pub(super) fn read(text: &str) -> Read<SceneText> {
     first.into_result()?;
     // Without a fault every section has been read.
     scene.ok_or_else(|| top.fault("the scene file cannot be read"))
+}
+
+/// Whether the line at an offset has a back slash in double quotes up to there, or just behind.
+fn has_escape(text: &str, at: usize) -> bool {
+    let start = text.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
+    let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
+    let mut quote = None;
+    line.chars().any(|c| {
+        match quote {
+            None if matches!(c, '"' | '\'') => quote = Some(c),
+            Some(open) if open == c => quote = None,
+            _ => {}
+        }
+        c == '\\' && quote == Some('"')
+    })
+}
+
+/// Values of a scene file, tables and lists included. The parsed text takes some hundred bytes for each.
+const MAX_VALUES: usize = 1 << 24;
+
+/// Refuses a text whose parsed form would take far more memory than the text: 60 MB of `{}` take gigabytes. Every value
+/// but the first comes after one of these characters; those in strings and comments are counted as well.
+fn check_size(text: &str) -> Read<()> {
+    let begins_value = |byte: u8| matches!(byte, b'=' | b',' | b'[' | b'{');
+    let mut places = text.bytes().enumerate().filter(|(_, byte)| begins_value(*byte)).map(|(at, _)| at);
+    match places.nth(MAX_VALUES) {
+        Some(at) => Err(Fault {
+            at,
+            message: format!(
+                "more than {MAX_VALUES} values in a scene file; write meshes as models (`.obj`) and name them here"
+            ),
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Reads every section, so that the first fault of them all can be told; `None` when there was one.
@@ -107,16 +147,17 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let background =
         section(top, "background", "[background]", view::BACKGROUND_KEYS, view::background, first);
     let light = |table: Table<'_>| light::light(table, reading);
-    let lights = list(top, "light", "[[light]]", light::LIGHT_KEYS, light, first);
+    let lights = list(top, "light", "[[light]]", (light::LIGHT_KEYS, MAX_LIGHTS), light, first);
     let mut materials = read_materials(top, first);
-    let model = |table: Table<'_>| objects::model(table, &materials);
-    let models = list(top, "model", "[[model]]", objects::MODEL_KEYS, model, first);
+    let model = |table: Table<'_>| objects::model(table, &materials, reading);
+    let models = list(top, "model", "[[model]]", (objects::MODEL_KEYS, MAX_MODELS), model, first);
     let sphere = |table: Table<'_>| objects::sphere(table, &mut materials);
-    let spheres = list(top, "sphere", "[[sphere]]", objects::SPHERE_KEYS, sphere, first);
+    let spheres = list(top, "sphere", "[[sphere]]", (objects::SPHERE_KEYS, MAX_SPHERES), sphere, first);
     let plane = |table: Table<'_>| objects::plane(table, &mut materials);
-    let planes = list(top, "plane", "[[plane]]", objects::PLANE_KEYS, plane, first);
+    let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
     let triangle = |table: Table<'_>| objects::triangle(table, &mut materials, reading);
-    let triangles = list(top, "triangle", "[[triangle]]", objects::TRIANGLE_KEYS, triangle, first);
+    let triangles =
+        list(top, "triangle", "[[triangle]]", (objects::TRIANGLE_KEYS, MAX_TRIANGLES), triangle, first);
     reading.warnings.sort_by_key(|warning| warning.at);
     let (materials, textures) = materials.into_parts();
     Some(SceneText {
@@ -147,20 +188,36 @@ fn section<'t, T>(
     first.keep(top.read(key, |value| read(Table::open(name, value.value, known)?)))
 }
 
-/// Reads each table of a list; those with a fault are missing from the result.
+/// Reads each table of a list, of which there may be `most`; those with a fault are missing from the result.
 fn list<'t, T>(
     top: Table<'t>,
     key: &'static str,
     name: &'t str,
-    known: &[&str],
+    (known, most): (&[&str], usize),
     mut read: impl FnMut(Table<'t>) -> Read<T>,
     first: &mut FirstFault,
 ) -> Vec<T> {
-    let tables = first.keep(tables_of(top.get(key))).unwrap_or_default();
+    let tables =
+        first.keep(tables_of(top.get(key)).and_then(|tables| within(tables, name, most))).unwrap_or_default();
     tables
         .into_iter()
         .filter_map(|value| first.keep(Table::open(name, value, known).and_then(&mut read)))
         .collect()
+}
+
+/// Refuses a list that is too long, before any of it is built.
+fn within<'t>(
+    tables: Vec<&'t Spanned<DeValue<'t>>>,
+    name: &str,
+    most: usize,
+) -> Read<Vec<&'t Spanned<DeValue<'t>>>> {
+    match tables.get(most) {
+        Some(first_beyond) => {
+            let count = tables.len();
+            Err(Fault::at_value(first_beyond, format!("{count} times {name}, at most {most} are allowed")))
+        }
+        None => Ok(tables),
+    }
 }
 
 /// All names are known before a value is read, so that a fault in one material hides none in its users.
@@ -180,6 +237,10 @@ fn read_materials(top: Table<'_>, first: &mut FirstFault) -> Materials {
 
 fn material_tables<'t>(value: Value<'t>) -> Read<Vec<(&'t str, &'t Spanned<DeValue<'t>>)>> {
     match value.value.get_ref() {
+        DeValue::Table(entries) if entries.len() > MAX_MATERIALS => {
+            let count = entries.len();
+            Err(value.fault(format!("{count} materials, at most {MAX_MATERIALS} are allowed")))
+        }
         DeValue::Table(entries) => {
             Ok(entries.iter().map(|(name, value)| (name.get_ref().as_ref(), value)).collect())
         }

@@ -4,14 +4,16 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::super::{MAX_COORDINATE, NormalMode, Plane, Sphere, Triangle};
+use super::super::{MAX_COORDINATE, NormalMode, Plane, Sphere, Triangle, Up};
 use super::Reading;
 use super::fault::Read;
 use super::material::Materials;
 use super::table::Table;
 use super::value::Value;
+use crate::texture::without_repeats;
 
-pub(super) const MODEL_KEYS: &[&str] = &["file", "material", "normals", "translate", "rotate", "scale"];
+pub(super) const MODEL_KEYS: &[&str] =
+    &["file", "material", "normals", "translate", "rotate", "scale", "up", "crease_angle"];
 pub(super) const SPHERE_KEYS: &[&str] = &["center", "radius", "material"];
 pub(super) const PLANE_KEYS: &[&str] = &["point", "normal", "material"];
 pub(super) const TRIANGLE_KEYS: &[&str] = &["vertices", "uvs", "material"];
@@ -28,27 +30,41 @@ pub(crate) struct ModelText {
     /// Offset of that material's name in the text.
     pub(crate) material_at: usize,
     pub(crate) normals: NormalMode,
+    /// Degrees, and the offset of the value in the text.
+    pub(crate) crease_angle: Option<(f64, usize)>,
     pub(crate) translate: DVec3,
+    /// The rotation that turns the file upright goes first.
     pub(crate) rotate: DVec3,
+    /// Along the axes of the file.
     pub(crate) scale: DVec3,
 }
 
-pub(super) fn model(table: Table<'_>, materials: &Materials) -> Read<ModelText> {
+pub(super) fn model(table: Table<'_>, materials: &Materials, reading: &mut Reading) -> Read<ModelText> {
     let file = table.required("file")?;
-    let name = file.text()?;
-    if name.is_empty() {
-        return Err(file.must_be("the name of a model file"));
-    }
+    let name = file.file_name("the name of a model file")?;
     let modes = [("smooth", NormalMode::Smooth), ("flat", NormalMode::Flat)];
+    let normals = table.read("normals", |value| value.word(&modes))?.unwrap_or(NormalMode::Smooth);
+    let crease_angle = table.read("crease_angle", |value| {
+        Ok((value.number("of degrees from 0 to 180", |n| (0.0..=180.0).contains(&n))?, value.start()))
+    })?;
+    if let (Some((_, at)), NormalMode::Flat) = (crease_angle, normals) {
+        let message = "`crease_angle` in [[model]] has no effect where `normals` is \"flat\"".to_owned();
+        reading.warn(at, message);
+    }
+    let rotate = table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
+    let scale = table.read("scale", scale)?.unwrap_or(DVec3::ONE);
+    let up = table.read("up", |value| value.word(&Up::WORDS))?.unwrap_or_default();
+    let (rotate, scale) = up.before(rotate, scale);
     Ok(ModelText {
         file: PathBuf::from(name),
         at: file.start(),
         material: materials.referred(table)?,
         material_at: table.get("material").map_or(0, |value| value.start()),
-        normals: table.read("normals", |value| value.word(&modes))?.unwrap_or(NormalMode::Smooth),
+        normals,
+        crease_angle,
         translate: table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
-        rotate: table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
-        scale: table.read("scale", scale)?.unwrap_or(DVec3::ONE),
+        rotate,
+        scale,
     })
 }
 
@@ -94,7 +110,11 @@ pub(super) fn triangle(
         Some(_) => materials.referred_or_neutral(table)?,
         None => materials.referred_plain(table, "add `uvs`, or use a material with a colour")?,
     };
-    let uvs = uvs.filter(|_| materials.has_texture(material));
+    // Checked when they were read: a triangle that has a texture has coordinates.
+    let uvs = uvs.filter(|_| materials.has_texture(material)).map(|uvs| {
+        let near = without_repeats(uvs).filter(|_| !materials.tells_repeats_apart(material));
+        near.unwrap_or(uvs.map(|uv| uv.as_vec2()))
+    });
     let [a, b, c] = vertices;
     if a == b || b == c || c == a {
         reading.warn(value.start(), format!("{value} has no area: the triangle is left out"));

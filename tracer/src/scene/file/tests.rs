@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::{Attenuation, Filter, LightKind, NormalMode};
+use crate::scene::{Attenuation, Filter, LightKind, NormalMode, Tiling, Wrap};
 
 /// A scene with one of everything, as the format's page shows it.
 const WHOLE: &str = r#"
@@ -66,6 +66,26 @@ normal = [0.0, 3.0, 4.0]
 vertices = [[0,0,0], [1,0,0], [0,1,0]]
 material = "marble"
 "#;
+
+#[test]
+fn models_may_be_turned_upright_and_have_a_crease_angle() {
+    let text = "[[model]]\nfile = \"a.obj\"\nup = \"z\"\nscale = [1, 2, 3]\nrotate = [10, 20, 30]\n\
+                [[model]]\nfile = \"a.obj\"\nup = \"y\"\ncrease_angle = 25\n\
+                [[model]]\nfile = \"a.obj\"\nnormals = \"flat\"\ncrease_angle = 25\n";
+    let scene = read(text).unwrap();
+    let [z, y, flat] = &scene.models[..] else { panic!("three models") };
+    // The file is turned before all else: about x, so that its z is what the scene calls y.
+    assert_eq!((z.rotate, z.scale), (DVec3::new(-80.0, 20.0, 30.0), DVec3::new(1.0, 3.0, 2.0)));
+    assert_eq!((z.crease_angle, y.crease_angle), (None, Some((25.0, text.find("25").unwrap()))));
+    assert_eq!((y.rotate, y.scale), (DVec3::ZERO, DVec3::ONE));
+    assert_eq!(flat.normals, NormalMode::Flat);
+    assert_eq!(scene.warnings.len(), 1);
+    assert!(
+        scene.warnings[0].message.contains("`crease_angle` in [[model]] has no effect"),
+        "{:?}",
+        scene.warnings
+    );
+}
 
 #[test]
 fn a_whole_scene_is_read() {
@@ -224,6 +244,7 @@ fn values_out_of_range_are_refused() {
         (with("", "[material.a]\nreflect = 2"), "2:11", &["from 0 to 1"]),
         (with("", "[[model]]\nfile = \"\""), "2:8", &["name of a model file"]),
         (with("", "[[model]]\nfile = \"a.obj\"\nscale = 0"), "3:9", &["none of them 0, but is 0"]),
+        (with("", "[[model]]\nfile = \"a.obj\"\ncrease_angle = 181"), "3:16", &["from 0 to 180"]),
         (with("", "[[model]]\nfile = \"a.obj\"\nscale = [1, 0, 1]"), "3:9", &["none of them 0"]),
         (with("", "[[model]]\nfile = \"a.obj\"\ntranslate = [1e31, 0, 0]"), "3:14", &["up to 1e30"]),
         (with("", "[[sphere]]\ncenter = [0,0,0]\nradius = 0"), "3:10", &["above 0"]),
@@ -242,6 +263,7 @@ fn unknown_words_and_materials_are_refused_with_the_nearest() {
         ("[camera]\nkind = \"pinhol\"", "2:8", &["did you mean `pinhole`?"]),
         ("[[light]]\nposition=[0,0,0]\nattenuation = \"inverse\"", "3:15", &["`inverse_square`"]),
         ("[[model]]\nfile = \"a.obj\"\nnormals = \"smoth\"", "3:11", &["did you mean `smooth`?"]),
+        ("[[model]]\nfile = \"a.obj\"\nup = \"x\"", "3:6", &["unknown word `x`"]),
         (
             "[material.glass]\n[[model]]\nfile = \"a.obj\"\nmaterial = \"glas\"",
             "4:12",
@@ -284,10 +306,18 @@ fn textures_and_texture_coordinates_are_read() {
     );
     let scene = read(&text).unwrap();
     let wood = scene.triangles[0].material;
-    let texture = &scene.textures[&wood];
+    let texture = scene.textures[&wood].diffuse.as_ref().unwrap();
     assert_eq!((texture.file.to_str(), texture.filter), (Some("maps/wood.png"), Filter::Bilinear));
     assert_eq!(place(&text, texture.at), (2, 23));
-    assert_eq!(scene.textures.values().filter(|texture| texture.filter == Filter::Nearest).count(), 1);
+    assert_eq!(
+        scene
+            .textures
+            .values()
+            .filter_map(|texts| texts.diffuse.as_ref())
+            .filter(|text| text.filter == Filter::Nearest)
+            .count(),
+        1
+    );
     assert_eq!(scene.textures.len(), 2);
     assert_eq!(scene.materials[wood as usize].diffuse, Vec3::ONE);
     let uvs = [Vec2::new(0.75, 0.0), Vec2::new(9.0, 1.5), Vec2::new(1.0, 2.0)];
@@ -295,6 +325,30 @@ fn textures_and_texture_coordinates_are_read() {
     // Nothing asks for them there.
     assert_eq!(scene.triangles[1].uvs, None);
     assert_eq!(place(&text, scene.models[0].material_at), (17, 12));
+}
+
+#[test]
+fn emission_and_the_places_of_textures_are_read() {
+    let text = format!(
+        "[material.lamp]\nemission = [1, 0.5, 0]\nemission_strength = 4\n\
+         [material.screen]\nemission = {{ texture = \"a.png\" }}\nemission_strength = 2\n\
+         [material.tiles]\ndiffuse = {{ texture = \"b.png\", wrap = \"mirror\", scale = [3, -0.5], offset = [0.5, 1] }}\n\
+         [[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = \"lamp\"\n\
+         [[triangle]]\n{CORNERS}uvs = [[-7.25, 3], [1, 4.5], [-7, 5]]\nmaterial = \"tiles\"\n\
+         [[triangle]]\n{CORNERS}uvs = [[-7.25, 3], [1, 4.5], [-7, 5]]\nmaterial = \"screen\"\n"
+    );
+    let scene = read(&text).unwrap();
+    let material = |index: u32| scene.materials[index as usize];
+    assert_eq!(material(scene.spheres[0].material).emission, Vec3::new(4.0, 2.0, 0.0));
+    let [tiles, screen] = [0, 1].map(|triangle: usize| scene.triangles[triangle].material);
+    assert_eq!(material(screen).emission, Vec3::splat(2.0));
+    assert!(scene.textures[&screen].diffuse.is_none() && scene.textures[&screen].emission.is_some());
+    let tiling = scene.textures[&tiles].diffuse.as_ref().unwrap().tiling;
+    let expected = Tiling { wrap: Wrap::Mirror, scale: Vec2::new(3.0, -0.5), offset: Vec2::new(0.5, 1.0) };
+    assert_eq!(tiling, expected);
+    // A picture that is mirrored tells whole repeats apart.
+    assert_eq!(scene.triangles[0].uvs.unwrap()[0], Vec2::new(-7.25, 3.0));
+    assert_eq!(scene.triangles[1].uvs.unwrap()[0], Vec2::new(0.75, 0.0));
 }
 
 #[test]
@@ -316,9 +370,29 @@ fn faults_of_textures_name_their_place() {
             &["unknown word `linear`", "`filter` in `diffuse` in [material.a]", "bilinear"],
         ),
         (
-            "[material.a]\ndiffuse = { texture = \"a.png\", scale = 2 }".to_owned(),
+            "[material.a]\ndiffuse = { texture = \"a.png\", filters = 2 }".to_owned(),
             "2:32",
-            &["unknown key `scale`", "`filter`"],
+            &["unknown key `filters`", "`filter`"],
+        ),
+        (
+            "[material.a]\ndiffuse = { texture = \"a.png\", scale = 2 }".to_owned(),
+            "2:40",
+            &["`scale` in `diffuse` in [material.a]", "an array of two finite numbers up to 1000000", "is 2"],
+        ),
+        (
+            "[material.a]\nemission = { texture = \"a.png\", offset = [0, 1e7] }".to_owned(),
+            "2:42",
+            &["`offset` in `emission` in [material.a]", "up to 1000000"],
+        ),
+        (
+            "[material.a]\ndiffuse = { texture = \"a.png\", wrap = \"once\" }".to_owned(),
+            "2:39",
+            &["unknown word `once`", "`repeat`, `clamp`, `mirror`"],
+        ),
+        (
+            "[material.a]\nemission = [1e29, 0, 0]\nemission_strength = 100".to_owned(),
+            "3:21",
+            &["`emission_strength` in [material.a]", "up to 1e30"],
         ),
         (
             with("[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial=\"wood\""),
@@ -484,4 +558,22 @@ proptest! {
             prop_assert!(fault.at <= text.len());
         }
     }
+}
+
+#[test]
+fn lists_are_counted_before_they_are_built() {
+    let lights = "[[light]]\n".repeat(MAX_LIGHTS + 1);
+    let fault = read(&lights).unwrap_err();
+    assert_eq!(fault.message, "4097 times [[light]], at most 4096 are allowed");
+    assert_eq!(place(&lights, fault.at).0, MAX_LIGHTS + 1);
+    let materials: String = (0..=MAX_MATERIALS).map(|index| format!("m{index}={{}}\n")).collect();
+    let fault = read(&format!("[material]\n{materials}")).unwrap_err();
+    assert!(fault.message.contains("262145 materials, at most 262144"), "{}", fault.message);
+}
+
+#[test]
+fn a_text_of_too_many_values_is_refused_before_it_is_parsed() {
+    let text = format!("a = [{}]", "{},".repeat(MAX_VALUES / 2));
+    let fault = read(&text).unwrap_err();
+    assert!(fault.message.contains("more than 16777216 values"), "{}", fault.message);
 }

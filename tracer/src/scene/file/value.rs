@@ -8,7 +8,11 @@ use toml::de::DeValue;
 
 use super::super::MAX_COORDINATE;
 use super::fault::{Fault, Read, shortened, suggestion};
-use crate::texture::without_repeats;
+use crate::texture::are_usable;
+
+/// What to do about back slashes in paths.
+pub(super) const ESCAPES: &str = "a back slash in double quotes begins an escape: write / in paths, as in \
+                                  \"models/new.obj\", or put them in 'single quotes'";
 
 /// A value and the key it belongs to.
 #[derive(Clone, Copy)]
@@ -78,6 +82,20 @@ impl<'t> Value<'t> {
         self.value.get_ref().as_str().ok_or_else(|| self.must_be("a text in quotes"))
     }
 
+    /// The name of a file. A back slash in double quotes may have become a line break, a tab or the like.
+    pub(super) fn file_name(&self, expected: &str) -> Read<&'t str> {
+        let name = self.text()?;
+        if name.is_empty() {
+            return Err(self.must_be(expected));
+        }
+        if name.contains(char::is_control) {
+            let name = shortened(name);
+            let message = format!("{self} is \"{name}\", with characters that no file's name has; {ESCAPES}");
+            return Err(self.fault(message));
+        }
+        Ok(name)
+    }
+
     /// One of a few words.
     pub(super) fn word<T: Copy>(&self, words: &[(&str, T)]) -> Read<T> {
         let known = words.iter().map(|(word, _)| *word);
@@ -111,22 +129,20 @@ impl<'t> Value<'t> {
         Ok([point(a)?, point(b)?, point(c)?])
     }
 
-    /// Three pairs of texture coordinates, whole repeats taken off.
-    pub(super) fn three_uvs(&self) -> Read<[Vec2; 3]> {
+    /// Three pairs of texture coordinates.
+    pub(super) fn three_uvs(&self) -> Read<[DVec2; 3]> {
         let expected = "an array of three pairs of finite numbers up to 1e6";
         let pairs = self.value.get_ref().as_array().and_then(|pairs| {
-            let pair = |item: &Spanned<DeValue<'_>>| {
-                let numbers: Vec<f64> = item
-                    .get_ref()
-                    .as_array()?
-                    .iter()
-                    .map(|item| finite(item.get_ref()))
-                    .collect::<Option<_>>()?;
-                <[f64; 2]>::try_from(numbers).ok().map(DVec2::from_array)
-            };
             <[DVec2; 3]>::try_from(pairs.iter().map(pair).collect::<Option<Vec<_>>>()?).ok()
         });
-        pairs.and_then(without_repeats).ok_or_else(|| self.must_be(expected))
+        pairs.filter(are_usable).ok_or_else(|| self.must_be(expected))
+    }
+
+    /// Two numbers up to `limit` in magnitude.
+    pub(super) fn pair(&self, limit: f32) -> Read<Vec2> {
+        let fits = |pair: &DVec2| pair.abs().cmple(DVec2::splat(f64::from(limit))).all();
+        let expected = || format!("an array of two finite numbers up to {limit}");
+        pair(self.value).filter(fits).map(|pair| pair.as_vec2()).ok_or_else(|| self.must_be(&expected()))
     }
 
     fn vector_of<'a>(
@@ -173,6 +189,12 @@ pub(super) fn unit(vector: DVec3) -> Option<DVec3> {
     let scaled = DVec3::from_array(vector.to_array().map(|c| libm::ldexp(c, -exponent)));
     let length = scaled.length();
     (length > 0.0).then(|| scaled / length)
+}
+
+/// Two finite numbers.
+fn pair(item: &Spanned<DeValue<'_>>) -> Option<DVec2> {
+    let numbers = item.get_ref().as_array()?.iter().map(|item| finite(item.get_ref()));
+    <[f64; 2]>::try_from(numbers.collect::<Option<Vec<_>>>()?).ok().map(DVec2::from_array)
 }
 
 /// A number that is neither infinite nor NaN.

@@ -24,6 +24,7 @@ pub(super) const RENDER_KEYS: &[&str] = &[
     "exponent",
     "pixels",
     "scale",
+    "dither",
 ];
 pub(super) const CAMERA_KEYS: &[&str] =
     &["kind", "position", "look_at", "direction", "rotation", "up", "fov", "view_height", "zoom"];

@@ -6,11 +6,10 @@ fn box_mesh(lower: DVec3, upper: DVec3) -> CompiledMesh {
         vec![lower, DVec3::new(upper.x, lower.y, lower.z), upper, DVec3::new(lower.x, upper.y, upper.z)];
     let mesh = Mesh {
         positions,
-        normals: Vec::new(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         triangle_materials: vec![0, 0],
-        uvs: Vec::new(),
-        materials: vec![NamedMaterial { name: "a".into(), material: Material::NEUTRAL, texture: None }],
+        materials: vec![NamedMaterial::plain("a", Material::NEUTRAL)],
+        ..Mesh::default()
     };
     CompiledMesh::compile(&mesh).unwrap().0
 }
@@ -25,32 +24,92 @@ fn projected(camera: &Camera, aspect: f64, point: DVec3) -> Option<(f64, f64)> {
     (half > 0.0).then(|| (to.dot(right) / (half * aspect), to.dot(up) / half))
 }
 
+/// The share of width and height between the outermost of some points, and the middle between them.
+fn filled(camera: &Camera, (width, height): (u32, u32), points: &[DVec3]) -> [(f64, f64); 2] {
+    let aspect = f64::from(width) / f64::from(height);
+    let places: Vec<_> = points.iter().map(|point| projected(camera, aspect, *point).unwrap()).collect();
+    let span = |axis: fn(&(f64, f64)) -> f64| {
+        let least = places.iter().map(axis).fold(f64::INFINITY, f64::min);
+        let most = places.iter().map(axis).fold(f64::NEG_INFINITY, f64::max);
+        ((most - least) / 2.0, (most + least) / 2.0)
+    };
+    [span(|place| place.0), span(|place| place.1)]
+}
+
+/// How far ahead of the camera the nearest of some points is.
+fn nearest(camera: &Camera, points: &[DVec3]) -> f64 {
+    let forward = (camera.look_at - camera.position).normalize();
+    points.iter().map(|point| (*point - camera.position).dot(forward)).fold(f64::INFINITY, f64::min)
+}
+
+fn half_diagonal(lower: DVec3, upper: DVec3) -> f64 {
+    (upper - lower).length() / 2.0
+}
+
+const SIZES: [(u32, u32); 6] = [(1024, 768), (300, 300), (90, 160), (1920, 800), (1, 16384), (16384, 1)];
+
 #[test]
-fn a_bare_model_is_wholly_in_the_picture() {
+fn a_bare_model_fills_nine_tenths_of_every_picture() {
     for (lower, upper) in [
         (DVec3::splat(-1.0), DVec3::splat(1.0)),
         (DVec3::new(0.0, 0.0, 0.0), DVec3::new(100.0, 1.0, 0.01)),
         (DVec3::new(1e7, -1e7, 0.0), DVec3::new(1e7 + 1.0, -1e7 + 3.0, 2.0)),
-        (DVec3::splat(-1e-9), DVec3::new(1e-9, 1e-8, 1e-9)),
+        (DVec3::splat(-1e-6), DVec3::new(1e-6, 1e-5, 1e-6)),
+        (DVec3::splat(-1e6), DVec3::new(3e6, 1e6, 1e6)),
         (DVec3::ZERO, DVec3::new(1.0, 1000.0, 1.0)),
+        (DVec3::ZERO, DVec3::new(5.0, 0.0, 5.0)),
+        (DVec3::ZERO, DVec3::new(0.0, 5.0, 0.001)),
     ] {
-        let scene = bare_model(&box_mesh(lower, upper));
-        scene.validate().unwrap();
-        for corner in 0..8 {
-            let pick = |axis: usize| if corner & (1 << axis) == 0 { lower[axis] } else { upper[axis] };
-            let corner = DVec3::new(pick(0), pick(1), pick(2));
-            for aspect in [1.0, 4.0 / 3.0, 16.0 / 9.0] {
-                let (x, y) = projected(&scene.camera, aspect, corner).unwrap();
-                assert!(x.abs() < 1.0 && y.abs() < 1.0, "{corner} at {x} {y} of {:?}", scene.camera);
-            }
+        let mesh = box_mesh(lower, upper);
+        let scale = libm::exp2(f64::from(mesh.exponent()));
+        let vertices: Vec<DVec3> = mesh
+            .triangles()
+            .flat_map(|triangle| mesh.corners(triangle))
+            .map(|corner| mesh.center() + corner.as_dvec3() * scale)
+            .collect();
+        for (size, up) in SIZES.into_iter().flat_map(|size| [(size, Up::Y), (size, Up::Z)]) {
+            let scene = bare_model(&mesh, up, Some(size));
+            scene.validate().unwrap();
+            let upright: Vec<DVec3> = vertices.iter().map(|vertex| up.upright(*vertex)).collect();
+            let [(width, x), (height, y)] = filled(&scene.camera, size, &upright);
+            // Far from the origin the camera has as many digits as the model.
+            let fill = width.max(height);
+            // Seen from its end, or in a strip of a picture, a long model has the camera as near as it may be before that.
+            let is_at_least_distance =
+                nearest(&scene.camera, &upright) < 1.001 * NEAREST * half_diagonal(lower, upper);
+            let is_filled = (fill - 0.9).abs() < 1e-6 || is_at_least_distance && fill < 0.9;
+            assert!(is_filled, "{lower} {upper} {size:?}: {width} x {height}");
+            let (fullest, middle) = if width > height { (width, x) } else { (height, y) };
+            assert!(middle.abs() < 1e-6 || fill < 0.9 - 1e-6, "{middle} of {fullest}");
+            assert!(x.abs() + width < 1.0 && y.abs() + height < 1.0, "{x} {y}, {width} x {height}");
         }
-        // And it is not lost in the distance.
-        let (_, top) = projected(&scene.camera, 1.0, lower).unwrap();
-        let (_, bottom) = projected(&scene.camera, 1.0, upper).unwrap();
-        let (left, _) = projected(&scene.camera, 1.0, lower).unwrap();
-        let (right, _) = projected(&scene.camera, 1.0, upper).unwrap();
-        assert!((top - bottom).hypot(left - right) > 0.5, "{:?}", scene.camera);
     }
+}
+
+#[test]
+fn the_camera_looks_from_the_front_the_right_and_above() {
+    let camera = bare_model(&box_mesh(-DVec3::ONE, DVec3::ONE), Up::Y, None).camera;
+    let towards = (camera.position - camera.look_at).normalize();
+    assert!((towards - DVec3::new(0.6, 0.35, 1.0).normalize()).length() < 1e-12);
+    assert_eq!((camera.fov, camera.up), (45.0, DVec3::Y));
+}
+
+#[test]
+fn a_scene_without_a_camera_fills_its_picture_by_its_box() {
+    let bounds = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(9.0, 3.0, 4.0));
+    for size in SIZES {
+        let camera = camera_showing(Some(bounds), size);
+        let [(width, _), (height, _)] = filled(&camera, size, &corners_of(bounds).collect::<Vec<_>>());
+        assert!((width.max(height) - 0.9).abs() < 1e-9, "{size:?}: {width} x {height}");
+    }
+}
+
+#[test]
+fn a_model_whose_z_points_up_is_turned_upright() {
+    let mesh = Arc::new(box_mesh(DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 6.0)));
+    let scene = bare_model(&mesh, Up::Z, None);
+    let expected = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 6.0, 1.0));
+    assert_eq!(bounds(&scene, std::slice::from_ref(&mesh)), Some(expected));
 }
 
 #[test]
@@ -78,7 +137,7 @@ fn the_point_on_the_axis_is_the_one_nearest_to_the_middle() {
 #[test]
 fn bounds_follow_scale_rotation_and_translation() {
     let mesh = Arc::new(box_mesh(DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0)));
-    let mut scene = bare_model(&mesh);
+    let mut scene = bare_model(&mesh, Up::Y, None);
     assert_eq!(bounds(&scene, std::slice::from_ref(&mesh)), Some((DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0))));
     scene.models[0].scale = DVec3::new(1.0, -1.0, 0.5);
     scene.models[0].rotate = DVec3::new(0.0, 90.0, 0.0);

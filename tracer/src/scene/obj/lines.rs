@@ -2,6 +2,9 @@
 
 use std::borrow::Cow;
 
+use super::super::text::physical_lines;
+use super::numbers::is_in_a_number;
+
 /// A logical line: a keyword and what follows it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Line<'t> {
@@ -18,7 +21,7 @@ impl Line<'_> {
 
     /// What follows the keyword.
     pub(super) fn rest(&self) -> &str {
-        self.text.get(self.keyword().len()..).unwrap_or_default().trim_start()
+        self.text.get(self.keyword().len()..).unwrap_or_default().trim_ascii_start()
     }
 }
 
@@ -28,17 +31,19 @@ fn keyword(text: &str) -> &str {
 
 /// Whether the rest of such a line is a name: names may hold `#`, and paths may end in a backslash.
 fn holds_a_name(keyword: &str) -> bool {
-    matches!(keyword, "o" | "g" | "usemtl" | "mtllib" | "newmtl" | "bump" | "disp" | "decal")
-        || keyword.starts_with("map_")
+    const NAMED: [&str; 10] =
+        ["o", "g", "usemtl", "mtllib", "newmtl", "bump", "disp", "decal", "norm", "refl"];
+    NAMED.iter().any(|named| keyword.eq_ignore_ascii_case(named))
+        || keyword.get(..4).is_some_and(|start| start.eq_ignore_ascii_case("map_"))
 }
 
-/// The logical lines of a text, with `\n`, `\r\n` or both as line ends.
+/// The logical lines of a text.
 pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
-    let mut physical = text.split('\n').zip(1..);
+    let mut physical = physical_lines(text).zip(1..);
     std::iter::from_fn(move || {
         loop {
             let (line, number) = physical.next()?;
-            let line = line.trim();
+            let line = line.trim_ascii();
             if holds_a_name(keyword(line)) {
                 return Some(Line { number, text: Cow::Borrowed(line) });
             }
@@ -47,12 +52,12 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
             while let Some(continued) = end.strip_suffix('\\') {
                 joined.push_str(continued);
                 joined.push(' ');
-                end = physical.next().map_or("", |(line, _)| without_comment(line.trim()));
+                end = physical.next().map_or("", |(line, _)| without_comment(line.trim_ascii()));
             }
             let text = if joined.is_empty() {
                 Cow::Borrowed(end)
             } else {
-                Cow::Owned((joined + end).trim().to_owned())
+                Cow::Owned((joined + end).trim_ascii().to_owned())
             };
             if !text.is_empty() {
                 return Some(Line { number, text });
@@ -62,7 +67,9 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = Line<'_>> {
 }
 
 fn without_comment(line: &str) -> &str {
-    line.split('#').next().unwrap_or_default().trim_end()
+    let mut hashes = line.match_indices('#').map(|(at, _)| at);
+    let end = hashes.find(|&at| !is_in_a_number(line, at)).unwrap_or(line.len());
+    line.get(..end).unwrap_or_default().trim_ascii_end()
 }
 
 #[cfg(test)]
@@ -89,6 +96,13 @@ mod tests {
         assert_eq!(read(text), owned(&[(1, "f 1 2  3  4"), (4, "v 1 2")]));
         assert_eq!(read("f 1 \\"), owned(&[(1, "f 1")]));
         assert_eq!(read("\\\n\\\n"), []);
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_no_comments() {
+        let text = "vn -1.#IND 0 1.#QNAN # odd\nv 1.# 2\nv 1.#x\nvn 0 0 1.#INF#";
+        let expected = [(1, "vn -1.#IND 0 1.#QNAN"), (2, "v 1."), (3, "v 1."), (4, "vn 0 0 1.#INF")];
+        assert_eq!(read(text), owned(&expected));
     }
 
     #[test]

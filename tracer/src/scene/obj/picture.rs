@@ -1,19 +1,25 @@
-//! The picture that `map_Kd` names: options put aside, and only inside of the model's folder, as with the libraries
-//! themselves.
+//! The picture that `map_Kd` and its like name, and their options.
 
-use std::path::{Component, Path};
+use std::path::Path;
 
+use super::super::Tiling;
+use super::super::lookup::{Found, Lookup, Missing, tidy};
+use super::super::printed::excerpt;
 use super::super::warnings::Warnings;
 use super::lines::Line;
+use super::tiling::{TextureOption, tiling, warn_of_others};
 use crate::mesh::MAX_TEXTURE_NAME;
 
-/// Where a material library lies.
+/// Where a material library is.
 pub(super) struct Place<'p> {
-    /// The model's folder.
-    pub(super) folder: &'p Path,
+    /// Finds pictures in the model's folder.
+    pub(super) pictures: &'p Lookup<'p>,
     /// The library's folder inside of it.
     pub(super) inner: &'p Path,
 }
+
+/// Characters of a name that a message shows.
+const MAX_SHOWN: usize = 200;
 
 /// Options of texture statements, and how many words follow each at most.
 const OPTIONS: &[(&str, usize)] = &[
@@ -33,49 +39,69 @@ const OPTIONS: &[(&str, usize)] = &[
     ("-type", 1),
 ];
 
-/// The picture's file, relative to the model's folder, with `/` between its parts. The error says why it is not used.
-pub(super) fn picture(line: &Line<'_>, place: &Place<'_>, warnings: &mut Warnings) -> Result<String, String> {
+/// The picture's file, relative to the model's folder, with `/` between its parts, and how it lies. The error says why it is
+/// not used.
+pub(super) fn picture(
+    line: &Line<'_>,
+    place: &Place<'_>,
+    warnings: &mut Warnings,
+) -> Result<(String, Tiling), String> {
     let (name, options) = split_options(line.rest());
-    if name.is_empty() {
+    if tidy(name).is_empty() {
         return Err(format!("`{}` names no picture", line.keyword()));
     }
-    let short: String = name.chars().take(200).collect();
-    let outside = || {
-        format!(
-            "the picture `{short}` lies outside the model's folder and is not read; \
-             put it there, or give the model a material of the scene file"
-        )
+    let file = match place.pictures.find(place.inner, name) {
+        Ok(found) => {
+            note_other_place(line.number, name, &found, warnings);
+            found.name
+        }
+        Err(missing) => way_to_missing(name, missing, place)?,
     };
-    let inside = inside(place.inner, name).ok_or_else(outside)?;
-    if inside.len() > MAX_TEXTURE_NAME {
+    if file.len() > MAX_TEXTURE_NAME {
         return Err(format!(
             "the picture's name has {} bytes, at most {MAX_TEXTURE_NAME} are taken",
-            inside.len()
+            file.len()
         ));
     }
-    // A link inside the folder may still lead out of it. A picture that is not there is told when it is wanted.
-    let anchor = if place.folder.as_os_str().is_empty() { Path::new(".") } else { place.folder };
-    if let (Ok(real), Ok(anchor)) = (place.folder.join(&inside).canonicalize(), anchor.canonicalize())
-        && !real.starts_with(anchor)
-    {
-        return Err(outside());
-    }
-    if !options.is_empty() {
-        let options = options.join(", ");
+    warn_of_others(&options, line, warnings);
+    Ok((file, tiling(&options)))
+}
+
+fn note_other_place(line: usize, name: &str, found: &Found, warnings: &mut Warnings) {
+    if !found.as_named {
+        let (name, instead) = (excerpt(name, MAX_SHOWN), excerpt(&found.name, MAX_SHOWN));
         warnings.at_line(
-            line.number,
-            format!("{options}: options of textures are left out; the picture repeats once a unit"),
+            line,
+            format!("the picture `{name}` is not there: `{instead}` in the model's folder is taken"),
         );
     }
-    Ok(inside)
+}
+
+/// The way to a picture that is not there, to be reported when it is wanted; or why it is not looked for.
+fn way_to_missing(name: &str, missing: Missing, place: &Place<'_>) -> Result<String, String> {
+    let shown = excerpt(name, MAX_SHOWN);
+    match missing {
+        Missing::NotThere => {
+            let way = place.pictures.way(place.inner, name);
+            way.ok_or_else(|| format!("the picture `{shown}` is not in the model's folder; put it there"))
+        }
+        Missing::Absolute => Err(format!(
+            "the picture `{shown}` is named by a path of another disk, and there is none of its name in the model's \
+             folder; put it there"
+        )),
+        Missing::Above | Missing::Link => Err(format!(
+            "the picture `{shown}` is outside the model's folder and is not read; put it there, \
+             or allow it with --allow-parent-textures"
+        )),
+    }
 }
 
 /// The file name, which may hold spaces, and the options before it.
-fn split_options(rest: &str) -> (&str, Vec<&'static str>) {
+fn split_options(rest: &str) -> (&str, Vec<TextureOption<'_>>) {
     let mut rest = rest.trim();
     let mut given = Vec::new();
     while let Some((option, most)) = OPTIONS.iter().find(|(option, _)| first_word(rest) == *option) {
-        given.push(*option);
+        let mut words = Vec::new();
         rest = after_word(rest);
         for index in 0..*most {
             // The second and third number of a vector may be left out.
@@ -83,8 +109,10 @@ fn split_options(rest: &str) -> (&str, Vec<&'static str>) {
             if !number && (*most == 3 || index > 0) {
                 break;
             }
+            words.push(first_word(rest));
             rest = after_word(rest);
         }
+        given.push((*option, words));
     }
     (rest, given)
 }
@@ -97,30 +125,12 @@ fn after_word(text: &str) -> &str {
     text.split_once(|c: char| c.is_ascii_whitespace()).map_or("", |(_, rest)| rest.trim_start())
 }
 
-/// `inner` and `name` together, without `.` and `..`; `None` when that leads out of the folder.
-fn inside(inner: &Path, name: &str) -> Option<String> {
-    let name = name.replace('\\', "/");
-    if name.contains(':') {
-        return None;
-    }
-    let mut parts = Vec::new();
-    for component in inner.components().chain(Path::new(&name).components()) {
-        match component {
-            Component::Normal(part) => parts.push(part.to_string_lossy().into_owned()),
-            Component::CurDir => {}
-            Component::ParentDir => drop(parts.pop()?),
-            Component::RootDir | Component::Prefix(_) => return None,
-        }
-    }
-    Some(parts.join("/")).filter(|path| !path.is_empty())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn options_are_put_aside_and_names_may_hold_spaces() {
+    fn options_are_read_and_names_may_hold_spaces() {
         for (text, name, options) in [
             ("wood.png", "wood.png", &[][..]),
             ("  two words.png ", "two words.png", &[]),
@@ -130,24 +140,9 @@ mod tests {
             ("-x wood.png", "-x wood.png", &[]),
             ("-clamp on", "", &["-clamp"]),
         ] {
-            assert_eq!(split_options(text), (name, options.to_vec()), "{text}");
-        }
-    }
-
-    #[test]
-    fn names_stay_inside_the_folder() {
-        for (inner, name, expected) in [
-            ("", "wood.png", Some("wood.png")),
-            ("lib", "maps\\wood.png", Some("lib/maps/wood.png")),
-            ("lib", "../wood.png", Some("wood.png")),
-            ("lib", "./a/../b.png", Some("lib/b.png")),
-            ("lib", "../../wood.png", None),
-            ("", "/etc/a.png", None),
-            ("", "C:\\a.png", None),
-            ("", "..", None),
-            ("", ".", None),
-        ] {
-            assert_eq!(inside(Path::new(inner), name).as_deref(), expected, "{inner} {name}");
+            let (found, given) = split_options(text);
+            let given: Vec<_> = given.into_iter().map(|(option, _)| option).collect();
+            assert_eq!((found, given), (name, options.to_vec()), "{text}");
         }
     }
 }

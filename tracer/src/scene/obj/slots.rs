@@ -3,39 +3,39 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glam::Vec2;
-
-use super::super::{Material, SceneError};
+use super::super::SceneError;
 use super::geometry::MaterialRun;
-use super::materials::Library;
+use super::materials::{Library, plain_name};
+use super::uvs::TriangleUvs;
 use crate::mesh::{Mesh, NamedMaterial};
 
 /// The material of a name; some writers put a comment behind it.
 pub(super) fn find<'l>(library: &'l Library, name: &str) -> Option<&'l NamedMaterial> {
-    let bare = || name.split_once(" #").and_then(|(bare, _)| library.get(bare.trim_end()));
-    library.get(name).or_else(bare)
+    let name = plain_name(name);
+    let bare = || name.split_once(" #").and_then(|(bare, _)| library.get(&*plain_name(bare)));
+    library.get(&*name).or_else(bare)
 }
 
 /// Gives every triangle its slot; a slot for each material that triangles use, in the order of their first use. Where a
-/// material has a texture, triangles without texture coordinates have a slot of their own: the same without the texture.
+/// material has textures, triangles without texture coordinates have a slot of their own: the same without them.
 pub(super) fn assign_materials(
     path: &Path,
     mesh: &mut Mesh,
     runs: &[MaterialRun],
     library: &Library,
-    uvs: Option<&[Option<[Vec2; 3]>]>,
+    neutral: &NamedMaterial,
+    uvs: Option<&[TriangleUvs]>,
 ) -> Result<(), SceneError> {
-    let neutral = NamedMaterial { name: "neutral".to_owned(), material: Material::NEUTRAL, texture: None };
     let mut slots = Slots { path, known: BTreeMap::new(), materials: Vec::new() };
     let mut triangle = 0;
     for run in runs.iter().filter(|run| run.triangles > 0) {
         let name = run.material.as_deref();
-        let material = name.and_then(|name| find(library, name)).unwrap_or(&neutral);
+        let material = name.and_then(|name| find(library, name)).unwrap_or(neutral);
         // Without the texture, and with it: looked up once a run.
         let mut found = [None; 2];
         for _ in 0..run.triangles {
             let has_uvs = uvs.is_some_and(|uvs| uvs.get(triangle).is_some_and(Option::is_some));
-            let textured = has_uvs && material.texture.is_some();
+            let textured = has_uvs && material.textures().next().is_some();
             let slot = match found[usize::from(textured)] {
                 Some(slot) => slot,
                 None => *found[usize::from(textured)].insert(slots.slot(name, material, textured)?),
@@ -68,9 +68,13 @@ impl<'r> Slots<'r> {
         let slot = u16::try_from(self.materials.len()).map_err(|_| {
             SceneError::in_file(self.path, "more than 65536 materials are used; merge some of them")
         })?;
-        let texture = material.texture.clone().filter(|_| textured);
-        let name_of_slot = name.unwrap_or(&material.name).to_owned();
-        self.materials.push(NamedMaterial { name: name_of_slot, material: material.material, texture });
+        let plain = NamedMaterial::plain(name.unwrap_or(&material.name), material.material);
+        let NamedMaterial { texture, cutout, emission_texture, .. } = material.clone();
+        self.materials.push(if textured {
+            NamedMaterial { texture, cutout, emission_texture, ..plain }
+        } else {
+            plain
+        });
         self.known.insert((name, textured), slot);
         Ok(slot)
     }

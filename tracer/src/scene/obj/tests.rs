@@ -1,7 +1,10 @@
 //! Models as people write them, models that are broken, and models made by chance.
 
+mod normals;
+
 use std::fmt::Write;
 
+use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
 use super::*;
@@ -16,7 +19,7 @@ fn load_files(files: &[(&str, &[u8])]) -> Result<(Mesh, Vec<String>), String> {
     }
     let place = format!("{}{}", folder.path().display(), std::path::MAIN_SEPARATOR);
     let without_folder = |message: String| message.replace(&place, "");
-    match load(&folder.path().join("a.obj"), Uvs::Textured) {
+    match load(&folder.path().join("a.obj"), Uvs::Textured, LoadOptions::default()) {
         Ok((mesh, warnings)) => Ok((mesh, warnings.into_iter().map(without_folder).collect())),
         Err(error) => Err(without_folder(error.to_string())),
     }
@@ -79,6 +82,14 @@ fn polygons_are_fanned_and_faces_may_come_before_their_vertices() {
 }
 
 #[test]
+fn weights_colours_and_short_texture_coordinates_do_no_harm() {
+    let text =
+        "v 0 0 0 1.0\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0 1 0 0 1\nv 0 1 0\nvt 0.5\nvt 0 0 0\nf 1/1 2/2 3/1 4/2\n";
+    let (mesh, warnings) = read(text);
+    assert_eq!((corners(&mesh), warnings), (square_corners(), vec![]));
+}
+
+#[test]
 fn digits_far_from_the_origin_survive() {
     let (mesh, _) = read("v 10000000.001 0 0\nv 10000000.002 0 0 1.0\nv 1e7 1 0 0.5 0.5 0.5\nf 1 2 3");
     assert_eq!(mesh.positions[0].x, 10_000_000.001);
@@ -116,7 +127,7 @@ fn texture_coordinates_stay_with_the_corners() {
         let (mesh, _) = wooden(faces);
         assert_eq!(mesh.uvs, [uvs([0., 0., 1., 0., 1., 1.]), uvs([0., 0., 1., 1., 0., 1.])], "{faces}");
         assert_eq!(mesh.positions.len(), 4);
-        assert_eq!(mesh.materials[0].texture.as_deref(), Some("wood.png"));
+        assert_eq!(mesh.materials[0].texture.as_ref().map(|texture| texture.file.as_str()), Some("wood.png"));
         assert_eq!(mesh.materials[0].material.diffuse, Vec3::ONE);
     }
     let (seam, _) = wooden("vt 0 0\nvt 0.5 0.25\nf 1/1 2/1 3/1\nf 1/2 3/2 4/2\n");
@@ -132,11 +143,11 @@ fn texture_coordinates_are_read_only_where_they_are_wanted() {
     std::fs::write(&path, &text).unwrap();
     std::fs::write(folder.path().join(WOOD.0), WOOD.1).unwrap();
     for (wanted, count) in [(Uvs::Never, 0), (Uvs::Textured, 0), (Uvs::Always, 1)] {
-        assert_eq!(load(&path, wanted).unwrap().0.uvs.len(), count, "{wanted:?}");
+        assert_eq!(load(&path, wanted, LoadOptions::default()).unwrap().0.uvs.len(), count, "{wanted:?}");
     }
     std::fs::write(&path, text.replace("usemtl red", "usemtl wood")).unwrap();
     for (wanted, count) in [(Uvs::Never, 0), (Uvs::Textured, 1), (Uvs::Always, 1)] {
-        assert_eq!(load(&path, wanted).unwrap().0.uvs.len(), count, "{wanted:?}");
+        assert_eq!(load(&path, wanted, LoadOptions::default()).unwrap().0.uvs.len(), count, "{wanted:?}");
     }
 }
 
@@ -159,16 +170,6 @@ fn triangles_without_usable_texture_coordinates_are_drawn_without_the_texture() 
 }
 
 #[test]
-fn seams_of_parts_do_not_split_vertices_unless_the_file_has_normals() {
-    let parts = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv -0.0 0 0\nv 1 1 0\nv 0 1 0\n";
-    let (mesh, _) = read(&format!("{parts}f 1 2 3\nf 4 5 6\n"));
-    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-    assert_eq!(corners(&mesh), square_corners());
-    let (mesh, _) = read(&format!("{parts}vn 0 0 1\nf 1//1 2//1 3//1\nf 4//1 5//1 6//1\n"));
-    assert_eq!(mesh.positions.len(), 6);
-}
-
-#[test]
 fn normals_of_the_file_are_kept_and_brought_to_unit_length() {
     let (mesh, warnings) = read(&format!("{SQUARE}vn 0 0 5\nvn 3 0 4\nf 1//1 2//2 3//1\nf 1//2 3//1 4//1"));
     assert_eq!(warnings, [""; 0]);
@@ -179,12 +180,39 @@ fn normals_of_the_file_are_kept_and_brought_to_unit_length() {
 }
 
 #[test]
-fn faces_partly_with_normals_are_averaged_with_a_warning() {
-    let (mesh, warnings) = read(&format!("{SQUARE}vn 0 0 1\nf 1//1 2//1 3//1\nf 1 3 4"));
-    assert!(mesh.normals.is_empty());
-    assert_eq!(corners(&mesh), square_corners());
-    assert_eq!(warnings.len(), 1);
-    assert!(warnings[0].starts_with("a.obj: some corners have a normal"), "{warnings:?}");
+fn concave_polygons_and_their_texture_coordinates_are_cut_alike() {
+    // An arrowhead whose notch is its last corner.
+    let faces =
+        "vt 0 0\nvt 0.1 0\nvt 0.2 0\nvt 0.3 0\nv 2 -1 0\nv 0 2 0\nv -2 -1 0\nv 0 0.4 0\nf 5/1 6/2 7/3 8/4\n";
+    let (mesh, _) = wooden(faces);
+    let u_of_x = |x: f64| {
+        if x == 2.0 {
+            0.0
+        } else if x == -2.0 {
+            0.2
+        } else {
+            0.1
+        }
+    };
+    assert_eq!(mesh.triangles.len(), 2);
+    for (corners, uvs) in corners(&mesh).into_iter().zip(&mesh.uvs) {
+        assert!(corners.contains(&DVec3::new(0.0, 0.4, 0.0)), "cut through the notch: {corners:?}");
+        for (corner, uv) in corners.into_iter().zip(uvs) {
+            let expected = if corner.y == 0.4 { 0.3 } else { u_of_x(corner.x) };
+            assert_eq!(uv.x, expected as f32, "{corner}");
+        }
+    }
+    assert_eq!(mesh.triangle_materials, [0, 0]);
+}
+
+#[test]
+fn a_wall_with_a_window_keeps_its_window() {
+    let (mesh, warnings) = read(
+        "v 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nv 1 1 0\nv 1 2 0\nv 3 2 0\nv 3 1 0\nf 1 2 3 4 1 5 6 7 8 5\n",
+    );
+    let area: f64 = corners(&mesh).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length() / 2.0).sum();
+    assert!((area - 10.0).abs() < 1e-12, "{area}");
+    assert_eq!((mesh.triangles.len(), warnings), (8, vec![]));
 }
 
 #[test]
@@ -217,12 +245,10 @@ fn broken_lines_are_refused_with_their_number() {
         ("f 1/1/1/1 2 3", "a.obj:5: ", "no corner"),
         ("f 1/x 2 3", "a.obj:5: ", "no corner"),
         ("f 1// 2 /3", "a.obj:5: ", "`/3` is no corner"),
-        ("vn 0 0 1\nf 1//1 2//1 3//2", "a.obj:6: ", "names normal 2, but the file has 1"),
-        ("f 1//-1 2 3", "a.obj:5: ", "only 0 normal lines"),
         ("v 1 2\nf 1 2 3", "a.obj:5: ", "`v 1 2`: three numbers were expected"),
         ("v 1 2 three", "a.obj:5: ", "three numbers"),
         ("v 1,5 2 3", "a.obj:5: ", "three numbers"),
-        ("vn 1 2", "a.obj:5: ", "three numbers were expected after `vn`"),
+        ("v 0 0 1.#INF\nf 1 2 5", "a.obj:5: ", "not finite"),
         ("# c\n\nv nan 0 0\nf 1 2 5", "a.obj:7: ", "not finite"),
         ("v 0 inf 0\nf 1 2 -1", "a.obj:5: ", "not finite"),
         ("f 1 2 5\nv 0 0 1e39", "a.obj:6: ", "beyond 1e30"),
@@ -242,11 +268,23 @@ fn vertices_that_are_not_finite_and_not_used_are_counted() {
 
 #[test]
 fn files_without_faces_are_refused() {
-    for text in ["", SQUARE, "g empty\no group\n", "\u{0}\u{1}\u{2}", "f\nf 1\n"] {
+    for (text, words) in [
+        ("", "the file is empty"),
+        (SQUARE, "a cloud of 4 points"),
+        ("g empty\no group\n", "needs at least one `f` line"),
+        ("\u{0}\u{1}\u{2}", "binary data"),
+        ("v \u{0}\u{1}\u{2}\n", "binary data"),
+        ("f\nf 1\n", "its 2 faces have fewer than three corners"),
+        ("[[model]]\nfile = 'a.obj'\n", "this is TOML"),
+    ] {
         let message = refusal(text);
-        assert!(message.starts_with("a.obj: no faces in the file"), "{text:?}: {message}");
+        assert!(
+            message.starts_with("a.obj: no faces in the file") && message.contains(words),
+            "{text:?}: {message}"
+        );
     }
-    let message = load(Path::new("no/such.obj"), Uvs::Textured).unwrap_err().to_string();
+    let message =
+        load(Path::new("no/such.obj"), Uvs::Textured, LoadOptions::default()).unwrap_err().to_string();
     assert!(message.starts_with("cannot read no/such.obj: "), "{message}");
 }
 
@@ -277,16 +315,101 @@ fn libraries_are_found_beside_the_model_only() {
     assert!(red("./a.mtl", "a.mtl").0);
     assert!(red("sub\\a.mtl", "sub/a.mtl").0);
     assert!(red("two words.mtl", "two words.mtl").0);
-    let (found, warnings) = red("other.mtl a.mtl", "a.mtl");
+    let (found, warnings) = red("other.mtl b.mtl", "b.mtl");
+    assert!(found, "{warnings:?}");
     assert!(
-        found && warnings[0].starts_with("a.obj:1: material library: cannot read other.mtl"),
+        warnings[0].starts_with("a.obj:1: the material library `other.mtl` is not in the model's folder"),
         "{warnings:?}"
     );
-    for outside in ["../a.mtl", "/etc/a.mtl", "C:\\a.mtl"] {
-        let (found, warnings) = red(outside, "a.mtl");
+    // What names another place is found in the model's folder, with a note.
+    for other in ["../b.mtl", "/etc/b.mtl", "C:\\b.mtl", "B.MTL", "x/b.mtl"] {
+        let (found, warnings) = red(other, "b.mtl");
+        assert!(found, "{other}: {warnings:?}");
+        let note = format!("a.obj:1: the material library `{other}` is not there: `b.mtl` is taken");
+        assert_eq!(warnings[0], note);
+    }
+    for outside in ["../b.mtl", "/etc/b.mtl", "C:\\b.mtl"] {
+        let (found, warnings) = red(outside, "sub/b.mtl");
         assert!(!found && warnings.len() == 1, "{warnings:?}");
         assert!(warnings[0].starts_with("a.obj:1: ") && warnings[0].contains("outside"), "{warnings:?}");
     }
+}
+
+#[test]
+fn names_of_libraries_may_have_blanks_quotes_escapes_and_comments() {
+    let red = b"\xef\xbb\xbfnewmtl red\nKd 1 0 0\n";
+    let blue = b"\xef\xbb\xbfnewmtl blue\nKd 0 0 1\n";
+    for names in [
+        "my mats.mtl other.mtl",
+        "other.mtl my mats.mtl # materials",
+        "my\\ mats.mtl other.mtl",
+        "\"my mats.mtl\" \"other.mtl\"",
+        "\"my mats.mtl\"\nmtllib other.mtl # x.mtl",
+        "my mats.mtl\nmtllib other.mtl\nmtllib my mats.mtl",
+    ] {
+        let text = TWO_MATERIALS.replace("usemtl never\n", "").replace("a.mtl", names);
+        let files = [("a.obj", text.as_bytes()), ("my mats.mtl", &red[..]), ("other.mtl", &blue[..])];
+        let (mesh, warnings) = load_files(&files).unwrap();
+        assert_eq!(warnings, [""; 0], "{names}");
+        let colors: Vec<_> = mesh.materials.iter().map(|slot| slot.material.diffuse).collect();
+        assert_eq!(colors, [Vec3::X, Vec3::Z], "{names}");
+    }
+}
+
+#[test]
+fn a_library_named_like_the_model_is_taken_where_the_named_one_is_not_there() {
+    for (mtllib, note) in [
+        (
+            "mtllib model_v1.mtl",
+            "a.obj:1: the material library `model_v1.mtl` is not there: `a.mtl`, named like the model, is taken",
+        ),
+        (
+            "",
+            "a.obj: no `mtllib` line names the library of its materials: `a.mtl`, named like the model, is taken",
+        ),
+    ] {
+        let text = TWO_MATERIALS.replace("mtllib a.mtl", mtllib).replace("usemtl never\n", "");
+        let load =
+            |library: &str| load_files(&[("a.obj", text.as_bytes()), ("a.mtl", library.as_bytes())]).unwrap();
+        let (mesh, warnings) = load(LIBRARY);
+        assert_eq!((mesh.materials[0].material.diffuse, warnings), (Vec3::X, vec![note.to_owned()]));
+        let (mesh, warnings) = load("newmtl unrelated\nKd 0 1 0\n");
+        assert!(mesh.materials.iter().all(|slot| slot.material == Material::NEUTRAL));
+        assert!(warnings.len() == 1 && !warnings[0].contains("is taken"), "{warnings:?}");
+    }
+}
+
+#[test]
+fn libraries_that_are_none_are_named_for_what_they_are() {
+    for (content, words) in [
+        (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n"[..], "a pointer of git-lfs"),
+        (b"<!DOCTYPE html><html></html>", "a web page"),
+        (b"PK\x03\x04....", "a ZIP archive"),
+    ] {
+        let (mesh, warnings) =
+            load_files(&[("a.obj", TWO_MATERIALS.as_bytes()), ("a.mtl", content)]).unwrap();
+        assert_eq!(mesh.materials[0].material, Material::NEUTRAL);
+        assert!(warnings[0].starts_with("a.obj:1: material library: a.mtl: this is "), "{warnings:?}");
+        assert!(warnings[0].contains(words), "{warnings:?}");
+    }
+}
+
+#[test]
+fn many_unknown_materials_are_one_warning() {
+    let runs: String = (0..20).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
+    let (_, warnings) = read(&format!("{SQUARE}{runs}"));
+    let expected = "a.obj:5: no material library defines `m0`, `m1`, `m2`, `m3`, `m4` and 15 more: drawn with the neutral material";
+    assert_eq!(warnings, [expected]);
+}
+
+#[test]
+fn quoted_names_of_materials_are_the_names() {
+    let text =
+        format!("mtllib a.mtl\n{SQUARE}usemtl \"dark red\"\nf 1 2 3\nusemtl dark  red # again\nf 1 3 4\n");
+    let (mesh, warnings) =
+        load_files(&[("a.obj", text.as_bytes()), ("a.mtl", b"newmtl dark red\nKd 1 0 0\n")]).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    assert!(mesh.materials.iter().all(|slot| slot.material.diffuse == Vec3::X), "{:?}", mesh.materials);
 }
 
 #[cfg(unix)]
@@ -297,7 +420,7 @@ fn links_out_of_the_folder_are_not_followed() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.obj"), TWO_MATERIALS).unwrap();
     std::os::unix::fs::symlink(outside.path().join("a.mtl"), folder.path().join("a.mtl")).unwrap();
-    let (mesh, warnings) = load(&folder.path().join("a.obj"), Uvs::Textured).unwrap();
+    let (mesh, warnings) = load(&folder.path().join("a.obj"), Uvs::Textured, LoadOptions::default()).unwrap();
     assert_eq!(mesh.materials[0].material, Material::NEUTRAL);
     assert!(warnings[0].contains("outside"), "{warnings:?}");
 }
@@ -306,15 +429,32 @@ fn links_out_of_the_folder_are_not_followed() {
 fn a_missing_library_is_one_warning_and_the_neutral_material() {
     let (mesh, warnings) = read(TWO_MATERIALS);
     assert_eq!(warnings.len(), 1, "{warnings:?}");
-    assert!(warnings[0].starts_with("a.obj:1: material library: cannot read a.mtl"), "{warnings:?}");
+    let expected = "a.obj:1: the material library `a.mtl` is not in the model's folder; its materials are drawn with the neutral one";
+    assert_eq!(warnings, [expected]);
     assert!(mesh.materials.iter().all(|slot| slot.material == Material::NEUTRAL));
 }
 
 #[test]
-fn old_encodings_in_comments_and_names_do_no_harm() {
-    let text = b"# gr\xfc\xdfe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl gr\xfcn\nf 1 2 3\n";
-    let (mesh, _) = load_files(&[("a.obj", text)]).unwrap();
-    assert_eq!(mesh.triangles.len(), 1);
+fn names_are_one_in_every_encoding_of_model_and_library() {
+    let model =
+        "mtllib a.mtl\n# grüße\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl grün\nf 1 2 3\nusemtl gräu\nf 1 3 2\n";
+    let library = "newmtl grün\nKd 0 1 0\nnewmtl gräu\nKd 0.5 0.5 0.5\n";
+    let latin_1 = |text: &str| text.chars().map(|c| c as u8).collect::<Vec<u8>>();
+    let wide = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    let marked = |text: &str| format!("\u{feff}{text}").into_bytes();
+    let old_mac = |text: &str| text.replace('\n', "\r").into_bytes();
+    type Writing<'w> = &'w dyn Fn(&str) -> Vec<u8>;
+    let writings: [Writing<'_>; 5] = [&|text| text.into(), &latin_1, &wide, &marked, &old_mac];
+    for (i, write_model) in writings.iter().enumerate() {
+        for (j, write_library) in writings.iter().enumerate() {
+            let files = [("a.obj", write_model(model)), ("a.mtl", write_library(library))];
+            let (mesh, warnings) =
+                load_files(&files.each_ref().map(|(name, text)| (*name, &text[..]))).unwrap();
+            let materials: Vec<_> = mesh.materials.iter().map(|m| (&*m.name, m.material.diffuse)).collect();
+            assert_eq!(materials, [("grün", Vec3::Y), ("gräu", Vec3::splat(0.5))], "{i} {j}");
+            assert_eq!(warnings, [""; 0]);
+        }
+    }
 }
 
 /// A mesh of polygons, each with its corners as indices counted from 0.
@@ -388,7 +528,15 @@ proptest! {
         let expected: Vec<[DVec3; 3]> = polygons
             .faces
             .iter()
-            .flat_map(|f| (2..f.len()).map(|i| [point(f[0]), point(f[i - 1]), point(f[i])]))
+            .flat_map(|face| {
+                let points: Vec<DVec3> = face.iter().map(|&vertex| point(vertex)).collect();
+                let mut triangles = Vec::new();
+                match points.len() {
+                    3 => triangles.push([0, 1, 2]),
+                    _ => polygon::cut(&points, &mut triangles),
+                }
+                triangles.into_iter().map(move |triangle| triangle.map(|corner: u32| points[corner as usize])).collect::<Vec<_>>()
+            })
             .collect();
         prop_assert_eq!(corners(&mesh), expected);
         prop_assert_eq!(mesh.triangle_materials.len(), mesh.triangles.len());

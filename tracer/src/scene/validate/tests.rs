@@ -95,7 +95,7 @@ fn numbers_out_of_bounds_are_found_by_name() {
 #[test]
 fn textures_are_listed_and_laid_on_what_has_coordinates() {
     let textured = |s: &mut Scene| {
-        s.textures = vec![TextureMap { texture: TextureId([3; 32]), filter: Filter::Nearest }];
+        s.textures = vec![TextureMap::new(TextureId([3; 32]), Filter::Nearest)];
         s.materials.push(Material { texture: Some(0), ..Material::NEUTRAL });
     };
     let mut sound = scene();
@@ -105,8 +105,20 @@ fn textures_are_listed_and_laid_on_what_has_coordinates() {
     assert_eq!(sound.validate(), Ok(()));
     assert_eq!(sound.texture_ids(), BTreeSet::from([TextureId([3; 32])]));
 
-    let message = spoiled(|s| s.materials[1].texture = Some(0));
-    assert_eq!(message, "materials[1].texture must be one of the scene's textures");
+    for spoil in [
+        (|s: &mut Scene| s.materials[1].texture = Some(0)) as fn(&mut Scene),
+        |s| s.materials[1].cutout = Some(0),
+        |s| s.materials[1].emission_texture = Some(0),
+    ] {
+        assert_eq!(spoiled(spoil), "materials[1].texture must be one of the scene's textures");
+    }
+    let message = spoiled(|s| s.materials[1].emission.y = f32::INFINITY);
+    assert_eq!(message, "materials[1].emission must be finite, not negative, at most 1e30");
+    let message = spoiled(|s| {
+        textured(s);
+        s.textures[0].tiling.offset.x = f32::NAN;
+    });
+    assert_eq!(message, "textures[0].tiling must be made of finite numbers up to 1e6");
     type Spoil = fn(&mut Scene);
     let cases: [(Spoil, &str); 4] = [
         (|s| s.spheres[0].material = 2, "spheres[0].material must be without a texture"),

@@ -1,0 +1,179 @@
+//! Files: only regular ones are read, and a written one appears whole or not at all.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Opens a regular file for reading, also behind links.
+///
+/// # Errors
+/// What the system says; a folder, pipe, socket or device, which is refused before it is opened: opening a pipe waits
+/// for a writer, and opening a device may have effects.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    require_regular(&fs::metadata(path)?)?;
+    let file = File::open(path)?;
+    // The name may have been given to something else meanwhile.
+    require_regular(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn require_regular(metadata: &fs::Metadata) -> io::Result<()> {
+    if metadata.is_file() {
+        return Ok(());
+    }
+    let (kind, what) = if metadata.is_dir() {
+        (io::ErrorKind::IsADirectory, "it is a folder; a file was expected")
+    } else {
+        (io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device; a regular file was expected")
+    };
+    Err(io::Error::new(kind, what))
+}
+
+/// All bytes of a regular file, or `None` if it has more than `limit`; of a larger file none are read.
+///
+/// # Errors
+/// As [`open_regular`]; too little memory.
+pub fn read_within(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
+    let file = open_regular(path)?;
+    // Room for all of it at once: a compiled model may have hundreds of megabytes.
+    let announced = file.metadata()?.len();
+    if announced > limit {
+        return Ok(None);
+    }
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(usize::try_from(announced).unwrap_or(usize::MAX))?;
+    // A file that grows meanwhile is counted as it is read, and one of a pseudo file system announces nothing.
+    file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= limit))
+}
+
+/// Writes a file under a new temporary name in the same folder and renames it.
+///
+/// # Errors
+/// What the system says. The file that was there before is then still there, and nothing else is left.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let (temporary, mut file) = Temporary::create_beside(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    // Closed before it is renamed: Windows does not rename open files.
+    drop(file);
+    temporary.rename_to(path)
+}
+
+/// A new file that is removed unless it is renamed.
+pub(crate) struct Temporary {
+    path: Option<PathBuf>,
+}
+
+impl Temporary {
+    /// Creates a file that did not exist, in the folder of `target`. A link of that name is not followed.
+    pub(crate) fn create_beside(target: &Path) -> io::Result<(Self, File)> {
+        // Process and counter make the name unique, so that no two writers share a temporary file.
+        static COUNTER: AtomicU32 = AtomicU32::new(0);
+        loop {
+            let mut name = OsString::from(".");
+            name.push(target.file_name().ok_or(io::ErrorKind::InvalidInput)?);
+            let serial = COUNTER.fetch_add(1, Ordering::Relaxed);
+            name.push(format!(".{}-{serial}.partial", std::process::id()));
+            let path = target.with_file_name(name);
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => return Ok((Self { path: Some(path) }, file)),
+                // Left by a killed process that had this number: in containers numbers are reused soon.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists && serial < u32::MAX => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Gives the file its name, replacing what had it.
+    pub(crate) fn rename_to(mut self, target: &Path) -> io::Result<()> {
+        if let Some(path) = &self.path {
+            fs::rename(path, target)?;
+        }
+        self.path = None;
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some(path) = &self.path {
+            // A failure here changes nothing: the cause has been reported already.
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_nothing_else_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.rfm");
+        write_whole(&path, b"first").unwrap();
+        write_whole(&path, b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_written_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let taken = folder.path().join("taken");
+        fs::create_dir(&taken).unwrap();
+        fs::write(taken.join("inside"), "x").unwrap();
+        assert!(write_whole(&taken, b"bytes").is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn files_beyond_the_limit_are_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        fs::write(&path, b"12345").unwrap();
+        assert_eq!(read_within(&path, 5).unwrap().as_deref(), Some(&b"12345"[..]));
+        assert_eq!(read_within(&path, 4).unwrap(), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_devices_and_folders_are_refused_also_behind_links() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        // No writer ever comes: opening it for reading would wait for ever.
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+        assert!(made.success());
+        for (target, words) in
+            [(pipe.as_path(), "a pipe"), (Path::new("/dev/zero"), "a device"), (folder.path(), "a folder")]
+        {
+            let link = folder.path().join("link");
+            symlink(target, &link).unwrap();
+            for path in [target, &link] {
+                let message = open_regular(path).unwrap_err().to_string();
+                assert!(message.contains(words), "{}: {message}", path.display());
+            }
+            fs::remove_file(&link).unwrap();
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_place_of_the_temporary_file_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, victim) = (folder.path().join("a.csv"), folder.path().join("victim"));
+        fs::write(&victim, "precious").unwrap();
+        // Other tests of this process may count on meanwhile, so every name that may come next is taken.
+        for serial in 0..500 {
+            let name = format!(".a.csv.{}-{serial}.partial", std::process::id());
+            std::os::unix::fs::symlink(&victim, folder.path().join(name)).unwrap();
+        }
+        write_whole(&path, b"table").unwrap();
+        assert_eq!(fs::read(&victim).unwrap(), b"precious");
+        assert_eq!(fs::read(&path).unwrap(), b"table");
+    }
+}

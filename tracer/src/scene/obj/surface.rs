@@ -1,0 +1,47 @@
+//! Statements of a material beside its reflected colours: what it emits, whether light changes it, where it is cut out, and
+//! how its pictures lie.
+
+use glam::Vec3;
+
+use super::super::warnings::Warnings;
+use super::lines::Line;
+use super::materials::{color, number};
+use super::picture::{Place, picture};
+use crate::mesh::{NamedMaterial, TextureFile};
+
+/// The largest emission that is read.
+const MAX_EMISSION: f64 = 1e9;
+
+/// Reads such a statement into a material; other statements are not looked at.
+pub(super) fn read(
+    line: &Line<'_>,
+    place: &Place<'_>,
+    material: &mut NamedMaterial,
+    warnings: &mut Warnings,
+) -> Result<(), String> {
+    match line.keyword().to_ascii_lowercase().as_str() {
+        "illum" => material.material.unlit = number(line)? == 0.0,
+        "ke" => {
+            let channels = color(line)?.map(|channel| channel.clamp(0.0, MAX_EMISSION) as f32);
+            material.material.emission = Vec3::from_array(channels);
+        }
+        "map_ke" => material.emission_texture = Some(texture(line, place, warnings)?),
+        "map_kd" => material.texture = Some(texture(line, place, warnings)?),
+        "map_d" => material.cutout = Some(texture(line, place, warnings)?),
+        _ => {}
+    }
+    Ok(())
+}
+
+fn texture(line: &Line<'_>, place: &Place<'_>, warnings: &mut Warnings) -> Result<TextureFile, String> {
+    let (file, tiling) = picture(line, place, warnings)?;
+    Ok(TextureFile { file, tiling })
+}
+
+/// What is left to be said once all statements of a material are read.
+pub(super) fn finish(material: &mut NamedMaterial) {
+    // `Ke` is a factor of its texel. Without it, or with 0, the map alone is meant.
+    if material.emission_texture.is_some() && !material.material.is_emissive() {
+        material.material.emission = Vec3::ONE;
+    }
+}
