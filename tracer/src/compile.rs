@@ -6,9 +6,13 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
+use crate::bvh::WIDTH;
 use crate::bvh::{self, BuildQuality};
+use crate::cancel::{Cancelled, IsCancelled, go_on, never};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Filter, Material, Model, NormalMode, Quality, Scene, Shading, ValidateError, rotation};
+use crate::scene::{
+    Material, Model, NormalMode, Quality, Scene, Shading, TextureMap, ValidateError, rotation,
+};
 use crate::texture::{Texture, TextureId};
 
 /// Why a scene cannot be traced.
@@ -39,6 +43,9 @@ pub enum CompileError {
     /// The frame asked for cannot be rendered.
     #[error("cannot render this frame: {0}")]
     Frame(#[from] ValidateError),
+    /// The result was not wanted any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A scene with its meshes and textures, and the shape of the tree over its instances. Immutable; share it between threads.
@@ -47,13 +54,24 @@ pub struct CompiledScene {
     scene: Scene,
     /// One per model.
     meshes: Vec<Arc<CompiledMesh>>,
-    /// Which models have a texture on them.
-    textured: Vec<bool>,
+    /// One per model.
+    coverings: Vec<Covering>,
     /// One per texture of the scene.
-    textures: Vec<(Arc<Texture>, Filter)>,
+    textures: Vec<(Arc<Texture>, TextureMap)>,
     /// Over all finite items; its boxes are those of no frame in particular.
     tree: bvh::WideTree,
     bounds: Option<(DVec3, DVec3)>,
+}
+
+/// What the materials of a model want of its mesh.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Covering {
+    /// Texture coordinates.
+    pub textured: bool,
+    /// Colours of vertices.
+    pub colored: bool,
+    /// Which triangles can be cut out, a bit each, sixteen by sixteen; empty if none can.
+    pub cutouts: Arc<[u16]>,
 }
 
 /// Everything with bounds is an *item* of the scene's own tree: models first, then spheres, then triangles.
@@ -71,6 +89,14 @@ pub struct Features {
     pub specular: bool,
     /// Something wears a material with a texture.
     pub textured: bool,
+    /// Something wears a material that takes the colours of vertices.
+    pub vertex_colors: bool,
+    /// Something wears a material that emits light.
+    pub emissive: bool,
+    /// Something wears a material that no light changes.
+    pub unlit: bool,
+    /// Something wears a material that is cut out by alpha.
+    pub cut_out: bool,
     /// A model with interpolated normals: they differ from the geometric ones.
     pub smooth: bool,
 }
@@ -82,7 +108,11 @@ impl Features {
         };
         Self {
             specular: any(Material::is_specular),
-            textured: any(|material| material.texture.is_some()),
+            textured: any(|material| material.texture.is_some() || material.emission_texture.is_some()),
+            vertex_colors: any(|material| material.vertex_colors),
+            emissive: any(Material::is_emissive),
+            unlit: any(|material| material.unlit),
+            cut_out: any(|material| material.cutout.is_some()),
             smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
         }
     }
@@ -148,6 +178,21 @@ impl CompiledScene {
         meshes: impl IntoIterator<Item = Arc<CompiledMesh>>,
         textures: impl IntoIterator<Item = Arc<Texture>>,
     ) -> Result<Self, CompileError> {
+        Self::new_unless(scene, meshes, textures, &never)
+    }
+
+    /// [`CompiledScene::new`], unless it is cancelled: the question is asked between steps of which each is a fraction of
+    /// the whole.
+    ///
+    /// # Errors
+    /// As [`CompiledScene::new`], and [`CompileError::Cancelled`].
+    pub fn new_unless(
+        scene: Scene,
+        meshes: impl IntoIterator<Item = Arc<CompiledMesh>>,
+        textures: impl IntoIterator<Item = Arc<Texture>>,
+        cancelled: &IsCancelled<'_>,
+    ) -> Result<Self, CompileError> {
+        go_on(cancelled)?;
         let by_id: BTreeMap<MeshId, Arc<CompiledMesh>> =
             meshes.into_iter().map(|mesh| (mesh.id(), mesh)).collect();
         let meshes: Vec<Arc<CompiledMesh>> = scene
@@ -156,14 +201,14 @@ impl CompiledScene {
             .enumerate()
             .map(|(model, description)| fitting_mesh(&scene, &by_id, model, description))
             .collect::<Result<_, _>>()?;
-        let textured = scene.models.iter().map(|model| has_texture(&scene, model)).collect();
+        let coverings = coverings_of(&scene, &meshes);
         let textures = textures_of(&scene, textures)?;
         let items = Items::of(&scene);
         let boxes: Vec<(DVec3, DVec3)> =
             items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default);
-        Ok(Self { scene, meshes, textured, textures, tree, bounds })
+        let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default, cancelled)?;
+        Ok(Self { scene, meshes, coverings, textures, tree, bounds })
     }
 
     /// What was compiled.
@@ -198,13 +243,13 @@ impl CompiledScene {
         &self.meshes
     }
 
-    /// For each model, whether a material of it has a texture.
-    pub(crate) fn textured(&self) -> &[bool] {
-        &self.textured
+    /// One per model.
+    pub(crate) fn coverings(&self) -> &[Covering] {
+        &self.coverings
     }
 
     /// The scene's textures, and how they are looked up.
-    pub(crate) fn textures(&self) -> &[(Arc<Texture>, Filter)] {
+    pub(crate) fn textures(&self) -> &[(Arc<Texture>, TextureMap)] {
         &self.textures
     }
 
@@ -217,15 +262,49 @@ impl CompiledScene {
 fn textures_of(
     scene: &Scene,
     textures: impl IntoIterator<Item = Arc<Texture>>,
-) -> Result<Vec<(Arc<Texture>, Filter)>, CompileError> {
+) -> Result<Vec<(Arc<Texture>, TextureMap)>, CompileError> {
     let by_id: BTreeMap<TextureId, Arc<Texture>> =
         textures.into_iter().map(|texture| (texture.id(), texture)).collect();
     let find = |id: TextureId| by_id.get(&id).cloned().ok_or(CompileError::MissingTexture { id });
-    scene.textures.iter().map(|map| Ok((find(map.texture)?, map.filter))).collect()
+    scene.textures.iter().map(|map| Ok((find(map.texture)?, *map))).collect()
 }
 
 fn has_texture(scene: &Scene, model: &Model) -> bool {
-    model.materials.iter().any(|&index| scene.materials[index as usize].texture.is_some())
+    model.materials.iter().any(|&index| scene.materials[index as usize].textures().next().is_some())
+}
+
+/// One per model; those that wear the same on the same mesh share theirs.
+fn coverings_of(scene: &Scene, meshes: &[Arc<CompiledMesh>]) -> Vec<Covering> {
+    let mut known: BTreeMap<(MeshId, &[u32]), Covering> = BTreeMap::new();
+    let of_model = |(model, mesh): (&'_ Model, &Arc<CompiledMesh>)| -> Covering {
+        let wears = |asks: fn(&Material) -> bool| {
+            model.materials.iter().any(|&index| asks(&scene.materials[index as usize]))
+        };
+        let cuts = wears(|material| material.cutout.is_some());
+        Covering {
+            textured: has_texture(scene, model),
+            colored: mesh.has_colors() && wears(|material| material.vertex_colors),
+            cutouts: if cuts { cutouts_of(scene, model, mesh) } else { Arc::default() },
+        }
+    };
+    let pairs = scene.models.iter().zip(meshes);
+    pairs
+        .map(|(model, mesh)| {
+            let same = known.entry((mesh.id(), &model.materials));
+            same.or_insert_with(|| of_model((model, mesh))).clone()
+        })
+        .collect()
+}
+
+fn cutouts_of(scene: &Scene, model: &Model, mesh: &CompiledMesh) -> Arc<[u16]> {
+    let mut cutouts = vec![0; mesh.blocks().len()];
+    for triangle in mesh.triangles() {
+        let material = model.materials[usize::from(mesh.slot(triangle))];
+        if scene.materials[material as usize].cutout.is_some() {
+            cutouts[triangle as usize / WIDTH] |= 1 << (triangle as usize % WIDTH);
+        }
+    }
+    cutouts.into()
 }
 
 fn fitting_mesh(

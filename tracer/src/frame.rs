@@ -10,16 +10,18 @@ use glam::{DMat3, DVec3, Vec3};
 
 use crate::bvh::WideNode;
 use crate::camera::PinholeRays;
+use crate::cancel::{IsCancelled, go_on, never};
 use crate::compile::{CompileError, CompiledScene, Features, Item, Items, orientation, transformed_bounds};
 use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
 use crate::render::TILE_SIZE;
-use crate::scene::{Camera, Filter, FrameView, Light, Model, NormalMode, Quality, Scene};
+use crate::scene::{Camera, FrameView, Light, Model, NormalMode, Quality, Scene, TextureMap};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
 use crate::texture::Texture;
 use crate::tile::Affine;
+use crate::trace::coincide::{FINE, mesh_rounding};
 
 /// Widening of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
@@ -46,6 +48,8 @@ pub struct PreparedFrame {
     pub(crate) spheres: Vec<EyeSphere>,
     pub(crate) triangles: Vec<EyeTriangle>,
     pub(crate) planes: Vec<EyePlane>,
+    /// How far rounding may have carried any surface of the frame, in eye units.
+    pub(crate) coarsest: f64,
     pub(crate) lights: Vec<EyeLight>,
     /// The scene's tree, with the boxes of this frame.
     pub(crate) nodes: Vec<WideNode>,
@@ -71,12 +75,26 @@ pub(crate) struct Instance {
     pub projection: Affine,
     /// Whether a material of it has a texture.
     pub textured: bool,
+    /// How far it may be off as a whole, in eye units: the digits of the numbers that placed it.
+    pub off: f64,
+    /// How far apart in mesh space, on each axis, points of surfaces may be that coincide.
+    pub drift: f32,
+    /// Whether a material of it takes the colours of its vertices.
+    pub colored: bool,
+    /// Which triangles can be cut out: see [`PreparedFrame::cutouts_of`].
+    pub cutouts: Arc<[u16]>,
 }
 
 /// A triangle of the scene file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EyeTriangle {
     pub corners: [DVec3; 3],
+    /// Unit normal, on the side from which the corners go round counter-clockwise.
+    pub normal: DVec3,
+    /// How far it may be off, in eye units.
+    pub off: f64,
+    /// It can be cut out.
+    pub cut: bool,
 }
 
 impl PreparedFrame {
@@ -85,22 +103,42 @@ impl PreparedFrame {
     /// # Errors
     /// A view that cannot be rendered: its size, samples or camera are out of range.
     pub fn new(scene: Arc<CompiledScene>, view: &FrameView) -> Result<Self, CompileError> {
+        Self::new_unless(scene, view, &never)
+    }
+
+    /// [`PreparedFrame::new`], unless it is cancelled: the question is asked between steps, of which none takes longer
+    /// than to look at every instance.
+    ///
+    /// # Errors
+    /// As [`PreparedFrame::new`], and [`CompileError::Cancelled`].
+    pub fn new_unless(
+        scene: Arc<CompiledScene>,
+        view: &FrameView,
+        cancelled: &IsCancelled<'_>,
+    ) -> Result<Self, CompileError> {
         view.validate()?;
+        go_on(cancelled)?;
         let source = scene.scene();
         let unit = unit_of(&scene, &view.camera);
         let to_eye = |world: DVec3| (world - view.camera.position) / unit;
         let rays = PinholeRays::new(view);
         let projection = rays.projection();
-        let instances = source
+        let mut instances: Vec<Instance> = source
             .models
             .iter()
             .zip(scene.meshes())
-            .zip(scene.textured())
-            .map(|((model, mesh), &textured)| Instance {
-                textured,
+            .zip(scene.coverings())
+            .map(|((model, mesh), covering)| Instance {
+                textured: covering.textured,
+                colored: covering.colored,
+                cutouts: Arc::clone(&covering.cutouts),
                 ..Instance::new(model, mesh, view.spin, to_eye, unit, &projection)
             })
             .collect();
+        go_on(cancelled)?;
+        let (triangles, planes) = (triangles(source, &to_eye, unit), planes(source, &to_eye, unit));
+        let coarsest = coarsest(&instances, &triangles, &planes);
+        instances.iter_mut().for_each(|instance| instance.drift = instance.drift_of(coarsest));
         let mut frame = Self {
             view: *view,
             per_unit: 1.0 / unit,
@@ -109,14 +147,16 @@ impl PreparedFrame {
             items: Items::of(source),
             instances,
             spheres: spheres(source, &to_eye, unit),
-            triangles: triangles(source, &to_eye),
-            planes: planes(source, &to_eye),
+            triangles,
+            planes,
+            coarsest,
             lights: lights(source, &view.quality, &to_eye, unit),
             nodes: Vec::new(),
             features: Features::of(source).at(&view.quality),
             level: simd::best(),
             scene,
         };
+        go_on(cancelled)?;
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
@@ -152,7 +192,7 @@ impl PreparedFrame {
     }
 
     /// The scene's textures, and how they are looked up.
-    pub(crate) fn textures(&self) -> &[(Arc<Texture>, Filter)] {
+    pub(crate) fn textures(&self) -> &[(Arc<Texture>, TextureMap)] {
         self.scene.textures()
     }
 
@@ -183,6 +223,12 @@ impl PreparedFrame {
 }
 
 impl Instance {
+    /// Whether its triangles are flat and of one colour each.
+    #[inline(always)]
+    pub(crate) fn is_bare(&self) -> bool {
+        !self.smooth && !self.textured && !self.colored
+    }
+
     fn new(
         model: &Model,
         mesh: &Arc<CompiledMesh>,
@@ -197,6 +243,9 @@ impl Instance {
         let inverse = linear.inverse();
         let translation = to_eye(model.translate) + orientation * mesh.center() / unit;
         let placement = Affine::new(linear, translation);
+        let numbers =
+            (model.translate.abs() + (orientation * mesh.center()).abs()) / unit + translation.abs();
+        let off = FINE * (numbers.max_element() + largest_of(&linear));
         Self {
             mesh: Arc::clone(mesh),
             linear,
@@ -207,7 +256,16 @@ impl Instance {
             normals: inverse.transpose(),
             smooth: model.normals == NormalMode::Smooth,
             textured: false,
+            off,
+            drift: 0.0,
+            colored: false,
+            cutouts: Arc::default(),
         }
+    }
+
+    /// See [`Instance::drift`]: two surfaces may be off, each as far as the coarsest one.
+    fn drift_of(&self, coarsest: f64) -> f32 {
+        (2.0 * coarsest * largest_of(&self.inverse)) as f32
     }
 }
 
@@ -238,15 +296,39 @@ fn spheres(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<Ey
     scene.spheres.iter().map(place).collect()
 }
 
-fn triangles(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3) -> Vec<EyeTriangle> {
-    let place = |triangle: &crate::scene::Triangle| EyeTriangle { corners: triangle.vertices.map(to_eye) };
+/// The length of the longest row or column.
+fn largest_of(matrix: &DMat3) -> f64 {
+    let of = |matrix: &DMat3| matrix.x_axis.length().max(matrix.y_axis.length()).max(matrix.z_axis.length());
+    of(matrix).max(of(&matrix.transpose()))
+}
+
+fn coarsest(instances: &[Instance], triangles: &[EyeTriangle], planes: &[EyePlane]) -> f64 {
+    let of_instances = instances.iter().map(|instance| mesh_rounding(&instance.linear) + instance.off);
+    let of_others = triangles.iter().map(|triangle| triangle.off).chain(planes.iter().map(|plane| plane.off));
+    of_instances.chain(of_others).fold(0.0, f64::max)
+}
+
+/// How far off points may be, in eye units, by the digits that they have in the world and in eye space.
+fn digits_of(world: &[DVec3], eye: &[DVec3], unit: f64) -> f64 {
+    let largest = |points: &[DVec3]| points.iter().map(|point| point.abs().max_element()).fold(0.0, f64::max);
+    FINE * (largest(world) / unit + largest(eye))
+}
+
+fn triangles(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<EyeTriangle> {
+    let place = |triangle: &crate::scene::Triangle| {
+        let corners @ [a, b, c] = triangle.vertices.map(to_eye);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let cut = triangle.uvs.is_some() && scene.materials[triangle.material as usize].cutout.is_some();
+        EyeTriangle { corners, normal, off: digits_of(&triangle.vertices, &corners, unit), cut }
+    };
     scene.triangles.iter().map(place).collect()
 }
 
-fn planes(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3) -> Vec<EyePlane> {
+fn planes(scene: &Scene, to_eye: &impl Fn(DVec3) -> DVec3, unit: f64) -> Vec<EyePlane> {
     let place = |plane: &crate::scene::Plane| EyePlane {
         normal: plane.normal.normalize_or_zero(),
         offset: plane.normal.normalize_or_zero().dot(to_eye(plane.point)),
+        off: digits_of(&[plane.point], &[to_eye(plane.point)], unit),
     };
     scene.planes.iter().map(place).collect()
 }

@@ -28,7 +28,10 @@
 
 mod bvh;
 mod camera;
+mod cancel;
 mod compile;
+mod cutout;
+pub mod files;
 mod frame;
 pub mod image;
 mod light;
@@ -49,9 +52,10 @@ mod trace;
 mod triangle;
 
 pub use camera::Basis;
+pub use cancel::{Cancelled, IsCancelled};
 pub use compile::{CompileError, CompiledScene, Features};
 pub use frame::{PreparedFrame, tile_rows};
-pub use render::{Cancelled, RayCounts, TILE_SIZE, render_rows, render_rows_watched};
+pub use render::{RayCounts, TILE_SIZE, render_rows, render_rows_watched};
 pub use simd::best_name as simd_level;
 pub use stage::{Stage, Watch};
 pub use trace::{Primitive, RayHit};

@@ -9,6 +9,8 @@ pub(crate) struct EyePlane {
     pub normal: DVec3,
     /// Signed distance from the origin along the normal.
     pub offset: f64,
+    /// How far it may be off, in the units of the space.
+    pub off: f64,
 }
 
 impl EyePlane {
@@ -23,7 +25,7 @@ impl EyePlane {
 mod tests {
     use super::*;
 
-    const FLOOR: EyePlane = EyePlane { normal: DVec3::Y, offset: -2.0 };
+    const FLOOR: EyePlane = EyePlane { normal: DVec3::Y, offset: -2.0, off: 0.0 };
 
     #[test]
     fn it_is_hit_from_both_sides_and_not_along_it() {

@@ -12,7 +12,7 @@ use glam::Vec3;
 
 use crate::simd::math::srgb255;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Bytes, Simd, SimdBase, SimdFloat, f32x16, select, splat, three, u8x64, u32x16};
+use crate::simd::{Bytes, Lanes, Simd, SimdBase, SimdFloat, f32x16, select, splat, three, u8x64};
 
 /// Bits of an `f32` below those that index the table: 8 bits of exponent and 6 of mantissa stay.
 const SHIFT: u32 = 17;
@@ -40,10 +40,16 @@ pub fn encode(color: Vec3) -> [u8; 3] {
 pub(crate) type Encoded = [u8; 64];
 
 /// Encodes sixteen linear colours; values outside [0, 1] are clamped, NaN becomes 0. By a polynomial: a value within 10^-4
-/// of a step of a threshold may fall on its other side.
+/// of a step of a threshold may fall on its other side. `offsets` in steps, less than half of one, are added before a value
+/// is rounded.
 #[inline(always)]
-pub(crate) fn encode_lanes<S: Simd>(simd: S, color: Vec3x16<S>) -> Encoded {
-    let [r, g, b] = three!(channel => code(simd, color.0[channel]));
+pub(crate) fn encode_lanes<S: Simd>(simd: S, color: Vec3x16<S>, offsets: Option<&Lanes>) -> Encoded {
+    let mut steps = three!(channel => unrounded(simd, color.0[channel]));
+    if let Some(offsets) = offsets {
+        let offsets = offsets.load(simd);
+        steps = three!(channel => (steps[channel] + offsets).max(splat(simd, 0.0)));
+    }
+    let [r, g, b] = three!(channel => simd.cvt_u32_f32x16(steps[channel].round_ties_even()));
     let pixels = r | (g << 8) | (b << 16);
     let without_fourth = u8x64::load_array_ref(simd, &WITHOUT_FOURTH);
     simd.swizzle_dyn_within_blocks_u8x64(pixels.to_bytes(), without_fourth).to_array()
@@ -60,11 +66,6 @@ const WITHOUT_FOURTH: [u8; 64] = {
     }
     from
 };
-
-#[inline(always)]
-fn code<S: Simd>(simd: S, linear: f32x16<S>) -> u32x16<S> {
-    simd.cvt_u32_f32x16(unrounded(simd, linear).round_ties_even())
-}
 
 /// What [`encode_lanes`] rounds: in steps of the encoding, from 0 to 255.
 #[inline(always)]

@@ -42,7 +42,7 @@ fn under(case: String, subject: &Subject, effort: &Effort) -> Result<Outcome, Co
         tested: verdict.tested,
         at_edges: verdict.at_edges,
         wrong: verdict.wrong,
-        first_wrong: verdict.first_wrong.map(|pixel| pixel.to_string()),
+        failures: verdict.failures.iter().map(ToString::to_string).collect(),
     })
 }
 

@@ -9,19 +9,24 @@ use rayon::prelude::*;
 
 use super::placed::placed;
 use super::random::Random;
+use super::replay::slip;
 use super::seams::{Edge, Seams};
 use super::{Check, Effort, Outcome, Subject};
+use crate::compile::Item;
 use crate::compile::{CompileError, orientation};
 use crate::frame::PreparedFrame;
-use crate::trace::Primitive;
+use crate::trace::PrimitiveId;
 use crate::triangle::ShearedRay;
 
 /// Scale of the scene, and how many of its extents it is moved.
-const PLACES: [(f64, f64); 7] =
+pub(super) const PLACES: [(f64, f64); 7] =
     [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e3), (1.0, 1e6), (1e-6, 1e6), (1e6, 1e6)];
 
 /// Rays that are shot in one go.
 const PACK: u64 = 4096;
+
+/// Rays that slip through and are named, of each case.
+const NAMED: usize = 8;
 
 /// Rays go through points of edges between this share of the edge and the same share before its end.
 const FROM_THE_END: f64 = 1.0 / 64.0;
@@ -35,33 +40,59 @@ pub fn leaks(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
     if subject.scene.models.is_empty() {
         return Ok(Vec::new());
     }
+    // Rays go through cut-outs: that is no leak.
+    let mut whole = subject.clone();
+    whole.scene.materials.iter_mut().for_each(|material| material.cutout = None);
+    let subject = &whole;
     let seams: Vec<Seams> = subject.meshes.iter().map(|mesh| Seams::of(mesh)).collect();
     let extent = subject.extent()?;
     let rays = effort.rays.div_ceil(PLACES.len() as u64);
-    let at = |(scale, distance): (f64, f64)| {
-        let offset = DVec3::new(1.0, -1.0, 0.5) * (distance * extent * scale);
-        let subject = subject.with(placed(&subject.scene, scale, offset));
+    let at = |place: usize| {
+        let subject = at_place(subject, place, extent);
         let frame = subject.prepared(effort.side)?;
         let pieces = pieces(&subject, &frame, &seams);
-        let Tally { at_edges, wrong } = shoot(&frame, &pieces, rays);
-        let case = format!("scale {scale:e}, {distance:e} extents away");
+        let Tally { at_edges, wrong, slipped } = shoot(&frame, &pieces, rays);
+        let name = |&ray: &u64| slip(&frame, &pieces, ray, number(ray, place));
         Ok(Outcome {
             check: Check::Leaks,
-            case,
+            case: case(place),
             unit: "rays",
             tested: rays,
             at_edges,
             wrong,
-            first_wrong: None,
+            failures: slipped.iter().map(name).collect(),
         })
     };
-    PLACES.into_iter().map(at).collect()
+    (0..PLACES.len()).map(at).collect()
+}
+
+/// The scene at one of [`PLACES`].
+pub(super) fn at_place(subject: &Subject, place: usize, extent: f64) -> Subject {
+    let (scale, distance) = PLACES[place % PLACES.len()];
+    let offset = DVec3::new(1.0, -1.0, 0.5) * (distance * extent * scale);
+    subject.with(placed(&subject.scene, scale, offset))
+}
+
+/// What a place is called.
+pub(super) fn case(place: usize) -> String {
+    let (scale, distance) = PLACES[place % PLACES.len()];
+    format!("scale {scale:e}, {distance:e} extents away")
+}
+
+/// What `--ray` takes: the same ray at the same place, however many are shot.
+fn number(ray: u64, place: usize) -> u64 {
+    ray * PLACES.len() as u64 + place as u64
+}
+
+/// The ray of its case and the place that a number names.
+pub(super) fn of_number(number: u64) -> (u64, usize) {
+    (number / PLACES.len() as u64, (number % PLACES.len() as u64) as usize)
 }
 
 /// A model in the world, with its seams.
 pub(super) struct Piece<'a> {
-    model: usize,
-    seams: &'a Seams,
+    pub(super) model: usize,
+    pub(super) seams: &'a Seams,
     /// world = `linear` * mesh + `translation`.
     linear: DMat3,
     translation: DVec3,
@@ -72,10 +103,22 @@ pub(super) struct Piece<'a> {
 }
 
 /// What became of rays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub(super) at_edges: u64,
     pub(super) wrong: u64,
+    /// The first of those that slipped through.
+    pub(super) slipped: Vec<u64>,
+}
+
+impl Tally {
+    fn and(mut self, mut other: Self) -> Self {
+        self.slipped.append(&mut other.slipped);
+        self.slipped.sort_unstable();
+        self.slipped.truncate(NAMED);
+        let (at_edges, wrong) = (self.at_edges + other.at_edges, self.wrong + other.wrong);
+        Self { at_edges, wrong, ..self }
+    }
 }
 
 /// The models of a scene whose meshes have the given seams.
@@ -114,38 +157,54 @@ pub(super) fn shoot(frame: &PreparedFrame, pieces: &[Piece<'_>], rays: u64) -> T
     let pack = |index: u64| {
         let mut random = Random::new(index);
         let mut tally = Tally::default();
-        for _ in 0..PACK.min(rays - index * PACK) {
-            let piece = &pieces[random.below(pieces.len())];
-            let shot = piece.shot(&mut random);
-            tally.at_edges += u64::from(shot == Shot::MayPass);
-            tally.wrong += u64::from(matches!(shot, Shot::MustStop(shot) if !piece.stops(frame, &shot)));
+        for ray in index * PACK..rays.min((index + 1) * PACK) {
+            let shot = aim(pieces, &mut random);
+            let slips = shot.closes && !pieces[shot.piece].stops(frame, &shot);
+            tally.at_edges += u64::from(!shot.closes);
+            tally.wrong += u64::from(slips);
+            tally.slipped.extend((slips && tally.slipped.len() < NAMED).then_some(ray));
         }
         tally
     };
-    (0..rays.div_ceil(PACK))
-        .into_par_iter()
-        .map(pack)
-        .reduce(Tally::default, |a, b| Tally { at_edges: a.at_edges + b.at_edges, wrong: a.wrong + b.wrong })
+    (0..rays.div_ceil(PACK)).into_par_iter().map(pack).reduce(Tally::default, Tally::and)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Shot {
-    /// At something that does not close.
-    MayPass,
-    MustStop(Aimed),
+/// One of the rays of [`shoot`].
+pub(super) fn shot(pieces: &[Piece<'_>], ray: u64) -> Aimed {
+    let mut random = Random::new(ray / PACK);
+    for _ in 0..ray % PACK {
+        aim(pieces, &mut random);
+    }
+    aim(pieces, &mut random)
+}
+
+fn aim(pieces: &[Piece<'_>], random: &mut Random) -> Aimed {
+    let piece = random.below(pieces.len());
+    pieces[piece].shot(piece, random)
 }
 
 /// A ray at an edge, or at its first end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Aimed {
-    origin: DVec3,
-    direction: DVec3,
-    edge: usize,
-    at_vertex: bool,
+pub(super) struct Aimed {
+    pub(super) origin: DVec3,
+    pub(super) direction: DVec3,
+    /// Index of the piece.
+    pub(super) piece: usize,
+    pub(super) edge: usize,
+    /// Place on the edge; zero at its first end.
+    pub(super) share: f64,
+    /// Whether something must stop it.
+    pub(super) closes: bool,
+}
+
+impl Aimed {
+    pub(super) fn at_vertex(&self) -> bool {
+        self.share == 0.0
+    }
 }
 
 impl Piece<'_> {
-    fn shot(&self, random: &mut Random) -> Shot {
+    fn shot(&self, piece: usize, random: &mut Random) -> Aimed {
         let origin = self.origin(random);
         let edge = random.below(self.seams.edges.len());
         let at_vertex = random.below(4) == 0;
@@ -156,7 +215,7 @@ impl Piece<'_> {
             (FROM_THE_END + (1.0 - 2.0 * FROM_THE_END) * random.unit(), self.closes(origin, edge))
         };
         let direction = self.world(first).lerp(self.world(last), share) - origin;
-        if closes { Shot::MustStop(Aimed { origin, direction, edge, at_vertex }) } else { Shot::MayPass }
+        Aimed { origin, direction, piece, edge, share, closes }
     }
 
     /// Just below or above a triangle, within the model's box, or around it.
@@ -174,7 +233,7 @@ impl Piece<'_> {
         }
     }
 
-    fn world(&self, vertex: u32) -> DVec3 {
+    pub(super) fn world(&self, vertex: u32) -> DVec3 {
         self.linear * self.seams.vertices[vertex as usize] + self.translation
     }
 
@@ -197,33 +256,60 @@ impl Piece<'_> {
     }
 
     /// Whether something stops a ray: a triangle that has a corner in common with what is aimed at, something before it, or
-    /// something else at the very place.
-    fn stops(&self, frame: &PreparedFrame, shot: &Aimed) -> bool {
-        let Some(hit) = frame.closest_hit(shot.origin, shot.direction, f64::INFINITY) else { return false };
-        hit.t < 1.0 || self.touches(frame, shot, hit.primitive) || hit.t <= self.exactly(frame, shot)
+    /// something else that coincides with it.
+    pub(super) fn stops(&self, frame: &PreparedFrame, shot: &Aimed) -> bool {
+        let Some(ray) = frame.to_eye(shot.origin, shot.direction) else { return false };
+        let Some((t, primitive)) = frame.closest(&ray, f64::INFINITY) else { return false };
+        t < 1.0
+            || self.touches(frame, shot, primitive)
+            || t <= self.exactly(frame, shot) + frame.slack(&ray, primitive, t)
     }
 
-    fn touches(&self, frame: &PreparedFrame, shot: &Aimed, primitive: Primitive) -> bool {
-        let Primitive::Model { model, triangle } = primitive else { return false };
+    fn touches(&self, frame: &PreparedFrame, shot: &Aimed, primitive: PrimitiveId) -> bool {
+        let PrimitiveId { item, triangle } = primitive;
+        if item >= frame.items.first_plane() {
+            return false;
+        }
+        let Item::Model(model) = frame.items.get(item) else { return false };
         let corners = frame.instances[model].mesh.corners(triangle).map(|corner| corner.as_dvec3());
-        let ends = &self.seams.edges[shot.edge].ends[..if shot.at_vertex { 1 } else { 2 }];
+        let ends = &self.seams.edges[shot.edge].ends[..if shot.at_vertex() { 1 } else { 2 }];
         model == self.model && ends.iter().any(|&end| corners.contains(&self.seams.vertices[end as usize]))
     }
 
     /// Where the ray meets the triangles at which it is aimed, without a tree; minus infinity where it meets none.
     fn exactly(&self, frame: &PreparedFrame, shot: &Aimed) -> f64 {
-        let seams = self.seams;
-        let Some(ray) = frame.to_eye(shot.origin, shot.direction) else { return f64::NEG_INFINITY };
-        let local = frame.instances[self.model].to_mesh(&ray);
-        let exact = ShearedRay::new(local.origin, local.direction);
-        let first = seams.edges[shot.edge].ends[0];
-        let edges = if shot.at_vertex { seams.edges_at(first).to_vec() } else { vec![shot.edge as u32] };
-        let triangles = edges.iter().flat_map(|&edge| {
-            let edge = &seams.edges[edge as usize];
-            let corner = |vertex: u32| seams.vertices[vertex as usize];
-            let [a, b] = edge.ends.map(corner);
-            seams.opposite(edge).iter().map(move |&opposite| [a, b, corner(opposite)])
-        });
-        triangles.filter_map(|corners| exact.intersect(&corners)).fold(f64::NEG_INFINITY, f64::max)
+        self.around(shot)
+            .into_iter()
+            .filter_map(|corners| self.meets(frame, shot, &corners))
+            .fold(f64::NEG_INFINITY, f64::max)
     }
+
+    /// Where the ray meets one triangle.
+    pub(super) fn meets(&self, frame: &PreparedFrame, shot: &Aimed, corners: &[DVec3; 3]) -> Option<f64> {
+        let ray = frame.to_eye(shot.origin, shot.direction)?;
+        let local = frame.instances[self.model].to_mesh(&ray);
+        ShearedRay::new(local.origin, local.direction).intersect(corners)
+    }
+
+    /// The triangles at which a ray is aimed, in mesh space.
+    pub(super) fn around(&self, shot: &Aimed) -> Vec<[DVec3; 3]> {
+        let seams = self.seams;
+        let first = seams.edges[shot.edge].ends[0];
+        let edges = if shot.at_vertex() { seams.edges_at(first).to_vec() } else { vec![shot.edge as u32] };
+        let mut triangles: Vec<[u32; 3]> = Vec::new();
+        for &edge in &edges {
+            let edge = &seams.edges[edge as usize];
+            let [a, b] = edge.ends;
+            triangles.extend(seams.opposite(edge).iter().map(|&opposite| sorted([a, b, opposite])));
+        }
+        // Each stands at two edges of a vertex.
+        triangles.sort_unstable();
+        triangles.dedup();
+        triangles.into_iter().map(|corners| corners.map(|vertex| seams.vertices[vertex as usize])).collect()
+    }
+}
+
+fn sorted(mut corners: [u32; 3]) -> [u32; 3] {
+    corners.sort_unstable();
+    corners
 }

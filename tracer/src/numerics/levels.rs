@@ -27,7 +27,7 @@ pub fn levels(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compil
             tested,
             at_edges: 0,
             wrong,
-            first_wrong: None,
+            failures: Vec::new(),
         });
     }
     Ok(outcomes)

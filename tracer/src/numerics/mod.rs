@@ -17,6 +17,7 @@ mod offset;
 mod oracle;
 mod placed;
 mod random;
+mod replay;
 mod scale;
 mod scenes;
 mod seams;
@@ -37,6 +38,7 @@ pub use acne::acne;
 pub use leaks::leaks;
 pub use levels::levels;
 pub use offset::offset;
+pub use replay::replay;
 pub use scale::scale;
 pub use scenes::built_in;
 
@@ -116,8 +118,8 @@ pub struct Outcome {
     pub at_edges: u64,
     /// Those of them that are wrong.
     pub wrong: u64,
-    /// What is wrong with the first of these, where that can be told in a line.
-    pub first_wrong: Option<String>,
+    /// What is wrong with the first of these, a line each.
+    pub failures: Vec<String>,
 }
 
 impl Outcome {

@@ -32,7 +32,7 @@ pub fn offset(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compil
             tested: verdict.tested,
             at_edges: verdict.at_edges,
             wrong: verdict.wrong,
-            first_wrong: verdict.first_wrong.map(|pixel| pixel.to_string()),
+            failures: verdict.failures.iter().map(ToString::to_string).collect(),
         })
     };
     DISTANCES.into_iter().map(at).collect()

@@ -15,6 +15,9 @@ const NEXT_TO: f64 = 1.0 / 1024.0;
 /// As far away, at the edge of a shadow: there the rounding of the point counts as often as light that grazes draws it out.
 const NEXT_TO_SHADOW: f64 = 1.0 / 16.0;
 
+/// Pixels that are wrong and are named, of each case.
+const NAMED: usize = 8;
+
 /// A pixel that is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WrongPixel {
@@ -32,13 +35,13 @@ impl fmt::Display for WrongPixel {
 }
 
 /// What the oracle says of some pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Verdict {
     pub(super) tested: u64,
     pub(super) at_edges: u64,
     pub(super) wrong: u64,
-    /// The first one that is.
-    pub(super) first_wrong: Option<WrongPixel>,
+    /// The first of those that are.
+    pub(super) failures: Vec<WrongPixel>,
 }
 
 /// Asks the oracle of a scene about pixels of its picture. A channel may differ by a step of the encoding.
@@ -53,15 +56,24 @@ pub(super) fn ask(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &
         let right = is_near(found, expected);
         let at_edge = !right && around(center).any(|ring| is_between(found, ring.map(seen), expected));
         let wrong = !right && !at_edge;
-        let first_wrong = wrong.then_some(WrongPixel { at: [x, y], found, expected });
-        Verdict { tested: 1, at_edges: at_edge.into(), wrong: wrong.into(), first_wrong }
+        let failures = Vec::from_iter(wrong.then_some(WrongPixel { at: [x, y], found, expected }));
+        Verdict { tested: 1, at_edges: at_edge.into(), wrong: wrong.into(), failures }
     };
-    pixels.par_iter().map(judge).reduce(Verdict::default, |a, b| Verdict {
-        tested: a.tested + b.tested,
-        at_edges: a.at_edges + b.at_edges,
-        wrong: a.wrong + b.wrong,
-        first_wrong: a.first_wrong.or(b.first_wrong),
-    })
+    pixels.par_iter().map(judge).reduce(Verdict::default, Verdict::and)
+}
+
+impl Verdict {
+    /// Of these pixels, and then those.
+    fn and(mut self, other: Self) -> Self {
+        self.failures.extend(other.failures);
+        self.failures.truncate(NAMED);
+        Self {
+            tested: self.tested + other.tested,
+            at_edges: self.at_edges + other.at_edges,
+            wrong: self.wrong + other.wrong,
+            ..self
+        }
+    }
 }
 
 /// How many pixels the oracle may be asked for.

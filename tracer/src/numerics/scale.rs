@@ -32,7 +32,7 @@ pub fn scale(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
             tested,
             at_edges: 0,
             wrong,
-            first_wrong: None,
+            failures: Vec::new(),
         });
     }
     Ok(outcomes)

@@ -90,7 +90,7 @@ pub(super) fn torus(around: u32, across: u32) -> Mesh {
         positions: squares().map(|(i, j)| point(i, j)).collect(),
         triangle_materials: vec![0; triangles.len()],
         triangles,
-        materials: vec![NamedMaterial { name: "torus".into(), material: Material::NEUTRAL, texture: None }],
+        materials: vec![NamedMaterial::plain("torus", Material::NEUTRAL)],
         ..Mesh::default()
     }
 }

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::leaks::{Tally, pieces, shoot};
+use super::leaks::{Tally, pieces, shoot, shot};
 use super::oracle::{Verdict, ask, chosen, is_between};
+use super::replay::slip;
 use super::scenes::torus;
 use super::seams::Seams;
 use super::*;
@@ -52,18 +53,52 @@ fn a_missing_triangle_leaks() {
     let broken_mesh = Arc::new(CompiledMesh::compile(&mesh).unwrap().0);
     let mut broken = whole.with(whole.scene.clone());
     broken.scene.models.iter_mut().for_each(|model| model.mesh = broken_mesh.id());
+    let broken_id = broken_mesh.id();
     broken.meshes = vec![broken_mesh];
 
     let seams = [Seams::of(&whole.meshes[0])];
-    let count = |subject: &Subject| {
-        let frame = subject.prepared(8).unwrap();
-        shoot(&frame, &pieces(&whole, &frame, &seams), 100_000)
-    };
-    let Tally { at_edges, wrong } = count(&whole);
+    let frame_of = |subject: &Subject| subject.prepared(8).unwrap();
+    let count = |frame: &PreparedFrame| shoot(frame, &pieces(&whole, frame, &seams), 100_000);
+    let Tally { at_edges, wrong, .. } = count(&frame_of(&whole));
     assert_eq!(wrong, 0);
     assert!((1_000..50_000).contains(&at_edges), "{at_edges} of 100,000 at outlines");
-    let slipped = count(&broken).wrong;
-    assert!((5..1_000).contains(&slipped), "{slipped} of 100,000 slipped through one hole of 3,072");
+    let frame = frame_of(&broken);
+    let Tally { wrong, slipped, .. } = count(&frame);
+    assert!((5..1_000).contains(&wrong), "{wrong} of 100,000 slipped through one hole of 3,072");
+    assert_eq!(slipped.len(), wrong.min(8) as usize);
+    // Each is named: by number, mesh and triangles.
+    let told = slip(&frame, &pieces(&whole, &frame, &seams), slipped[0], 7 * slipped[0]);
+    let [number, id] = [(7 * slipped[0]).to_string(), broken_id.to_string()];
+    for word in [format!("ray {number} slips through model "), id[..8].to_owned(), format!("--ray {number}")]
+    {
+        assert!(told.contains(&word), "{word}: {told}");
+    }
+    assert!(told.contains(" triangle ") && told.contains("it sees "), "{told}");
+}
+
+/// The number that a failure names shows the same ray again, whatever else is shot.
+#[test]
+fn a_ray_is_shown_again() {
+    let subject = tori();
+    let seams = [Seams::of(&subject.meshes[0])];
+    let frame = subject.prepared(8).unwrap();
+    let pieces = pieces(&subject, &frame, &seams);
+    let number = 7 * 5_003;
+    let shot = shot(&pieces, 5_003);
+    let text = replay(&subject, &LITTLE, number).unwrap().unwrap();
+    let from = format!("from {:?} along {:?}", shot.origin, shot.direction);
+    assert!(text.starts_with("ray 35021: scale 1e0, 0e0 extents away, ray 5003 there\n"), "{text}");
+    for word in [from.as_str(), "aimed at the ", " met at t = ", "the fast path sees ", "the oracle sees "] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    // Both see the same, and it is said what that means.
+    let after = |what: &str| text.split(what).nth(1).and_then(|rest| rest.lines().next()).unwrap().trim();
+    let thing = |seen: &str| seen.split(" at t = ").next().unwrap().to_owned();
+    assert!(text.contains("is stopped") || text.contains("may pass"), "{text}");
+    assert!(text.contains("aimed at the edge") || text.contains("aimed at the vertex"), "{text}");
+    assert_eq!(after("fast path sees") == "nothing", after("oracle sees") == "nothing", "{text}");
+    assert!(!thing(after("fast path sees")).is_empty());
+    assert_eq!(replay(&built_in().unwrap()[0], &LITTLE, 1).unwrap(), None, "a plane has no edges");
 }
 
 #[test]
@@ -78,10 +113,10 @@ fn the_oracle_sees_a_pixel_that_is_wrong() {
         picture[pixel * 3 + 1] ^= 0x20;
     }
     let broken = ask(&subject, &view, &picture, &pixels);
-    let told = broken.first_wrong.unwrap().to_string();
+    let told = broken.failures[0].to_string();
     let (x, y) = (pixels[0] as u32 % view.width, pixels[0] as u32 / view.width);
     assert!(told.starts_with(&format!("pixel ({x}, {y}) is [")), "{told}");
-    assert_eq!(broken, Verdict { wrong: 3, first_wrong: broken.first_wrong, ..fine });
+    assert_eq!(broken, Verdict { wrong: 3, failures: broken.failures.clone(), ..fine });
 }
 
 #[test]

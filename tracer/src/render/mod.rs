@@ -9,6 +9,7 @@
 //! ```
 
 mod adaptive;
+mod dither;
 mod encode;
 mod regular;
 #[cfg(test)]
@@ -17,9 +18,10 @@ mod traced;
 
 use std::ops::{AddAssign, Range};
 
+use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::image;
-use crate::scene::ColorDepth;
+use crate::scene::{ColorDepth, Quality};
 use crate::simd::dispatch;
 use crate::stage::Watch;
 use crate::tile::SIDE;
@@ -46,18 +48,13 @@ impl AddAssign for RayCounts {
     }
 }
 
-/// Rendering was told to stop; what `out` holds is not a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("rendering was cancelled")]
-pub struct Cancelled;
-
 /// Traces the rows `rows` of a frame into `out`: `rows.len() * width * 3` bytes, RGB8 sRGB, top to bottom.
 ///
 /// A pixel depends on the scene, the view and its place in the picture alone, so frames may be cut into rows in any
-/// way. `cancelled` is asked before each band of at most [`TILE_SIZE`] rows.
+/// way. `cancelled` is asked before each tile of at most [`TILE_SIZE`] rows and columns.
 ///
 /// # Errors
-/// [`Cancelled`], when `cancelled` says so.
+/// [`Cancelled`], when `cancelled` says so; what `out` holds is not a picture then.
 ///
 /// # Panics
 /// If `rows` leaves the frame, or `out` has another length.
@@ -92,19 +89,18 @@ pub fn render_rows_watched<W: Watch>(
     let mut counts = RayCounts::default();
     let mut top = rows.start;
     while top < rows.end {
-        if cancelled() {
-            return Err(Cancelled);
-        }
         let bottom = (top + 1).next_multiple_of(band_rows).min(rows.end);
         let start = (top - rows.start) as usize * row_bytes;
         let band = &mut out[start..start + (bottom - top) as usize * row_bytes];
         counts += if adaptive {
-            dispatch!(frame.level, simd => adaptive::render_band(simd, frame, top..bottom, band, &mut *watch))
+            dispatch!(frame.level, simd => adaptive::render_band(simd, frame, top..bottom, band, cancelled, &mut *watch))?
         } else {
-            dispatch!(frame.level, simd => regular::render_band(simd, frame, top..bottom, band, &mut *watch))
+            dispatch!(frame.level, simd => regular::render_band(simd, frame, top..bottom, band, cancelled, &mut *watch))?
         };
-        if frame.view().quality.colors == ColorDepth::Reduced {
-            image::reduce_colors(band);
+        match frame.view().quality {
+            Quality { colors: ColorDepth::Exact, .. } => {}
+            Quality { dither: false, .. } => image::reduce_colors(band),
+            Quality { dither: true, .. } => dither::reduce_colors(frame, &(top..bottom), band),
         }
         top = bottom;
     }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::RayCounts;
 use super::encode::{Means, Place, write_samples};
 use super::traced::{Scratch, trace};
+use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::shade::Colors;
 use crate::simd::{LANES, Simd, three};
@@ -28,11 +29,12 @@ pub(super) fn render_band<S: Simd, W: Watch>(
     frame: &PreparedFrame,
     rows: Range<u32>,
     out: &mut [u8],
+    cancelled: &dyn Fn() -> bool,
     watch: &mut W,
-) -> RayCounts {
+) -> Result<RayCounts, Cancelled> {
     watch.enter(Stage::Visible);
     let rays = Rays::grid(simd);
-    let mut scratch = Scratch::new(frame);
+    let mut scratch = Scratch::new(frame, cancelled);
     // Whole pixels, with all their samples.
     let side = frame.tile_rows();
     let grid = frame.rays.grid();
@@ -49,7 +51,7 @@ pub(super) fn render_band<S: Simd, W: Watch>(
         let center = [f64::from(pixels.left * grid) + half, f64::from(pixels.top * grid) + half];
         let live = live_lanes(grid, &pixels);
         let tile = EyeTile::new(frame, &rays, live, center, grid);
-        let colors = trace(simd, &tile, &mut scratch, &mut counts, watch);
+        let colors = trace(simd, &tile, &mut scratch, &mut counts, watch)?;
         watch.enter(Stage::Encoding);
         if grid == 1 {
             write_samples(simd, frame, &pixels, colors, &live, out);
@@ -58,7 +60,7 @@ pub(super) fn render_band<S: Simd, W: Watch>(
         }
         watch.enter(Stage::Visible);
     }
-    counts
+    Ok(counts)
 }
 
 /// Samples of the pixels that are asked for.
@@ -85,7 +87,7 @@ pub(super) fn lanes_of(columns: u32, rows: Range<u32>) -> [u32; BLOCKS] {
 #[inline(always)]
 fn write_means<S: Simd>(simd: S, frame: &PreparedFrame, pixels: &Pixels, colors: &Colors, out: &mut [u8]) {
     let grid = frame.rays.grid() as usize;
-    let mut means = Means::of((grid * grid) as f32);
+    let mut means = Means::of((grid * grid) as f32, frame, &pixels.rows);
     for y in pixels.rows.start..pixels.rows.end {
         for x in pixels.left..pixels.right {
             let (column, row) = ((x - pixels.left) as usize * grid, (y - pixels.top) as usize * grid);

@@ -181,6 +181,9 @@ impl Facets {
         if tile.frame.features.smooth {
             group.keep(simd, ng, &mut surfaces.ns[block]);
         }
+        if tile.frame.features.emissive {
+            surfaces.face(block, lanes, bits(along.simd_lt(zero)));
+        }
         let sound = lift.simd_le(splat(simd, f32::MAX)) & along.abs().simd_le(splat(simd, f32::MAX));
         let unsound = lanes & !bits(sound);
         if unsound != 0 {

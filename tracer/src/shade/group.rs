@@ -43,6 +43,17 @@ pub(super) fn put<S: Simd>(simd: S, mask: mask32x16<S>, vectors: [Vec3; 3], lane
     }
 }
 
+/// A number of the three corners, by the weights of the second and the third.
+#[inline(always)]
+pub(super) fn barycentric_mean<S: Simd>(
+    simd: S,
+    [a, b, c]: [&Lanes; 3],
+    [second, third]: [f32x16<S>; 2],
+) -> f32x16<S> {
+    let first = splat(simd, 1.0) - second - third;
+    a.load(simd) * first + b.load(simd) * second + c.load(simd) * third
+}
+
 /// Three vectors a lane.
 pub(super) type ThreeVectors<S> = [Vec3x16<S>; 3];
 

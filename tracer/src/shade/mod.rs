@@ -5,13 +5,15 @@
 //! ```
 //!
 //! [`surface`] finds the point, N and the material of each ray's hit ([`facet`] those of flat triangles, in [`space`]), [`texel`]
-//! the share that a texture leaves of c_d, [`background`] stands where nothing is hit,
+//! the share that a texture leaves of c_d, [`tint`] that of the colours of vertices, [`glow`] is what is seen without light,
+//! [`background`] stands where nothing is hit,
 //! [`specular`] is the second term in the brackets; A_j B_j I_j come from [`crate::light`], S_j from
 //! [`crate::tile::shadow`].
 
 mod background;
 mod binomial;
 mod facet;
+mod glow;
 mod group;
 mod material;
 mod space;
@@ -20,6 +22,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 mod texel;
+mod tint;
 
 use crate::frame::PreparedFrame;
 use crate::light::{Emitter, EyeLight, JUST_BEFORE};
@@ -91,6 +94,9 @@ pub(crate) fn shade<S: Simd, W: Watch>(
             let behind = Vec3x16::load(simd, &scratch.colors[block]);
             blend(simd, hit, ambient(simd, frame, &scratch.surfaces, block), behind)
                 .store(&mut scratch.colors[block]);
+            if frame.features.emissive || frame.features.unlit {
+                glow::glow(frame, &mut scratch.surfaces, block, &mut scratch.colors[block]);
+            }
         }
     }
     for light in &frame.lights {
@@ -128,7 +134,7 @@ fn add_light<S: Simd, W: Watch>(
     let Scratch { surfaces, colors, contributions, lifted, .. } = scratch;
     let mut lit = [0_u32; BLOCKS];
     for block in 0..BLOCKS {
-        if surfaces.hit[block] != 0 {
+        if surfaces.lit[block] != 0 {
             let reached = unshadowed(
                 simd,
                 tile.frame,
@@ -138,7 +144,7 @@ fn add_light<S: Simd, W: Watch>(
                 &mut contributions[block],
                 &mut lifted[block],
             );
-            lit[block] = reached & surfaces.hit[block];
+            lit[block] = reached & surfaces.lit[block];
         }
     }
     if lit == [0; BLOCKS] {
@@ -181,7 +187,7 @@ fn unshadowed<S: Simd>(
     let incidence = light.incidence(simd, points);
     let n_dot_l = normals.dot(incidence.direction);
     let facing = incidence.reached & bits(n_dot_l.simd_gt(zero));
-    if facing & surfaces.hit[block] == 0 {
+    if facing & surfaces.lit[block] == 0 {
         return 0;
     }
     let materials = Materials::gather(simd, frame.scene(), surfaces, block);

@@ -6,6 +6,7 @@ use super::facet::Facets;
 use super::group::{Group, ThreeVectors, barycentric, put};
 use super::space::{Space, space_of};
 use super::texel::{CornerUvs, Texels};
+use super::tint::CornerColors;
 use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::frame::{Instance, PreparedFrame};
@@ -27,6 +28,10 @@ const LIFT: f32 = 1.0 / (1 << 20) as f32;
 pub(super) struct Surfaces {
     /// Bits of the lanes that hit something.
     pub hit: [u32; BLOCKS],
+    /// Those of them that lights shine on.
+    pub lit: [u32; BLOCKS],
+    /// Bits of the lanes that see the front side. Only kept if a material of the scene emits light.
+    pub front: [u32; BLOCKS],
     /// In eye space.
     pub point: [[Lanes; 3]; BLOCKS],
     /// Geometric unit normals on the viewer's side.
@@ -39,7 +44,7 @@ pub(super) struct Surfaces {
     pub lift: [Lanes; BLOCKS],
     /// Index into the scene's materials; in blocks with a hit, lanes without one repeat one of the others.
     pub material: [Indices; BLOCKS],
-    /// What textures make of the diffuse colours; only in scenes that have textures.
+    /// What textures and vertices make of colours; only in scenes that have either.
     pub texels: Option<Box<Texels>>,
 }
 
@@ -49,6 +54,8 @@ impl Surfaces {
         let nowhere = [[Lanes::ZERO; 3]; BLOCKS];
         Self {
             hit: [0; BLOCKS],
+            lit: [0; BLOCKS],
+            front: [0; BLOCKS],
             point: nowhere,
             ng: nowhere,
             ns: nowhere,
@@ -74,6 +81,7 @@ impl Surfaces {
             let items = &visible.item[block];
             let mut rest = tile.live[block] & !items.equal(simd, NOTHING);
             self.hit[block] = rest;
+            self.lit[block] = rest;
             facets.begin_block(block);
             if let Some(texels) = &mut self.texels {
                 texels.clear(block);
@@ -105,6 +113,23 @@ impl Surfaces {
                 direction.scale(backwards).store(&mut self.to_viewer[block]);
             }
         }
+        if visible.tied != [0; BLOCKS] {
+            self.lift_off_others(tile.frame, visible);
+        }
+    }
+
+    /// Where surfaces coincide, shadow rays are lifted off all of them: these are apart by at most twice what one may be off, and the
+    /// lifted point is off by as much again.
+    #[cold]
+    #[inline(never)]
+    fn lift_off_others(&mut self, frame: &PreparedFrame, visible: &Visible) {
+        let least = (4.0 * frame.coarsest) as f32;
+        for block in 0..BLOCKS {
+            for lane in each_bit(visible.tied[block]) {
+                let lift = &mut self.lift[block].0[lane];
+                *lift = lift.max(least);
+            }
+        }
     }
 
     /// The lanes of a block that see one item without facets. `space` is kept for the next block that sees it.
@@ -132,7 +157,7 @@ impl Surfaces {
             );
         }
         let triangles = &visible.triangle[block];
-        let (corners, normals, uvs, space) = match frame.items.get(item) {
+        let (corners, normals, paint, space) = match frame.items.get(item) {
             Item::Sphere(index) => {
                 let sphere = frame.spheres[index];
                 let material = frame.scene().spheres[index].material;
@@ -143,17 +168,24 @@ impl Surfaces {
                 let corners = three!(k => Vec3x16::splat(simd, corners[k].as_vec3().to_array()));
                 self.material[block].put(simd, mask_of(simd, lanes), frame.scene().triangles[index].material);
                 let uvs = frame.scene().triangles[index].uvs.map(CornerUvs::splat);
-                (corners, None, uvs, space_of(space, item, || Space::of_eye(tile)))
+                (corners, None, Paint { uvs, colors: None }, space_of(space, item, || Space::of_eye(tile)))
             }
             Item::Model(index) => {
                 let instance = &frame.instances[index];
                 let slots = &frame.scene().models[index].materials;
                 let (corners, normals) = self.gather(simd, instance, slots, triangles, block, lanes);
-                let uvs = instance.textured.then(|| CornerUvs::gather(&instance.mesh, &triangles.0, lanes));
-                (corners, normals, uvs, space_of(space, item, || Space::of_instance(tile, instance)))
+                let (mesh, triangles) = (&instance.mesh, &triangles.0);
+                let uvs = instance.textured.then(|| CornerUvs::gather(mesh, triangles, lanes));
+                let colors = instance.colored.then(|| CornerColors::gather(mesh, triangles, lanes));
+                (
+                    corners,
+                    normals,
+                    Paint { uvs, colors },
+                    space_of(space, item, || Space::of_instance(tile, instance)),
+                )
             }
         };
-        let sound = self.fill_triangles(simd, group, space, corners, normals, uvs.as_ref());
+        let sound = self.fill_triangles(simd, group, space, corners, normals, &paint);
         for lane in each_bit(lanes & !sound) {
             self.repair(tile, block, lane, item, triangles.0[lane]);
         }
@@ -205,7 +237,7 @@ impl Surfaces {
         space: &Space,
         [a, b, c]: ThreeVectors<S>,
         normals: Option<ThreeVectors<S>>,
-        uvs: Option<&CornerUvs>,
+        paint: &Paint,
     ) -> u32 {
         let &Group { tile, block, lanes, direction, .. } = group;
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
@@ -238,12 +270,29 @@ impl Surfaces {
         } else if tile.frame.features.smooth {
             group.keep(simd, ng, &mut self.ns[block]);
         }
-        if let (Some(uvs), Some(texels)) = (uvs, &mut self.texels) {
+        if tile.frame.features.emissive {
+            self.face(block, lanes, bits(along.simd_lt(zero)));
+        }
+        if let (Paint { uvs: Some(_), .. } | Paint { colors: Some(_), .. }, Some(texels)) =
+            (paint, &mut self.texels)
+        {
             let at = space.direction(simd, tile, block).scale(t).sub(to_a);
-            let uv = uvs.at(simd, barycentric(simd, at, ab, ac));
-            texels.fill(tile.frame, block, lanes, &self.material[block], &uv);
+            let weights = barycentric(simd, at, ab, ac);
+            let materials = &self.material[block];
+            if let Some(uvs) = &paint.uvs {
+                texels.fill(tile.frame, block, lanes, materials, &uvs.at(simd, weights));
+            }
+            if let Some(colors) = &paint.colors {
+                texels.tint(simd, tile.frame, block, lanes, materials, colors.at(simd, weights));
+            }
         }
         bits(lift.simd_le(splat(simd, f32::MAX)) & turned.abs().simd_le(splat(simd, f32::MAX)))
+    }
+
+    /// Keeps which of some lanes see the front side.
+    #[inline(always)]
+    pub(super) fn face(&mut self, block: usize, lanes: u32, front: u32) {
+        self.front[block] = (self.front[block] & !lanes) | (front & lanes);
     }
 
     /// Keeps points on planes with their normals. Returns how far shadow rays are lifted off them.
@@ -266,19 +315,22 @@ impl Surfaces {
     /// A triangle too thin for single precision: once more in `f64`.
     #[inline(never)]
     pub(super) fn repair(&mut self, tile: &EyeTile<'_>, block: usize, lane: usize, item: u32, triangle: u32) {
-        let [a, b, c] = match tile.frame.items.get(item) {
+        let ([a, b, c], mirrored) = match tile.frame.items.get(item) {
             Item::Model(index) => {
                 let instance = &tile.frame.instances[index];
                 let corners = instance.mesh.corners(triangle);
-                corners.map(|corner| instance.linear * corner.as_dvec3() + instance.translation)
+                let placed = corners.map(|corner| instance.linear * corner.as_dvec3() + instance.translation);
+                (placed, instance.linear.determinant() < 0.0)
             }
-            Item::Triangle(index) => tile.frame.triangles[index].corners,
+            Item::Triangle(index) => (tile.frame.triangles[index].corners, false),
             // Never too thin.
             Item::Sphere(_) => return,
         };
         let ray = tile.ray(block, lane);
         let ng = (b - a).cross(c - a).normalize_or(-ray.direction.normalize());
-        let ng = if ng.dot(ray.direction) > 0.0 { -ng } else { ng };
+        let behind = ng.dot(ray.direction) > 0.0;
+        let ng = if behind { -ng } else { ng };
+        self.face(block, 1 << lane, u32::from(behind == mirrored) << lane);
         // Without a plane to rely on, the first corner tells the distance.
         let depth = a.length() / ray.direction.length();
         self.set(block, lane, ray.direction * depth, ng);
@@ -297,10 +349,12 @@ impl Surfaces {
         for lane in each_bit(lanes) {
             let ray = tile.ray(block, lane);
             let primitive = PrimitiveId { item, triangle: 0 };
-            let t = tile.frame.hit_of(&ray, primitive, None).map_or(0.0, |hit| hit.t);
+            let t = tile.frame.t_of(&ray, primitive, None).unwrap_or(0.0);
             let point = ray.direction * t;
             let ng = normal(point);
-            let ng = if ng.dot(ray.direction) > 0.0 { -ng } else { ng };
+            let behind = ng.dot(ray.direction) > 0.0;
+            let ng = if behind { -ng } else { ng };
+            self.face(block, 1 << lane, u32::from(!behind) << lane);
             self.set(block, lane, point, ng);
             self.material[block].0[lane] = material;
         }
@@ -314,6 +368,12 @@ impl Surfaces {
         }
         self.lift[block].0[lane] = point.abs().max_element() as f32 * LIFT;
     }
+}
+
+/// What corners of triangles carry beside normals.
+struct Paint {
+    uvs: Option<CornerUvs>,
+    colors: Option<CornerColors>,
 }
 
 /// Notes the triangles that some lanes of a block see, if their item is flat and bare: else they want more than a plane.
@@ -333,7 +393,7 @@ fn add_facets<S: Simd>(
     }
     let triangles = &visible.triangle[block];
     match frame.items.get(item) {
-        Item::Model(index) if !frame.instances[index].smooth && !frame.instances[index].textured => {
+        Item::Model(index) if frame.instances[index].is_bare() => {
             let slots = &frame.scene().models[index].materials;
             let mesh = &frame.instances[index].mesh;
             facets.add(simd, block, item, lanes, triangles, |triangle| match slots.as_slice() {

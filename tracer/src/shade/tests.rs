@@ -35,7 +35,7 @@ fn empty() -> Scene {
 }
 
 fn material(diffuse: Vec3, specular: f32, exponent: f32) -> Material {
-    Material { diffuse, specular: Vec3::splat(specular), exponent, texture: None }
+    Material { diffuse, specular: Vec3::splat(specular), exponent, ..Material::NEUTRAL }
 }
 
 fn light(position: DVec3, color: f32, attenuation: Attenuation) -> Light {

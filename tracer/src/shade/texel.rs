@@ -6,10 +6,11 @@
 use glam::Vec2;
 
 use super::Colors;
+use super::group::barycentric_mean;
 use super::surface::Surfaces;
 use crate::frame::PreparedFrame;
 use crate::mesh::CompiledMesh;
-use crate::scene::Filter;
+use crate::scene::{Filter, Tiling, Wrap};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{
     Indices, LANES, Lanes, Simd, SimdBase, SimdFloat, dispatch, each_bit, f32x16, mask_of, select, splat,
@@ -20,12 +21,23 @@ use crate::texture::Texture;
 use crate::tile::BLOCKS;
 
 /// Texture coordinates at the corners of sixteen triangles, indexed `[corner][u or v]`.
-pub(super) struct CornerUvs([[Lanes; 2]; 3]);
+pub(super) struct CornerUvs {
+    corners: [[Lanes; 2]; 3],
+    /// Whole repeats that are to be added for textures that tell them apart.
+    repeats: Option<[Lanes; 2]>,
+}
+
+/// Texture coordinates of sixteen points.
+pub(super) struct PointUvs {
+    near: [Lanes; 2],
+    /// See [`CornerUvs`].
+    repeats: Option<[Lanes; 2]>,
+}
 
 impl CornerUvs {
     /// One triangle in all lanes.
     pub(super) fn splat(uvs: [Vec2; 3]) -> Self {
-        Self(uvs.map(|uv| uv.to_array().map(|c| Lanes([c; LANES]))))
+        Self { corners: uvs.map(|uv| uv.to_array().map(|c| Lanes([c; LANES]))), repeats: None }
     }
 
     /// Those of the triangles that lanes see.
@@ -41,36 +53,58 @@ impl CornerUvs {
                 uvs[1].0[lane] = corner.y;
             }
         }
-        Self(uvs)
+        let repeats = (!mesh.uv_repeats().is_empty()).then(|| gather_repeats(mesh, triangles, lanes));
+        Self { corners: uvs, repeats }
     }
 
     /// Between the corners: `weights` are those of the second and the third.
     #[inline(always)]
-    pub(super) fn at<S: Simd>(&self, simd: S, weights: [f32x16<S>; 2]) -> [Lanes; 2] {
-        let [a, b, c] = &self.0;
-        let [second, third] = weights;
-        let first = splat(simd, 1.0) - second - third;
-        let mut uv = [Lanes::ZERO; 2];
+    pub(super) fn at<S: Simd>(&self, simd: S, weights: [f32x16<S>; 2]) -> PointUvs {
+        let [a, b, c] = &self.corners;
+        let mut near = [Lanes::ZERO; 2];
         for axis in 0..2 {
-            let [a, b, c] = [a[axis].load(simd), b[axis].load(simd), c[axis].load(simd)];
-            uv[axis].store(a * first + b * second + c * third);
+            near[axis].store(barycentric_mean(simd, [&a[axis], &b[axis], &c[axis]], weights));
         }
-        uv
+        PointUvs { near, repeats: self.repeats }
     }
 }
 
-/// Factors of the diffuse colours of a tile, 1 where there is no texture.
-pub(super) struct Texels(Colors);
+#[inline(never)]
+fn gather_repeats(mesh: &CompiledMesh, triangles: &[u32; LANES], lanes: u32) -> [Lanes; 2] {
+    let mut repeats = [Lanes::ZERO; 2];
+    for lane in each_bit(lanes) {
+        let whole = mesh.whole_repeats(triangles[lane]);
+        repeats[0].0[lane] = whole.x;
+        repeats[1].0[lane] = whole.y;
+    }
+    repeats
+}
+
+/// Factors of the diffuse colours and the emission of a tile, 1 where there is no texture.
+pub(super) struct Texels {
+    diffuse: Colors,
+    /// Only in scenes where something emits light.
+    emission: Option<Box<Colors>>,
+}
+
+const WHITE: [Lanes; 3] = [Lanes([1.0; LANES]); 3];
 
 impl Texels {
-    /// `None` for a scene without textures.
+    /// `None` for a scene without textures and colours of vertices.
     pub(super) fn for_scene(frame: &PreparedFrame) -> Option<Box<Self>> {
-        frame.features.textured.then(|| Box::new(Self([[Lanes([1.0; LANES]); 3]; BLOCKS])))
+        let features = &frame.features;
+        (features.textured || features.vertex_colors).then(|| {
+            let emission = features.emissive.then(|| Box::new([WHITE; BLOCKS]));
+            Box::new(Self { diffuse: [WHITE; BLOCKS], emission })
+        })
     }
 
     /// No textures in a block yet.
     pub(super) fn clear(&mut self, block: usize) {
-        self.0[block] = [Lanes([1.0; LANES]); 3];
+        self.diffuse[block] = WHITE;
+        if let Some(emission) = &mut self.emission {
+            emission[block] = WHITE;
+        }
     }
 
     /// Fills the lanes of a block that have a texture. Dispatched anew: few scenes come here, and the code of all others
@@ -82,7 +116,7 @@ impl Texels {
         block: usize,
         lanes: u32,
         materials: &Indices,
-        uv: &[Lanes; 2],
+        uv: &PointUvs,
     ) {
         dispatch!(frame.level, simd => self.fill_with(simd, frame, block, lanes, materials, uv));
     }
@@ -96,23 +130,84 @@ impl Texels {
         block: usize,
         lanes: u32,
         materials: &Indices,
-        uv: &[Lanes; 2],
+        uv: &PointUvs,
     ) {
-        let uv = [uv[0].load(simd), uv[1].load(simd)];
         let mut rest = lanes;
         while rest != 0 {
-            let material = materials.0[rest.trailing_zeros() as usize];
-            let same = rest & materials.equal(simd, material);
+            let index = materials.0[rest.trailing_zeros() as usize];
+            let same = rest & materials.equal(simd, index);
             rest &= !same;
-            let Some(map) = frame.scene().materials[material as usize].texture else { continue };
-            let (texture, filter) = &frame.textures()[map as usize];
-            let color = match frame.view().quality.filter.unwrap_or(*filter) {
-                Filter::Nearest => nearest(simd, texture, uv, same),
-                Filter::Bilinear => bilinear(simd, texture, uv, same),
-            };
-            let (mask, before) = (mask_of(simd, same), Vec3x16::load(simd, &self.0[block]));
-            Vec3x16(three!(i => select(mask, color.0[i], before.0[i]))).store(&mut self.0[block]);
+            let material = &frame.scene().materials[index as usize];
+            if let Some(map) = material.texture {
+                look_up(simd, frame, map, uv, same, &mut self.diffuse[block]);
+            }
+            if let (Some(map), Some(emission)) = (material.emission_texture, &mut self.emission) {
+                look_up(simd, frame, map, uv, same, &mut emission[block]);
+            }
         }
+    }
+
+    /// Multiplies the diffuse factors of a block by the colours of vertices, in lanes whose materials take them.
+    #[inline(always)]
+    pub(super) fn tint<S: Simd>(
+        &mut self,
+        simd: S,
+        frame: &PreparedFrame,
+        block: usize,
+        lanes: u32,
+        materials: &Indices,
+        colors: Vec3x16<S>,
+    ) {
+        let mut tinted = 0;
+        let mut rest = lanes;
+        while rest != 0 {
+            let index = materials.0[rest.trailing_zeros() as usize];
+            let same = rest & materials.equal(simd, index);
+            rest &= !same;
+            tinted |= if frame.scene().materials[index as usize].vertex_colors { same } else { 0 };
+        }
+        let (mask, before) = (mask_of(simd, tinted), Vec3x16::load(simd, &self.diffuse[block]));
+        let after = before.mul(colors);
+        Vec3x16(three!(i => select(mask, after.0[i], before.0[i]))).store(&mut self.diffuse[block]);
+    }
+}
+
+/// One texture in some lanes of a block.
+#[inline(always)]
+fn look_up<S: Simd>(
+    simd: S,
+    frame: &PreparedFrame,
+    map: u32,
+    uv: &PointUvs,
+    lanes: u32,
+    colors: &mut [Lanes; 3],
+) {
+    let (texture, map) = &frame.textures()[map as usize];
+    let uv = uv.laid(simd, &map.tiling);
+    let color = match frame.view().quality.filter.unwrap_or(map.filter) {
+        Filter::Nearest => nearest(simd, texture, map.tiling.wrap, uv, lanes),
+        Filter::Bilinear => bilinear(simd, texture, map.tiling.wrap, uv, lanes),
+    };
+    let (mask, before) = (mask_of(simd, lanes), Vec3x16::load(simd, colors));
+    Vec3x16(three!(i => select(mask, color.0[i], before.0[i]))).store(colors);
+}
+
+impl PointUvs {
+    /// Scaled and moved as a texture asks.
+    #[inline(always)]
+    fn laid<S: Simd>(&self, simd: S, tiling: &Tiling) -> [f32x16<S>; 2] {
+        let [u, v] = [self.near[0].load(simd), self.near[1].load(simd)];
+        if *tiling == Tiling::default() {
+            return [u, v];
+        }
+        let [u, v] = match &self.repeats {
+            Some(repeats) if tiling.tells_repeats_apart() => {
+                [u + repeats[0].load(simd), v + repeats[1].load(simd)]
+            }
+            _ => [u, v],
+        };
+        let Tiling { scale, offset, .. } = tiling;
+        [u * splat(simd, scale.x) + splat(simd, offset.x), v * splat(simd, scale.y) + splat(simd, offset.y)]
     }
 }
 
@@ -122,23 +217,48 @@ impl Surfaces {
     pub(super) fn textured<S: Simd>(&self, simd: S, block: usize, diffuse: Vec3x16<S>) -> Vec3x16<S> {
         match &self.texels {
             None => diffuse,
-            Some(texels) => diffuse.mul(Vec3x16::load(simd, &texels.0[block])),
+            Some(texels) => diffuse.mul(Vec3x16::load(simd, &texels.diffuse[block])),
+        }
+    }
+
+    /// An emission in a block with its textures.
+    #[inline(always)]
+    pub(super) fn glowing_texels<S: Simd>(&self, simd: S, block: usize, emission: Vec3x16<S>) -> Vec3x16<S> {
+        match self.texels.as_ref().and_then(|texels| texels.emission.as_ref()) {
+            None => emission,
+            Some(texels) => emission.mul(Vec3x16::load(simd, &texels[block])),
         }
     }
 }
 
-/// Where a coordinate lies in a picture that repeats once a unit: in texels, from 0 up to `size`, which rounding may reach.
+/// Where a coordinate lies in a picture: in texels, from 0 up to `size`, which rounding may reach.
 #[inline(always)]
-fn position<S: Simd>(coordinate: f32x16<S>, size: f32x16<S>) -> f32x16<S> {
-    (coordinate - coordinate.floor()) * size
+fn position<S: Simd>(simd: S, wrap: Wrap, coordinate: f32x16<S>, size: f32x16<S>) -> f32x16<S> {
+    let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
+    let share = match wrap {
+        Wrap::Repeat => coordinate - coordinate.floor(),
+        Wrap::Clamp => coordinate.max_precise(zero).min_precise(one),
+        Wrap::Mirror => {
+            let two = splat(simd, 2.0);
+            let pair = coordinate - (coordinate * splat(simd, 0.5)).floor() * two;
+            pair.min_precise(two - pair)
+        }
+    };
+    share * size
 }
 
 /// The texel that each point lies in.
 #[inline(always)]
-fn nearest<S: Simd>(simd: S, texture: &Texture, [u, v]: [f32x16<S>; 2], lanes: u32) -> Vec3x16<S> {
+fn nearest<S: Simd>(
+    simd: S,
+    texture: &Texture,
+    wrap: Wrap,
+    [u, v]: [f32x16<S>; 2],
+    lanes: u32,
+) -> Vec3x16<S> {
     let [width, height] = [texture.width(), texture.height()];
-    let x = position(u, splat(simd, width as f32)).to_array();
-    let y = position(v, splat(simd, height as f32)).to_array();
+    let x = position(simd, wrap, u, splat(simd, width as f32)).to_array();
+    let y = position(simd, wrap, v, splat(simd, height as f32)).to_array();
     let decoded = srgb::decoded();
     let mut color = [Lanes::ZERO; 3];
     for lane in each_bit(lanes) {
@@ -159,16 +279,18 @@ struct Pair<S: Simd> {
 }
 
 impl<S: Simd> Pair<S> {
-    /// Texel centres lie at half numbers; the first and the last texel are neighbours.
+    /// Texel centres lie at half numbers; where the picture repeats, the first and the last texel are neighbours.
     #[inline(always)]
-    fn around(simd: S, position: f32x16<S>, size: f32x16<S>) -> Self {
+    fn around(simd: S, wrap: Wrap, position: f32x16<S>, size: f32x16<S>) -> Self {
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let from_center = position - splat(simd, 0.5);
         let first = from_center.floor();
         let next = first + one;
+        let last = size - one;
+        let (before, behind) = if wrap == Wrap::Repeat { (last, zero) } else { (zero, last) };
         Self {
-            first: select(first.simd_lt(zero), size - one, first).to_array(),
-            second: select(next.simd_lt(size), next, zero).to_array(),
+            first: select(first.simd_lt(zero), before, first).to_array(),
+            second: select(next.simd_lt(size), next, behind).to_array(),
             weight: from_center - first,
         }
     }
@@ -176,10 +298,16 @@ impl<S: Simd> Pair<S> {
 
 /// The four texels around each point, weighted by nearness.
 #[inline(always)]
-fn bilinear<S: Simd>(simd: S, texture: &Texture, [u, v]: [f32x16<S>; 2], lanes: u32) -> Vec3x16<S> {
+fn bilinear<S: Simd>(
+    simd: S,
+    texture: &Texture,
+    wrap: Wrap,
+    [u, v]: [f32x16<S>; 2],
+    lanes: u32,
+) -> Vec3x16<S> {
     let [width, height] = [splat(simd, texture.width() as f32), splat(simd, texture.height() as f32)];
-    let columns = Pair::around(simd, position(u, width), width);
-    let rows = Pair::around(simd, position(v, height), height);
+    let columns = Pair::around(simd, wrap, position(simd, wrap, u, width), width);
+    let rows = Pair::around(simd, wrap, position(simd, wrap, v, height), height);
     let decoded = srgb::decoded();
     let mut colors = [[Lanes::ZERO; 3]; 4];
     for lane in each_bit(lanes) {

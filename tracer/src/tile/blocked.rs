@@ -5,9 +5,11 @@ use super::lens::Lens;
 use super::points::Points;
 use super::setup::{At, Flats};
 use super::shadow::ShadowTile;
+use super::visible::NOTHING;
 use super::walk::{Frontier, Interest};
 use super::{ALL_BLOCKS, BLOCKS, Rays};
 use crate::compile::Item;
+use crate::cutout;
 use crate::simd::{Lanes, Simd, SimdBase, bits, each_bit, f32x16, splat, u32x16};
 use crate::trace::PrimitiveId;
 
@@ -26,10 +28,24 @@ pub(super) struct Blocked<'a> {
     pub rays: &'a Rays,
     pub points: &'a mut Points,
     /// Whose triangles are asked about.
-    pub item: u32,
+    item: u32,
+    /// Which of them can be cut out.
+    cutouts: &'a [u16],
 }
 
-impl Blocked<'_> {
+impl<'a> Blocked<'a> {
+    /// About nothing yet.
+    pub(super) fn new(tile: &'a ShadowTile<'a>, rays: &'a Rays, points: &'a mut Points) -> Self {
+        Self { tile, rays, points, item: NOTHING, cutouts: &[] }
+    }
+
+    /// Asks about this item from now on.
+    #[inline(always)]
+    pub(super) fn turn_to(&mut self, item: u32) {
+        self.item = item;
+        self.cutouts = self.tile.frame.cutouts_of(item);
+    }
+
     #[inline(always)]
     pub(super) fn cover_item<S: Simd>(
         &mut self,
@@ -109,16 +125,45 @@ impl Blocked<'_> {
         }
     }
 
-    /// One ray against all triangles of a leaf.
+    /// As [`Blocked::cover_block`] for triangles that can be cut out: each ray that one may be before is asked exactly.
+    #[cold]
+    #[inline(never)]
+    fn cover_cut<S: Simd>(&mut self, simd: S, flats: &Flats, first: u32, triangles: u32, block: usize) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (x, y) = (self.rays.x[block].load(simd), self.rays.y[block].load(simd));
+                let (low, high) = (self.points.low[block].load(simd), self.points.high[block].load(simd));
+                for lane in each_bit(triangles) {
+                    let at = flats.triangle_at(simd, lane, x, y);
+                    let error = splat(simd, flats.z_error.0[lane]);
+                    let (maybe, _) = self.before(simd, &at, error, low, high);
+                    for ray in each_bit(maybe & self.points.open[block]) {
+                        self.ask(block, ray, first + lane as u32);
+                    }
+                }
+            },
+        );
+    }
+
+    /// One ray against all triangles of a leaf but for those that can be cut out.
     #[inline(always)]
-    fn cover_ray<S: Simd>(&mut self, simd: S, flats: &Flats, first: u32, block: usize, lane: usize) {
+    fn cover_ray<S: Simd>(
+        &mut self,
+        simd: S,
+        flats: &Flats,
+        first: u32,
+        cut: u32,
+        block: usize,
+        lane: usize,
+    ) {
         let (x, y) = (self.rays.x[block].0[lane], self.rays.y[block].0[lane]);
         let at = flats.all_at(simd, x, y);
         let error = flats.z_error.load(simd);
         let low = splat(simd, self.points.low[block].0[lane]);
         let high = splat(simd, self.points.high[block].0[lane]);
         let (maybe, certain) = self.before(simd, &at, error, low, high);
-        let mut maybe = maybe & flats.seen;
+        let mut maybe = maybe & flats.seen & !cut;
         if self.tile.item[block].0[lane] == self.item {
             let own = self.tile.triangle[block].0[lane].wrapping_sub(first);
             maybe &= !1_u32.checked_shl(own).unwrap_or(0);
@@ -188,8 +233,13 @@ impl<S: Simd> Question<S> for Blocked<'_> {
     #[inline(always)]
     fn cover(&mut self, simd: S, flats: &Flats, first: u32, blocks: u32) {
         let mut hull = None;
+        let cut = cutout::bits_at(self.cutouts, first);
         for block in each_bit(blocks) {
-            let triangles = flats.touching(simd, self.rays.around(block), self.points.least.0[block]);
+            let mut triangles = flats.touching(simd, self.rays.around(block), self.points.least.0[block]);
+            if triangles & cut != 0 {
+                self.cover_cut(simd, flats, first, triangles & cut, block);
+                triangles &= !cut;
+            }
             if triangles.count_ones() <= FEW_TRIANGLES {
                 self.cover_block(simd, flats, first, triangles, block);
                 continue;
@@ -201,7 +251,7 @@ impl<S: Simd> Question<S> for Blocked<'_> {
             let rays = self.rays.rays_in(simd, block, around) & self.points.open_before(simd, block, z_most);
             if rays.count_ones() < triangles.count_ones() {
                 for lane in each_bit(rays) {
-                    self.cover_ray(simd, flats, first, block, lane);
+                    self.cover_ray(simd, flats, first, cut, block, lane);
                 }
             } else {
                 self.cover_block(simd, flats, first, triangles, block);

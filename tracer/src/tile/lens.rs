@@ -85,6 +85,8 @@ pub(crate) struct Lens {
     pub parallel: bool,
     /// Error of [`Lens::exact`] for points of the scene.
     pub exact_error: f64,
+    /// How far apart points of surfaces may be that coincide, in units of the space that it looks at.
+    pub drift: f64,
     exact: Affine,
 }
 
@@ -103,6 +105,33 @@ impl Lens {
         Self { exact_error: exact_size * EXACT_ROUNDING, ..Self::with_sizes(exact, size, parallel) }
     }
 
+    /// Of a picture of eye space: what surfaces may be off in a and b, and in g, each by `coarsest` on its own side. A closeness has at
+    /// least three times the errors of (a, b, g) as its own: it is enough that they are as large as half of the distance.
+    pub(crate) fn drift(picture: &Affine, coarsest: f64) -> [f32; 2] {
+        let off = three!(i => {
+            let [x, y, z, _] = picture.0[i];
+            DVec3::new(x, y, z).length() * coarsest
+        });
+        [off[0].max(off[1]) as f32, off[2] as f32]
+    }
+
+    /// With errors that cover what surfaces may be off that coincide (in the picture and in depth; in the space that it looks at), so that
+    /// their closeness is never told apart for certain.
+    #[inline(always)]
+    pub(crate) fn drifting(self, in_picture: [f32; 2], in_space: f64) -> Self {
+        let error = [self.error[0].max(in_picture[0]), self.error[1].max(in_picture[1])];
+        Self { error, drift: in_space, ..self }
+    }
+
+    /// The volume in (a, b, g) of a unit of the space.
+    pub(super) fn volume(&self) -> f64 {
+        let [a, b, g] = three!(i => {
+            let [x, y, z, _] = self.exact.0[i];
+            DVec3::new(x, y, z)
+        });
+        a.dot(b.cross(g)).abs()
+    }
+
     /// `size` bounds the numbers that go into each row.
     #[inline(always)]
     fn with_sizes(exact: Affine, size: [f64; 3], parallel: bool) -> Self {
@@ -114,7 +143,7 @@ impl Lens {
         }
         let error = [size[0].max(size[1]) as f32 * ROUNDING, size[2] as f32 * ROUNDING];
         let exact_error = size[0].max(size[1]).max(size[2]) * EXACT_ROUNDING;
-        Self { rows, error, parallel, exact_error, exact }
+        Self { rows, error, parallel, exact_error, drift: 0.0, exact }
     }
 
     /// The same picture of another space, of which `placement` is the place in this one.

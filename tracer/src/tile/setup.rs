@@ -157,6 +157,7 @@ impl Flats {
     /// in the space that the lens looks at.
     pub(super) fn set_up_exactly(&mut self, lane: usize, lens: &Lens, corners: [DVec3; 3], rays: &Rays) {
         self.seen = 0;
+        let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let corners = three!(k => lens.exact(corners[k]));
         // z g at the corners, with g = 1 for parallel rays.
         let closeness = three!(k => if lens.parallel { -corners[k].z } else { 1.0 });
@@ -200,7 +201,13 @@ impl Flats {
         for (lanes, number) in self.z.iter_mut().zip([z0, zx, zy]) {
             lanes.0[lane] = number;
         }
-        let z_error = 4.0 * ROUNDING * size([z0, zx, zy])
+        // Moved across itself, the plane comes as much closer as its distance from the lens changes by.
+        let drift = if lens.drift > 0.0 {
+            lens.drift * across.length() * lens.volume() / determinant.abs()
+        } else {
+            0.0
+        };
+        let z_error = (4.0 * ROUNDING + drift as f32) * size([z0, zx, zy])
             + (zx.abs() + zy.abs()) * rays.error
             + gradient_error as f32 * (1.0 + 2.0 * reach);
         self.z_error.0[lane] = z_error;

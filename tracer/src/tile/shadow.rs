@@ -14,7 +14,6 @@ use glam::{DVec3, Vec3};
 
 use super::blocked::Blocked;
 use super::light_lens::Extent;
-use super::visible::NOTHING;
 use super::{BLOCKS, Rays, Scratch};
 use crate::frame::PreparedFrame;
 use crate::simd::{Indices, Lanes, Simd, three};
@@ -59,23 +58,23 @@ impl ShadowTile<'_> {
         points.dark = [0; BLOCKS];
         let extent = Extent::of(simd, self.points, self.grid, &asked);
         let Some(lens) = extent.lens(self.light) else {
-            Blocked { tile: self, rays, points, item: NOTHING }.ask_all();
+            Blocked::new(self, rays, points).ask_all();
             return points.dark;
         };
         points.project(simd, self.points, &extent, &lens, rays);
-        let mut blocked = Blocked { tile: self, rays, points, item: NOTHING };
+        let mut blocked = Blocked::new(self, rays, points);
         scene_frontier.find(simd, &self.frame.nodes, &lens, rays, &blocked);
         for leaf in &scene_frontier.leaves {
             if leaf.z_most < blocked.points.least_of_all {
                 continue;
             }
             for &item in self.frame.items_of(leaf.index) {
-                blocked.item = item;
+                blocked.turn_to(item);
                 blocked.cover_item(simd, &lens, mesh_frontier, flats);
             }
         }
         for plane in 0..self.frame.planes.len() as u32 {
-            blocked.item = self.frame.items.first_plane() + plane;
+            blocked.turn_to(self.frame.items.first_plane() + plane);
             blocked.ask_item();
         }
         points.dark

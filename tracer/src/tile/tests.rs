@@ -19,7 +19,7 @@ use crate::scene::{
     Sphere, Triangle,
 };
 use crate::simd::{self, Indices, LANES, Lanes, Simd, dispatch};
-use crate::trace::{Hit, PrimitiveId, Ray};
+use crate::trace::{PrimitiveId, Ray};
 
 /// Numbers that a seed tells (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
 struct Random(u64);
@@ -91,7 +91,7 @@ fn hard_triangles(random: &mut Random, origin: DVec3, targets: &[DVec3], count: 
 
 /// `None` if they are all too small to be kept.
 fn mesh_of(triangles: &[[DVec3; 3]]) -> Option<CompiledMesh> {
-    let material = NamedMaterial { name: "m".into(), material: Material::NEUTRAL, texture: None };
+    let material = NamedMaterial::plain("m", Material::NEUTRAL);
     let mesh = Mesh {
         positions: triangles.concat(),
         triangles: (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
@@ -223,16 +223,13 @@ fn every_ray_sees_what_brute_force_sees() {
         let mut frame = frame_of(random, &triangles, camera, size);
         let live = some_lanes(random);
         let primitives = primitives(&frame);
-        let closest = |ray: &Ray| {
-            let hits = primitives.iter().filter_map(|&primitive| frame.hit_of(ray, primitive, None));
-            hits.reduce(|best: Hit, hit| if hit.wins_over(&best) { hit } else { best })
-        };
+        let closest = |ray: &Ray| frame.seen_of(ray, primitives.iter().copied(), f64::INFINITY);
         let expected: Vec<(usize, usize, Option<PrimitiveId>)> = each_lane(&live)
             .map(|(block, lane)| {
                 let (column, row) = place(block, lane);
                 let direction = frame.rays.of_sample(corner.0 + column as u32, corner.1 + row as u32);
                 let hit = closest(&Ray { origin: DVec3::ZERO, direction });
-                (block, lane, hit.map(|hit| hit.primitive))
+                (block, lane, hit.map(|(_, primitive)| primitive))
             })
             .collect();
         for level in simd::all() {

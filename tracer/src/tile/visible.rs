@@ -8,6 +8,7 @@ use super::setup::{At, Flats};
 use super::walk::{Interest, Walk};
 use super::{ALL_BLOCKS, BLOCKS, Rays, Scratch};
 use crate::compile::Item;
+use crate::cutout;
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{
@@ -32,6 +33,8 @@ pub(crate) struct Visible {
     least: Lanes,
     /// Least of `least`.
     least_of_all: f32,
+    /// Rays that see one of several surfaces in one place; while a tile is searched, those that may.
+    pub tied: [u32; BLOCKS],
 }
 
 impl Visible {
@@ -44,6 +47,7 @@ impl Visible {
             high: [Lanes::ZERO; BLOCKS],
             least: Lanes::ZERO,
             least_of_all: 0.0,
+            tied: [0; BLOCKS],
         }
     }
 
@@ -52,6 +56,7 @@ impl Visible {
     fn clear<S: Simd>(&mut self, simd: S, live: &[u32; BLOCKS]) {
         let infinite = splat(simd, f32::INFINITY);
         self.least_of_all = f32::INFINITY;
+        self.tied = [0; BLOCKS];
         for block in 0..BLOCKS {
             let start = select(mask_of(simd, live[block]), splat(simd, 0.0), infinite);
             self.low[block].store(start);
@@ -93,10 +98,11 @@ impl Visible {
         }
     }
 
-    fn see(&mut self, block: usize, lane: usize, hit: &Hit) {
-        let closeness = (1.0 / hit.t) as f32;
-        self.low[block].0[lane] = closeness * (1.0 - ROUNDING);
-        self.high[block].0[lane] = closeness * (1.0 + ROUNDING);
+    /// What coincides with the hit is at most `slack` behind it.
+    fn see(&mut self, block: usize, lane: usize, hit: &Hit, slack: f64) {
+        let closeness = |t: f64| (1.0 / t) as f32;
+        self.low[block].0[lane] = closeness(hit.t + slack) * (1.0 - ROUNDING);
+        self.high[block].0[lane] = closeness(hit.t) * (1.0 + ROUNDING);
         self.item[block].0[lane] = hit.primitive.item;
         self.triangle[block].0[lane] = hit.primitive.triangle;
     }
@@ -110,6 +116,8 @@ pub(crate) struct EyeTile<'a> {
     pub lens: Lens,
     /// Which rays count.
     pub live: [u32; BLOCKS],
+    /// How far, in its picture and in depth, surfaces may be off that coincide: see [`Lens::drift`].
+    drift: [f32; 2],
     /// Samples along a side of a pixel, as this tile counts them.
     grid: f64,
     /// How much larger its picture is than that of the frame.
@@ -136,8 +144,9 @@ impl<'a> EyeTile<'a> {
         let steps = [frame.rays.through(center[0] / grid, center[1] / grid), right, down];
         let rounded_steps = three!(i => steps[i].as_vec3().to_array());
         let picture = frame.projection.enlarged(enlarged).centered(center[0], center[1]);
-        let lens = Lens::new(picture, 1.0, false);
-        Self { frame, rays, lens, grid, enlarged, center, live, steps, rounded_steps }
+        let [near, far] = Lens::drift(&picture, frame.coarsest);
+        let lens = Lens::new(picture, 1.0, false).drifting([near, far], 2.0 * frame.coarsest);
+        Self { frame, rays, lens, drift: [near, far], grid, enlarged, center, live, steps, rounded_steps }
     }
 
     /// How the tile sees a mesh.
@@ -145,6 +154,7 @@ impl<'a> EyeTile<'a> {
     fn lens_of(&self, instance: &Instance) -> Lens {
         let [x, y] = self.center;
         Lens::new(instance.projection.enlarged(self.enlarged).centered(x, y), 1.0, false)
+            .drifting(self.drift, f64::from(instance.drift))
     }
 
     /// The ray of a lane, exactly.
@@ -167,11 +177,12 @@ impl<'a> EyeTile<'a> {
     pub(crate) fn find_visible<S: Simd>(&self, simd: S, visible: &mut Visible, scratch: &mut Scratch) {
         visible.clear(simd, &self.live);
         let Scratch { scene_stack, mesh_stack, flats, .. } = scratch;
-        let mut nearest = Nearest { tile: self, item: NOTHING, visible };
+        let mut nearest = Nearest { tile: self, item: NOTHING, cutouts: &[], visible };
         let mut walk = Walk::new(&self.frame.nodes, &[], &self.lens, self.rays, scene_stack).around_last();
         while let Some((leaf, _)) = walk.next(simd, &nearest) {
             for &item in self.frame.items_of(leaf) {
                 nearest.item = item;
+                nearest.cutouts = self.frame.cutouts_of(item);
                 match self.frame.items.get(item) {
                     Item::Model(index) => {
                         let instance = &self.frame.instances[index];
@@ -199,6 +210,25 @@ impl<'a> EyeTile<'a> {
             nearest.item = self.frame.items.first_plane() + plane;
             nearest.ask_every_ray(simd);
         }
+        if visible.tied != [0; BLOCKS] {
+            self.settle_ties(visible);
+        }
+    }
+
+    /// Rays whose nearest hit may coincide with others see one of the same surface all over: see `trace/coincide.rs`.
+    #[cold]
+    #[inline(never)]
+    fn settle_ties(&self, visible: &mut Visible) {
+        for block in 0..BLOCKS {
+            for lane in each_bit(visible.tied[block]) {
+                let (item, triangle) = (visible.item[block].0[lane], visible.triangle[block].0[lane]);
+                let nearest = PrimitiveId { item, triangle };
+                let (seen, others) = self.frame.preferred(&self.ray(block, lane), nearest, f64::INFINITY);
+                visible.tied[block] &= !(u32::from(!others) << lane);
+                visible.item[block].0[lane] = seen.item;
+                visible.triangle[block].0[lane] = seen.triangle;
+            }
+        }
     }
 }
 
@@ -206,6 +236,8 @@ impl<'a> EyeTile<'a> {
 struct Nearest<'a, 'b> {
     tile: &'a EyeTile<'a>,
     item: u32,
+    /// Which triangles of the item can be cut out.
+    cutouts: &'a [u16],
     visible: &'b mut Visible,
 }
 
@@ -226,13 +258,18 @@ impl Nearest<'_, '_> {
     fn ask(&mut self, block: usize, lane: usize, triangle: u32) {
         let ray = self.tile.ray(block, lane);
         let frame = self.tile.frame;
-        let Some(hit) = frame.hit_of(&ray, PrimitiveId { item: self.item, triangle }, None) else { return };
+        let primitive = PrimitiveId { item: self.item, triangle };
+        let Some(hit) = frame.hit_of(&ray, primitive, None) else { return };
+        let slack = frame.slack(&ray, primitive, hit.t);
         let seen = self.visible.item[block].0[lane];
         let best = (seen != NOTHING)
             .then(|| PrimitiveId { item: seen, triangle: self.visible.triangle[block].0[lane] })
             .and_then(|seen| frame.hit_of(&ray, seen, None));
+        if best.is_some_and(|best| (hit.t - best.t).abs() <= slack) {
+            self.visible.tied[block] |= 1 << lane;
+        }
         if best.is_none_or(|best| hit.wins_over(&best)) {
-            self.visible.see(block, lane, &hit);
+            self.visible.see(block, lane, &hit, slack);
         }
     }
 }
@@ -259,10 +296,14 @@ impl<S: Simd> Question<S> for Nearest<'_, '_> {
     #[inline(always)]
     fn cover(&mut self, simd: S, flats: &Flats, first: u32, blocks: u32) {
         let mut changed = 0;
+        let cut = cutout::bits_at(self.cutouts, first);
         for block in each_bit(blocks) {
             let triangles = flats.touching(simd, self.tile.rays.around(block), self.visible.least.0[block]);
             if triangles != 0 {
-                let any = self.cover_block(simd, flats, first, triangles, block);
+                let mut any = self.cover_block(simd, flats, first, triangles & !cut, block);
+                if triangles & cut != 0 {
+                    any |= self.cover_cut(simd, flats, first, triangles & cut, block);
+                }
                 changed |= u32::from(any) << block;
             }
         }
@@ -310,5 +351,37 @@ impl Nearest<'_, '_> {
         }
         self.visible.keep(simd, block, low, high, seen, changed, self.item);
         changed | asked != 0
+    }
+
+    /// As [`Nearest::cover_block`] for triangles that can be cut out: of what is not certain to be farther, each ray is asked
+    /// exactly.
+    #[cold]
+    #[inline(never)]
+    fn cover_cut<S: Simd>(
+        &mut self,
+        simd: S,
+        flats: &Flats,
+        first: u32,
+        triangles: u32,
+        block: usize,
+    ) -> bool {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let rays = self.tile.rays;
+                let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
+                let mut asked = 0;
+                for lane in each_bit(triangles) {
+                    let At { maybe, z, .. } = flats.triangle_at(simd, lane, x, y);
+                    let z_high = z + splat(simd, flats.z_error.0[lane]);
+                    let maybe = maybe & !bits(z_high.simd_lt(self.visible.low[block].load(simd)));
+                    for ray in each_bit(maybe) {
+                        self.ask(block, ray, first + lane as u32);
+                    }
+                    asked |= maybe;
+                }
+                asked != 0
+            },
+        )
     }
 }

@@ -4,6 +4,7 @@
 //! certain (`walk.rs`, `filter.rs`); the exact test of `triangle.rs` decides the rest, and computes the distance that is
 //! answered. Every level of SIMD, and every tree, therefore gives the same hit, to the bit.
 
+pub(crate) mod coincide;
 mod filter;
 mod near_ray;
 mod search;
@@ -18,7 +19,8 @@ use glam::{DVec3, Vec3};
 
 use crate::bvh::WIDTH;
 use crate::compile::Item;
-use crate::frame::{Instance, PreparedFrame};
+use crate::cutout;
+use crate::frame::{EyeTriangle, Instance, PreparedFrame};
 use crate::mesh::TriangleBlock;
 use crate::simd::{Simd, dispatch, each_bit, prefetch, three};
 use crate::triangle::ShearedRay;
@@ -83,9 +85,11 @@ impl PreparedFrame {
     ///
     /// `direction` need not be a unit vector; t is in its lengths. The hit is the one that an exact test (in `f64`) of all
     /// primitives in turn would find, to the bit and on every machine. No ray slips between two triangles that share an
-    /// edge (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013). Of hits with the same t the first in
-    /// the scene counts: models before spheres before triangles before planes, and in a mesh the triangle that comes
-    /// first in its file.
+    /// edge (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013). Where alpha cuts a triangle out, the
+    /// ray goes on. Where surfaces coincide but for the
+    /// rounding of their corners, the hit is one of the same surface all over: of an item before that of an infinite plane, then
+    /// of a surface that faces the ray before one seen from behind, then of the first in the scene: models before
+    /// spheres before triangles before planes, and in a mesh the triangle that comes first in its file.
     ///
     /// `None` also for what is no ray: an origin or a direction that is not finite, or a direction whose largest
     /// component is not within 1e-100 to 1e100.
@@ -136,7 +140,12 @@ impl PreparedFrame {
     }
 
     /// Where the ray hits one primitive, to the last digit. Of one that it leaves only the far side is hit, if it has one.
-    fn t_of(&self, ray: &Ray, primitive: PrimitiveId, leaving: Option<PrimitiveId>) -> Option<f64> {
+    pub(crate) fn t_of(
+        &self,
+        ray: &Ray,
+        primitive: PrimitiveId,
+        leaving: Option<PrimitiveId>,
+    ) -> Option<f64> {
         let PrimitiveId { item, triangle } = primitive;
         let leaves = leaving == Some(primitive);
         if item >= self.items.first_plane() {
@@ -147,14 +156,18 @@ impl PreparedFrame {
             Item::Sphere(index) => self.spheres[index].intersect(ray.origin, ray.direction, leaves),
             Item::Model(_) | Item::Triangle(_) if leaves => None,
             Item::Triangle(index) => {
-                ShearedRay::new(ray.origin, ray.direction).intersect(&self.triangles[index].corners)
+                let EyeTriangle { corners, cut, .. } = &self.triangles[index];
+                let t = ShearedRay::new(ray.origin, ray.direction).intersect(corners)?;
+                (!cut || self.is_there(primitive, ray, corners, t)).then_some(t)
             }
             Item::Model(index) => {
                 let instance = &self.instances[index];
                 let local = instance.to_mesh(ray);
                 let corners = instance.mesh.corners(triangle);
                 let corners = three!(k => corners[k].as_dvec3());
-                ShearedRay::new(local.origin, local.direction).intersect(&corners)
+                let t = ShearedRay::new(local.origin, local.direction).intersect(&corners)?;
+                let solid = instance.cutouts.is_empty() || self.is_there(primitive, &local, &corners, t);
+                solid.then_some(t)
             }
         }
     }
@@ -170,7 +183,7 @@ impl PreparedFrame {
             return instance.search(simd, ray, 0, stack, search);
         }
         let bounds = || self.nodes[0].bounds();
-        let Some(near) = NearRay::new(*ray, bounds) else { return Continue(()) };
+        let Some(near) = NearRay::new(*ray, 0.0, bounds) else { return Continue(()) };
         walk(simd, &self.nodes, &near, stack, &mut ItemLeaves { frame: self, ray, search })
     }
 
@@ -179,10 +192,9 @@ impl PreparedFrame {
     fn offer_item(&self, ray: &Ray, item: u32, search: &mut impl Search) -> ControlFlow<()> {
         let primitive = PrimitiveId { item, triangle: 0 };
         let leaving = search.leaves(primitive).then_some(primitive);
-        match self.t_of(ray, primitive, leaving) {
-            Some(t) => search.offer(Offer { primitive, certain: true, low: t, high: t }),
-            None => Continue(()),
-        }
+        let Some(t) = self.t_of(ray, primitive, leaving) else { return Continue(()) };
+        let slack = self.slack(ray, primitive, t);
+        search.offer(Offer { primitive, certain: true, low: t - slack, high: t + slack })
     }
 
     /// `None` for what is no ray.
@@ -243,6 +255,8 @@ impl<S: Simd, T: Search> Leaves<S> for ItemLeaves<'_, T> {
 struct TriangleLeaves<'a, T> {
     item: u32,
     blocks: &'a [TriangleBlock],
+    /// Which of them can be cut out: see [`PreparedFrame::cutouts_of`].
+    cutouts: &'a [u16],
     near: &'a NearRay,
     search: &'a mut T,
 }
@@ -258,11 +272,12 @@ impl<S: Simd, T: Search> Leaves<S> for TriangleLeaves<'_, T> {
         // Made for each block: many rays see none, few see many. Not before the walk either: see `walk`.
         let filter = FilterRay::new(black_box(self.near));
         let hits = filter.hits(simd, &self.blocks[leaf as usize], reach);
+        let certain = hits.certain & !cutout::bits_at(self.cutouts, leaf * WIDTH as u32);
         for lane in each_bit(hits.maybe) {
             let triangle = leaf * WIDTH as u32 + lane as u32;
             let primitive = PrimitiveId { item: self.item, triangle };
             if !self.search.leaves(primitive) {
-                let certain = hits.certain >> lane & 1 == 1;
+                let certain = certain >> lane & 1 == 1;
                 let (low, high) = (self.near.t(hits.low[lane]), self.near.t(hits.high[lane]));
                 self.search.offer(Offer { primitive, certain, low, high })?;
             }
@@ -290,9 +305,10 @@ impl Instance {
         search: &mut impl Search,
     ) -> ControlFlow<()> {
         let whole_mesh = || (Vec3::NEG_ONE, Vec3::ONE);
-        let Some(near) = NearRay::new(self.to_mesh(ray), whole_mesh) else { return Continue(()) };
+        let Some(near) = NearRay::new(self.to_mesh(ray), self.drift, whole_mesh) else { return Continue(()) };
         let blocks = self.mesh.blocks();
-        let mut triangles = TriangleLeaves { item, blocks, near: &near, search };
+        let cutouts = &self.cutouts;
+        let mut triangles = TriangleLeaves { item, blocks, cutouts, near: &near, search };
         walk(simd, self.mesh.nodes(), &near, stack, &mut triangles)
     }
 

@@ -10,7 +10,7 @@ pub(super) const FAR: f32 = 4.0;
 
 /// Error of a coordinate relative to a corner, sheared, in shares of the largest number that went into it: the sum of
 /// ten roundings of at most 2^-24, and room.
-const ROUNDING: f32 = 0.75 / (1 << 20) as f32;
+const ROUNDING: f32 = 0.6875 / (1 << 20) as f32;
 
 /// Directions whose largest component is not within these are scaled, so that no product overflows in `f32`.
 const USUAL: std::ops::Range<f32> = 1.0 / (1 << 30) as f32..(1 << 30) as f32;
@@ -41,9 +41,9 @@ pub(super) struct NearRay {
 }
 
 impl NearRay {
-    /// `None` if the ray misses the box by far.
+    /// `None` if the ray misses the box by far. `drift`: how far, on each axis, what coincides may be apart.
     #[inline(always)]
-    pub(super) fn new(ray: Ray, bounds: impl FnOnce() -> (Vec3, Vec3)) -> Option<Self> {
+    pub(super) fn new(ray: Ray, drift: f32, bounds: impl FnOnce() -> (Vec3, Vec3)) -> Option<Self> {
         let mut origin = in_four(ray.origin);
         let mut size = largest(&origin);
         let mut start = 0.0;
@@ -69,7 +69,9 @@ impl NearRay {
         let [x, y, z, _] = direction;
         let (x, y, z) = (x.abs(), y.abs(), z.abs());
         let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(y < z) };
-        Some(Self { origin, direction, inverse, axis, error: (1.0 + size) * ROUNDING, start, scale, per_t })
+        // Sheared, a drift counts on two axes.
+        let error = (1.0 + size) * ROUNDING + 2.0 * drift;
+        Some(Self { origin, direction, inverse, axis, error, start, scale, per_t })
     }
 
     /// The t of a distance.

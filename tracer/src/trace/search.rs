@@ -1,6 +1,6 @@
 //! What a ray is asked for: the closest hit, or any.
 //!
-//! Filters offer intervals of distances. What they decide is decided; only where intervals overlap, or where a hit is not
+//! Filters offer intervals of distances, as wide as hits that coincide may be apart (`coincide.rs`). What they decide is decided; only where intervals overlap, or where a hit is not
 //! certain, the exact test is asked. So the answer is the one of the exact test over all primitives.
 
 use std::ops::ControlFlow::{self, Break, Continue};
@@ -29,11 +29,15 @@ pub(super) trait Search {
     fn offer(&mut self, offer: Offer) -> ControlFlow<()>;
 }
 
-/// The hit with the lowest t in (0, `t_max`), of equal ones the one of the lowest rank.
+/// The hit that a ray sees in (0, `t_max`): the one with the lowest t, of equal ones that of the lowest rank, or one that
+/// coincides with it.
 pub(super) struct Closest<'a> {
     frame: &'a PreparedFrame,
     ray: &'a Ray,
+    t_max: f64,
     best: Option<PrimitiveId>,
+    /// Whether hits were so near to each other that they may coincide.
+    tied: bool,
     /// The t of the best hit lies between these; `t_max` as long as there is none.
     low: f64,
     high: f64,
@@ -41,12 +45,15 @@ pub(super) struct Closest<'a> {
 
 impl<'a> Closest<'a> {
     pub(super) fn new(frame: &'a PreparedFrame, ray: &'a Ray, t_max: f64) -> Self {
-        Self { frame, ray, best: None, low: t_max, high: t_max }
+        Self { frame, ray, t_max, best: None, tied: false, low: t_max, high: t_max }
     }
 
     /// What was found, and its t to the last digit.
     pub(super) fn found(&self) -> Option<(f64, PrimitiveId)> {
-        let best = self.best?;
+        let mut best = self.best?;
+        if self.tied {
+            (best, _) = self.frame.preferred(self.ray, best, self.t_max);
+        }
         Some((self.frame.t_of(self.ray, best, None)?, best))
     }
 
@@ -54,13 +61,17 @@ impl<'a> Closest<'a> {
     #[inline(never)]
     fn ask(&mut self, primitive: PrimitiveId) {
         let Some(hit) = self.frame.hit_of(self.ray, primitive, None) else { return };
+        let slack = self.frame.slack(self.ray, primitive, hit.t);
         let best = self.best.and_then(|best| self.frame.hit_of(self.ray, best, None));
         let wins = match best {
-            Some(best) => hit.wins_over(&best),
-            None => hit.t < self.high,
+            Some(best) => {
+                self.tied |= (hit.t - best.t).abs() <= slack;
+                hit.wins_over(&best)
+            }
+            None => hit.t < self.t_max,
         };
         if wins {
-            self.take(primitive, hit.t, hit.t);
+            self.take(primitive, hit.t, hit.t + slack);
         }
     }
 

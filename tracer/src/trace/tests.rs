@@ -45,7 +45,7 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
 
 fn mesh_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let slots = vec![0; triangles.len()];
-    let material = NamedMaterial { name: "m".into(), material: Material::NEUTRAL, texture: None };
+    let material = NamedMaterial::plain("m", Material::NEUTRAL);
     Mesh { positions, triangles, triangle_materials: slots, materials: vec![material], ..Mesh::default() }
 }
 
@@ -293,11 +293,11 @@ fn all_hits(frame: &PreparedFrame, ray: &Ray) -> Vec<(f64, PrimitiveId)> {
 }
 
 fn brute_force(frame: &PreparedFrame, ray: &Ray) -> Option<(f64, PrimitiveId)> {
-    let rank = |id: PrimitiveId| (id.item, frame.instances[id.item as usize].mesh.source(id.triangle));
-    let nearer = |a: &(f64, PrimitiveId), b: &(f64, PrimitiveId)| {
-        a.0.total_cmp(&b.0).then_with(|| rank(a.1).cmp(&rank(b.1)))
-    };
-    all_hits(frame, ray).into_iter().min_by(nearer)
+    let hits = all_hits(frame, ray);
+    for &(t, primitive) in &hits {
+        assert_eq!(frame.t_of(ray, primitive, None), Some(t));
+    }
+    frame.seen_of(ray, hits.iter().map(|&(_, primitive)| primitive), f64::INFINITY)
 }
 
 fn brute_count(frame: &PreparedFrame, ray: &Ray, t_max: f64) -> usize {

@@ -6,6 +6,7 @@ use super::super::RayCounts;
 use super::super::regular::lanes_of;
 use super::super::traced::{Scratch, trace};
 use super::BAND;
+use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::shade::Colors;
 use crate::simd::vector::Vec3x16;
@@ -48,10 +49,10 @@ impl Corners {
         frame: &PreparedFrame,
         top: u32,
         rows: &Range<u32>,
-        scratch: &mut Scratch,
+        scratch: &mut Scratch<'_>,
         counts: &mut RayCounts,
         watch: &mut W,
-    ) {
+    ) -> Result<(), Cancelled> {
         let middle = (SIDE as f64 - 1.0) / 2.0;
         let columns = frame.width() + 1;
         let rays = Rays::grid(simd);
@@ -59,22 +60,23 @@ impl Corners {
             let live = lanes_of(columns - left, rows.start..(rows.end + 1).min(BAND));
             let center = [f64::from(left) + middle, f64::from(top) + middle];
             let tile = EyeTile::new(frame, &rays, live, center, 1);
-            let colors = trace(simd, &tile, scratch, counts, watch);
+            let colors = trace(simd, &tile, scratch, counts, watch)?;
             watch.enter(Stage::Encoding);
             self.put(simd, &live, colors, left as usize, place);
         }
         if rows.end < BAND {
-            return;
+            return Ok(());
         }
         for left in (0..columns).step_by(ROW_TILE as usize) {
             let live = in_row((columns - left) as usize);
             let rays = Rays::row(simd, &live);
             let center = [f64::from(left) + f64::from(ROW_TILE - 1) / 2.0, f64::from(top + BAND) + 0.5];
             let tile = EyeTile::new(frame, &rays, live, center, 1);
-            let colors = trace(simd, &tile, scratch, counts, watch);
+            let colors = trace(simd, &tile, scratch, counts, watch)?;
             watch.enter(Stage::Encoding);
             self.put(simd, &live, colors, left as usize, |block, lane| (block * LANES + lane, BAND as usize));
         }
+        Ok(())
     }
 
     /// Keeps the colours of a tile whose lanes stand at `place`, four in a row.

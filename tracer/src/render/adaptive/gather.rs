@@ -2,6 +2,7 @@
 
 use super::super::RayCounts;
 use super::super::traced::{Scratch, trace};
+use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::shade::Colors;
 use crate::simd::{LANES, Simd, three};
@@ -84,10 +85,10 @@ impl Gathered {
         pattern: &Pattern,
         center: [u32; 2],
         pixels: &[[u32; 2]],
-        scratch: &'a mut Scratch,
+        scratch: &'a mut Scratch<'_>,
         counts: &mut RayCounts,
         watch: &mut W,
-    ) -> &'a Colors {
+    ) -> Result<&'a Colors, Cancelled> {
         self.live = [0; BLOCKS];
         let grid = pattern.grid as f32;
         for (pixel, at) in pixels.iter().enumerate() {

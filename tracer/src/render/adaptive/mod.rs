@@ -18,8 +18,10 @@ mod tests;
 use std::ops::Range;
 
 use super::RayCounts;
+use super::dither::Dither;
 use super::encode::{Means, Place, write_flat};
 use super::traced::Scratch;
+use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, each_bit, three};
@@ -48,12 +50,13 @@ pub(super) fn render_band<S: Simd, W: Watch>(
     frame: &PreparedFrame,
     rows: Range<u32>,
     out: &mut [u8],
+    cancelled: &dyn Fn() -> bool,
     watch: &mut W,
-) -> RayCounts {
+) -> Result<RayCounts, Cancelled> {
     watch.enter(Stage::Visible);
-    let mut band = Band::new(frame, rows);
-    band.render(simd, out, watch);
-    band.counts
+    let mut band = Band::new(frame, rows, cancelled);
+    band.render(simd, out, watch)?;
+    Ok(band.counts)
 }
 
 /// A band of rows under way.
@@ -63,7 +66,7 @@ struct Band<'a> {
     top: u32,
     /// What is asked for.
     rows: Range<u32>,
-    scratch: Scratch,
+    scratch: Scratch<'a>,
     corners: Corners,
     /// What the pixels that are asked for want: by row, then sixteen columns.
     wants: Vec<Wants>,
@@ -74,12 +77,12 @@ struct Band<'a> {
 }
 
 impl<'a> Band<'a> {
-    fn new(frame: &'a PreparedFrame, rows: Range<u32>) -> Self {
+    fn new(frame: &'a PreparedFrame, rows: Range<u32>, cancelled: &'a dyn Fn() -> bool) -> Self {
         let width = frame.width() as usize;
         Self {
             frame,
             top: rows.start / BAND * BAND,
-            scratch: Scratch::new(frame),
+            scratch: Scratch::new(frame, cancelled),
             corners: Corners::new(width),
             wants: vec![Wants::default(); rows.len() * width.div_ceil(LANES)],
             rows,
@@ -90,14 +93,15 @@ impl<'a> Band<'a> {
     }
 
     #[inline(always)]
-    fn render<S: Simd, W: Watch>(&mut self, simd: S, out: &mut [u8], watch: &mut W) {
-        self.trace_corners(simd, watch);
+    fn render<S: Simd, W: Watch>(&mut self, simd: S, out: &mut [u8], watch: &mut W) -> Result<(), Cancelled> {
+        self.trace_corners(simd, watch)?;
         self.find_wants(simd);
         self.write_flat(simd, out);
         for left in (0..self.frame.width()).step_by(SPAN as usize) {
-            self.sample_centers(simd, left, out, watch);
-            self.sample_all(simd, left, out, watch);
+            self.sample_centers(simd, left, out, watch)?;
+            self.sample_all(simd, left, out, watch)?;
         }
+        Ok(())
     }
 
     /// Rows of the band, counted from its first, whose contrast matters: those that are asked for, and those beside them.
@@ -108,10 +112,10 @@ impl<'a> Band<'a> {
     }
 
     #[inline(always)]
-    fn trace_corners<S: Simd, W: Watch>(&mut self, simd: S, watch: &mut W) {
+    fn trace_corners<S: Simd, W: Watch>(&mut self, simd: S, watch: &mut W) -> Result<(), Cancelled> {
         let rows = self.rows_around();
         let Self { frame, top, scratch, corners, counts, .. } = self;
-        corners.trace(simd, frame, *top, &rows, scratch, counts, watch);
+        corners.trace(simd, frame, *top, &rows, scratch, counts, watch)
     }
 
     #[inline(always)]
@@ -131,11 +135,12 @@ impl<'a> Band<'a> {
     /// Means of corners, in all pixels.
     #[inline(always)]
     fn write_flat<S: Simd>(&self, simd: S, out: &mut [u8]) {
+        let dither = Dither::of(self.frame, &self.rows);
         for y in self.rows.clone() {
             for x in (0..self.frame.width()).step_by(LANES) {
                 let Vec3x16(sums) = self.corners.sums(simd, x as usize, (y - self.top) as usize);
                 let place = Place::of(self.frame, &self.rows, x, y);
-                write_flat(simd, Vec3x16(sums), (self.frame.width() - x) as usize, place, out);
+                write_flat(simd, Vec3x16(sums), (self.frame.width() - x) as usize, place, dither, out);
             }
         }
     }
@@ -158,16 +163,22 @@ impl<'a> Band<'a> {
 
     /// A sample at the centres of pixels that want one. Where that shows a contrast, they want all.
     #[inline(always)]
-    fn sample_centers<S: Simd, W: Watch>(&mut self, simd: S, left: u32, out: &mut [u8], watch: &mut W) {
+    fn sample_centers<S: Simd, W: Watch>(
+        &mut self,
+        simd: S,
+        left: u32,
+        out: &mut [u8],
+        watch: &mut W,
+    ) -> Result<(), Cancelled> {
         self.collect(left, |wants| wants.one);
         let center = [left + SPAN / 2, self.top + BAND / 2];
         let pattern = Pattern::center();
         let limit = limit(self.frame.rays.grid());
-        let mut means = Means::of(4.0 + CENTER_WEIGHT);
+        let mut means = Means::of(4.0 + CENTER_WEIGHT, self.frame, &self.rows);
         let pixels = std::mem::take(&mut self.pixels);
         for some in pixels.chunks(pattern.per_tile()) {
             let Self { frame, scratch, gathered, counts, .. } = self;
-            let colors = gathered.trace(simd, frame, &pattern, center, some, scratch, counts, watch);
+            let colors = gathered.trace(simd, frame, &pattern, center, some, scratch, counts, watch)?;
             watch.enter(Stage::Encoding);
             let mut encoded = [Lanes::ZERO; 3];
             for (pixel, &[x, y]) in some.iter().enumerate() {
@@ -190,24 +201,32 @@ impl<'a> Band<'a> {
         }
         means.finish(simd, out);
         self.pixels = pixels;
+        Ok(())
     }
 
     /// All samples of the pixels that want them: what regular sampling gives.
     #[inline(always)]
-    fn sample_all<S: Simd, W: Watch>(&mut self, simd: S, left: u32, out: &mut [u8], watch: &mut W) {
+    fn sample_all<S: Simd, W: Watch>(
+        &mut self,
+        simd: S,
+        left: u32,
+        out: &mut [u8],
+        watch: &mut W,
+    ) -> Result<(), Cancelled> {
         self.collect(left, |wants| wants.all);
         let center = [left + SPAN / 2, self.top + BAND / 2];
         let pattern = Pattern::full(self.frame.rays.grid());
-        let mut means = Means::of(pattern.len() as f32);
+        let mut means = Means::of(pattern.len() as f32, self.frame, &self.rows);
         let Self { frame, rows, scratch, gathered, pixels, counts, .. } = self;
         for some in pixels.chunks(pattern.per_tile()) {
-            let colors = gathered.trace(simd, frame, &pattern, center, some, scratch, counts, watch);
+            let colors = gathered.trace(simd, frame, &pattern, center, some, scratch, counts, watch)?;
             watch.enter(Stage::Encoding);
             for (pixel, &[x, y]) in some.iter().enumerate() {
                 means.push(simd, pattern.sum(colors, pixel), Place::of(frame, rows, x, y), out);
             }
         }
         means.finish(simd, out);
+        Ok(())
     }
 }
 

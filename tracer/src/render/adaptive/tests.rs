@@ -24,9 +24,9 @@ fn frame(scene: &Arc<CompiledScene>, samples: u32, adaptive: bool) -> PreparedFr
 
 /// The bytes of a band, and which of its pixels got all their samples.
 fn band(frame: &PreparedFrame, rows: Range<u32>) -> (Vec<u8>, Vec<bool>) {
-    let mut band = Band::new(frame, rows.clone());
+    let mut band = Band::new(frame, rows.clone(), &|| false);
     let mut bytes = vec![0; rows.len() * WIDTH as usize * 3];
-    dispatch!(simd::best(), simd => band.render(simd, &mut bytes, &mut ()));
+    dispatch!(simd::best(), simd => band.render(simd, &mut bytes, &mut ())).unwrap();
     let places = rows.clone().flat_map(|y| (0..WIDTH).map(move |x| [x, y]));
     let all = places.map(|place| {
         let (index, bit) = want(frame, &rows, place);
