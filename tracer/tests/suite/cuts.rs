@@ -52,7 +52,8 @@ fn a_frame_cut_into_rows_is_the_same_frame_at_any_width_and_number_of_samples() 
         for (i, width) in WIDTHS.into_iter().enumerate() {
             for grid in [1 + i as u32 % 4, 4 - i as u32 % 4] {
                 let height = 1 + next(&mut state) % 70;
-                let quality = Quality { adaptive: next(&mut state).is_multiple_of(2), ..Quality::default() };
+                let adaptive = next(&mut state).is_multiple_of(2);
+                let quality = Quality { adaptive, dither: i % 2 == 1, ..Quality::default() };
                 let samples = grid * grid;
                 let view = FrameView { width, height, samples, quality, ..FrameView::of(scene.scene()) };
                 let frame = PreparedFrame::new(Arc::clone(&scene), &view).unwrap();

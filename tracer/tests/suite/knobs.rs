@@ -6,7 +6,8 @@ use crate::common::{analytic, instanced, render, render_textured};
 use rayfarm_tracer::image::{RgbImage, compare};
 use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{
-    ColorDepth, ExponentPrecision, Filter, FrameView, LoadedScene, Quality, Scene, Shading, load,
+    Background, Camera, ColorDepth, ExponentPrecision, Filter, FrameView, LoadedScene, Quality, Scene,
+    Shading, load,
 };
 
 const FULL: fn() -> Quality = Quality::default;
@@ -99,5 +100,86 @@ fn reduced_colors_are_the_nearest_of_five_six_and_five_bits() {
         for pixel in reduced.pixels.chunks_exact(3) {
             assert!(pixel[0] >> 5 == pixel[0] & 7 && pixel[1] >> 6 == pixel[1] & 3, "{pixel:?}");
         }
+    }
+}
+
+/// A slow gradient in the dark, and nothing else.
+fn dusk() -> Scene {
+    let mut scene = analytic(320, 240);
+    (scene.spheres, scene.planes, scene.triangles) = (Vec::new(), Vec::new(), Vec::new());
+    let (position, look_at, up) = (glam::DVec3::ZERO, glam::DVec3::NEG_Z, glam::DVec3::Y);
+    scene.camera = Camera { position, look_at, up, fov: 10.0, zoom: 1.0 };
+    let [bottom, top] = [0.0, DUSK].map(glam::Vec3::splat);
+    scene.background = Background::Gradient { bottom, top };
+    scene
+}
+
+/// What a ray straight up would see there.
+const DUSK: f32 = 0.03;
+
+/// What a row of it is, encoded and not rounded: the mean of its pixels.
+fn dusk_row(y: u32) -> f64 {
+    let half = 5.0_f64.to_radians().tan();
+    let pixel = |x: u32| {
+        let along = |index: u32, count: f64| (f64::from(index) + 0.5) / count * 2.0 - 1.0;
+        let (u, v) = (along(x, 320.0) * half * 320.0 / 240.0, -along(y, 240.0) * half);
+        let rise = v / (u * u + v * v + 1.0).sqrt();
+        let light = f64::from(DUSK) * (rise + 1.0) / 2.0;
+        (1.055 * light.powf(1.0 / 2.4) - 0.055) * 255.0
+    };
+    (0..320).map(pixel).sum::<f64>() / 320.0
+}
+
+/// Rows of 8 x 8 pixels each as the means of their bytes.
+fn means(picture: &RgbImage) -> Vec<f64> {
+    let rows = picture.pixels.chunks_exact(8 * 3 * picture.width as usize);
+    rows.map(|row| row.iter().map(|&byte| f64::from(byte)).sum::<f64>() / row.len() as f64).collect()
+}
+
+#[test]
+fn a_gradient_in_the_dark_has_bands_and_none_when_it_is_dithered() {
+    let scene = dusk();
+    for (samples, adaptive) in [(1, false), (4, false), (4, true), (16, true)] {
+        let picture = |dither| {
+            let quality = Quality { dither, adaptive, ..FULL() };
+            render(&scene, &[], &FrameView { samples, ..at(&scene, quality) }).0
+        };
+        let (plain, dithered) = (picture(false), picture(true));
+        assert_eq!(off_by_more(1, &plain, &dithered), 0, "no pixel is off by more than a step");
+        let even = |means: &[f64]| means.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        assert!(even(&means(&plain)) > 8, "bands many pixels high: {:?}", means(&plain));
+        let smooth = means(&dithered);
+        assert_eq!(even(&smooth), 0, "{smooth:?}");
+        // What the eye sees is the light itself.
+        for (row, mean) in smooth.iter().enumerate() {
+            let exact = (0..8).map(|y| dusk_row(row as u32 * 8 + y)).sum::<f64>() / 8.0;
+            assert!((mean - exact).abs() < 0.1, "row {row}: {mean}, and the light {exact}");
+        }
+        let grey = dithered.pixels.chunks_exact(3).all(|pixel| pixel[0] == pixel[1] && pixel[1] == pixel[2]);
+        assert!(grey, "grey stays grey");
+    }
+}
+
+#[test]
+fn a_flat_colour_that_is_a_byte_stays_it_when_it_is_dithered() {
+    let mut scene = dusk();
+    let color = [3_u8, 130, 251];
+    let linear = color.map(|code| rayfarm_tracer::srgb::decode(code) as f32);
+    scene.background = Background::Color(linear.into());
+    let (picture, _) = render(&scene, &[], &at(&scene, Quality { dither: true, ..FULL() }));
+    assert!(picture.pixels.chunks_exact(3).all(|pixel| *pixel == color));
+}
+
+#[test]
+fn fewer_colours_are_dithered_too() {
+    let scene = dusk();
+    let quality = Quality { dither: true, colors: ColorDepth::Reduced, ..FULL() };
+    let (picture, _) = render(&scene, &[], &at(&scene, quality));
+    for pixel in picture.pixels.chunks_exact(3) {
+        assert!(pixel[0] >> 5 == pixel[0] & 7 && pixel[1] >> 6 == pixel[1] & 3, "{pixel:?}");
+    }
+    let (full, _) = render(&scene, &[], &at(&scene, Quality { dither: true, ..FULL() }));
+    for (fewer, all) in means(&picture).into_iter().zip(means(&full)) {
+        assert!((fewer - all).abs() < 0.8, "{fewer} for {all}");
     }
 }

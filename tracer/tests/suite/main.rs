@@ -4,6 +4,7 @@
 
 mod adaptive;
 mod build_quality;
+mod coincident;
 mod common;
 mod cuts;
 mod extremes;
@@ -15,5 +16,6 @@ mod oracle;
 mod physics;
 mod project_scenes;
 mod shadows;
+mod surfaces;
 mod textures;
 mod workloads;

@@ -8,7 +8,8 @@ use rayfarm_tracer::scene::load;
 /// Under all checks nothing is wrong.
 fn check(name: &str) -> Vec<Outcome> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(name);
-    let effort = Effort { rays: 70_000, side: 96, oracle_work: 1_000_000, pixels: None };
+    // As many rays as `check-numerics` shoots by itself.
+    let effort = Effort { side: 96, oracle_work: 1_000_000, pixels: None, ..Effort::default() };
     let outcomes = run(&Subject::new(name, load(&path).unwrap()), &effort).unwrap();
     let broken: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.holds()).collect();
     assert!(broken.is_empty(), "{name}: {broken:#?}");

@@ -1,6 +1,7 @@
 //! What is known without a tracer: radiances by hand, and pictures that must not change.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use crate::common::{analytic, ball, empty, instanced, light, point, render};
 use glam::{DVec3, Vec3};
@@ -8,10 +9,10 @@ use proptest::prelude::*;
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{
-    Attenuation, Background, FrameView, LightKind, Material, Model, NormalMode, Plane, Scene, Sphere,
-    Triangle,
+    Attenuation, Background, FrameView, LightKind, Material, Model, NormalMode, Plane, Quality, Scene,
+    Sphere, Triangle,
 };
-use rayfarm_tracer::{Cancelled, CompiledScene, PreparedFrame, render_rows, srgb};
+use rayfarm_tracer::{Cancelled, CompileError, CompiledScene, IsCancelled, PreparedFrame, render_rows, srgb};
 
 /// One pixel in the middle of the picture.
 fn middle(scene: &Scene) -> [u8; 3] {
@@ -37,7 +38,7 @@ fn lit_sphere(material: Material) -> Scene {
 #[test]
 fn a_ball_lit_from_the_eye_shows_its_albedo_and_its_highlight() {
     let material =
-        Material { diffuse: Vec3::splat(0.25), specular: Vec3::ZERO, exponent: 1.0, texture: None };
+        Material { diffuse: Vec3::splat(0.25), specular: Vec3::ZERO, exponent: 1.0, ..Material::NEUTRAL };
     assert_eq!(middle(&lit_sphere(material)), [code(0.25); 3]);
     assert_eq!(middle(&lit_sphere(Material { specular: Vec3::splat(0.5), ..material })), [code(0.75); 3]);
 }
@@ -48,7 +49,7 @@ fn inverse_square_divides_by_the_distance_to_the_surface() {
         diffuse: Vec3::splat(0.9),
         specular: Vec3::ZERO,
         exponent: 1.0,
-        texture: None,
+        ..Material::NEUTRAL
     });
     scene.lights[0].attenuation = Attenuation::InverseSquare;
     assert_eq!(middle(&scene), [code(0.1); 3]);
@@ -60,7 +61,7 @@ fn ambient_counts_once_whatever_the_number_of_lights() {
         diffuse: Vec3::splat(0.5),
         specular: Vec3::ZERO,
         exponent: 1.0,
-        texture: None,
+        ..Material::NEUTRAL
     });
     scene.ambient = Vec3::splat(0.4);
     scene.lights = vec![light(point(0.0, 0.0, -9.0), 1.0, Attenuation::None); 7];
@@ -70,7 +71,7 @@ fn ambient_counts_once_whatever_the_number_of_lights() {
 #[test]
 fn a_slanted_plane_follows_the_cosine() {
     let mut scene =
-        lit_sphere(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0, texture: None });
+        lit_sphere(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0, ..Material::NEUTRAL });
     scene.spheres.clear();
     scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, material: 0 }];
     let direction = DVec3::new(0.0, -libm::sqrt(0.75), -0.5);
@@ -84,7 +85,7 @@ fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
         diffuse: Vec3::splat(0.5),
         specular: Vec3::ZERO,
         exponent: 1.0,
-        texture: None,
+        ..Material::NEUTRAL
     });
     scene.lights[0].kind = point(0.0, 6.0, 6.0);
     let lit = middle(&scene);
@@ -101,7 +102,7 @@ fn what_stands_behind_a_light_takes_nothing_away() {
         diffuse: Vec3::splat(0.5),
         specular: Vec3::ZERO,
         exponent: 1.0,
-        texture: None,
+        ..Material::NEUTRAL
     });
     let lit = middle(&scene);
     scene.spheres.push(Sphere { center: DVec3::new(0.0, 0.0, 9.0), radius: 1.0, material: 0 });
@@ -269,6 +270,66 @@ fn rendering_stops_when_it_is_told_to() {
     let mut out = vec![0; 16 * 64 * 3];
     assert_eq!(render_rows(&frame, 0..64, &mut out, &after_three), Err(Cancelled));
     assert_eq!(asked.get(), 4);
+}
+
+/// A frame of one band: what is asked between tiles stops it there, however it is sampled.
+#[test]
+fn rendering_stops_between_the_tiles_of_a_band() {
+    let scene = analytic(128, 16);
+    let compiled = Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap());
+    let quality = Quality { adaptive: true, ..FrameView::of(&scene).quality };
+    let regular = FrameView::of(&scene);
+    let adaptive = FrameView { samples: 4, quality, ..regular };
+    for (view, tiles) in [(regular, 8), (adaptive, 9)] {
+        let frame = PreparedFrame::new(Arc::clone(&compiled), &view).unwrap();
+        let mut out = vec![0; 16 * 128 * 3];
+        let asked = std::cell::Cell::new(0);
+        let stop_at = |question: usize, out: &mut [u8]| {
+            asked.set(0);
+            let cancelled = || asked.replace(asked.get() + 1) == question;
+            let stopped = render_rows(&frame, 0..16, out, &cancelled);
+            (stopped.err(), asked.get())
+        };
+        let (whole, questions) = stop_at(usize::MAX, &mut out);
+        assert!(whole.is_none() && questions >= tiles, "{questions} questions for {tiles} tiles");
+        for question in 0..questions {
+            assert_eq!(stop_at(question, &mut vec![0; out.len()]), (Some(Cancelled), question + 1));
+        }
+        // Cancelling leaves nothing behind: the frame is the same afterwards.
+        let mut again = vec![0; out.len()];
+        render_rows(&frame, 0..16, &mut again, &|| false).unwrap();
+        assert_eq!(again, out);
+    }
+}
+
+#[test]
+fn a_scene_that_is_not_wanted_any_more_stops_wherever_its_compilation_is() {
+    let mut scene = analytic(16, 16);
+    let material = scene.spheres[0].material;
+    let sphere =
+        |i: u32| Sphere { center: DVec3::new(f64::from(i), f64::from(i % 7), 0.0), radius: 0.4, material };
+    scene.spheres = (0..3_000).map(sphere).collect();
+    let asked = AtomicUsize::new(0);
+    let compile = |question: usize| {
+        asked.store(0, Relaxed);
+        CompiledScene::new_unless(scene.clone(), [], [], &|| asked.fetch_add(1, Relaxed) == question)
+    };
+    let whole = Arc::new(compile(usize::MAX).unwrap());
+    let questions = asked.load(Relaxed);
+    // Rounds of clustering, passes of reinsertion, and the steps around them.
+    assert!(questions > 40, "{questions} questions");
+    for question in 0..questions {
+        assert!(matches!(compile(question), Err(CompileError::Cancelled(_))), "question {question}");
+        assert_eq!(asked.load(Relaxed), question + 1, "work goes on");
+    }
+    let view = FrameView::of(&scene);
+    let frame = |cancelled: &IsCancelled<'_>| PreparedFrame::new_unless(Arc::clone(&whole), &view, cancelled);
+    assert!(frame(&|| false).is_ok());
+    for question in 0..3 {
+        asked.store(0, Relaxed);
+        let stopped = frame(&|| asked.fetch_add(1, Relaxed) == question);
+        assert!(matches!(stopped, Err(CompileError::Cancelled(_))), "question {question}");
+    }
 }
 
 proptest! {

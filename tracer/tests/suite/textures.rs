@@ -41,7 +41,7 @@ fn square(uvs: [[f64; 2]; 4], texture: &Texture, filter: Filter) -> Scene {
     scene.camera.position = DVec3::new(0.5, 0.5, 1.0);
     scene.camera.look_at = DVec3::new(0.5, 0.5, 0.0);
     scene.camera.fov = 2.0 * libm::atan(0.5).to_degrees();
-    scene.textures = vec![TextureMap { texture: texture.id(), filter }];
+    scene.textures = vec![TextureMap::new(texture.id(), filter)];
     scene.materials[0] = Material { diffuse: Vec3::ONE, texture: Some(0), ..scene.materials[1] };
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| DVec3::new(x, y, 0.0));
     let triangle = |[a, b, c]: [usize; 3]| Triangle {
@@ -188,7 +188,7 @@ fn textured_instances_are_the_oracles() {
     let (mesh, texture) = (globe(), noise(64, 32));
     for filter in [Filter::Nearest, Filter::Bilinear] {
         let mut scene = empty(120, 90);
-        scene.textures = vec![TextureMap { texture: texture.id(), filter }];
+        scene.textures = vec![TextureMap::new(texture.id(), filter)];
         scene.materials[0].texture = Some(0);
         let model = |x: f64, scale: [f64; 3], normals, materials| Model {
             mesh: mesh.id(),
@@ -253,7 +253,7 @@ fn odd_coordinates_from_elsewhere_are_refused() {
     let texture = four();
     let mut scene = square(WHOLE, &texture, Filter::Nearest);
     scene.validate().unwrap();
-    for odd in [f32::NAN, -1.0, 1e9] {
+    for odd in [f32::NAN, -1e9, 1e9] {
         scene.triangles[0].uvs = Some([Vec2::ZERO, Vec2::splat(odd), Vec2::ONE]);
         assert!(scene.validate().unwrap_err().to_string().starts_with("triangles[0].uvs must be"));
     }

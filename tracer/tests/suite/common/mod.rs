@@ -13,7 +13,8 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts, render_rows};
 
 /// Nothing but a background, a camera at z = 4 that looks at the origin, and three materials.
 pub(crate) fn empty(width: u32, height: u32) -> Scene {
-    let material = |diffuse, specular, exponent| Material { diffuse, specular, exponent, texture: None };
+    let material =
+        |diffuse, specular, exponent| Material { diffuse, specular, exponent, ..Material::NEUTRAL };
     Scene {
         ambient: Vec3::splat(0.06),
         render: RenderSettings { width, height, ..RenderSettings::default() },
@@ -120,7 +121,7 @@ pub(crate) fn ball(rings: u32, sectors: u32) -> Mesh {
 
 fn mesh_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = (0..triangles.len()).map(|i| (i / 40 % 2) as u16).collect();
-    let slot = |name: &str| NamedMaterial { name: name.into(), material: Material::NEUTRAL, texture: None };
+    let slot = |name: &str| NamedMaterial::plain(name, Material::NEUTRAL);
     let materials = vec![slot("a"), slot("b")];
     Mesh { positions, triangles, triangle_materials, materials, ..Mesh::default() }
 }
