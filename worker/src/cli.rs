@@ -6,11 +6,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, ValueEnum};
+use rayfarm_protocol::address;
 use tracing_subscriber::EnvFilter;
 
 use crate::client::{DiskCacheOptions, Share, WorkerOptions, run};
 use crate::disk_cache::user_folder;
 use crate::ending::Ending;
+
+/// Names a worker whose command line does not: unlike a command line, other users of the machine cannot read it.
+pub const NAME_VARIABLE: &str = "RAYFARM_WORKER_NAME";
 
 /// A render node of rayfarm: traces segments for a master, with all its cores.
 #[derive(Debug, Parser)]
@@ -31,7 +35,7 @@ pub struct WorkerArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 
-    /// What the master calls this worker [default: the name of this machine]
+    /// What the master calls this worker [default: RAYFARM_WORKER_NAME of the environment, or the name of this machine]
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
 
@@ -65,7 +69,11 @@ pub struct WorkerArgs {
     #[arg(long)]
     pub exit_with_stdin: bool,
 
-    /// End with an error when the connection fails, instead of trying again
+    /// End with the master, instead of waiting for the next one that listens at its address
+    #[arg(long)]
+    pub once: bool,
+
+    /// End with an error when the connection fails, instead of trying again; and with the master
     #[arg(long)]
     pub no_reconnect: bool,
 
@@ -94,8 +102,13 @@ impl WorkerArgs {
         WorkerOptions {
             master: self.master.clone(),
             threads: self.threads.map(usize::from),
-            name: self.name.clone().unwrap_or_else(machine_name),
+            name: self
+                .name
+                .clone()
+                .or_else(|| std::env::var(NAME_VARIABLE).ok())
+                .unwrap_or_else(machine_name),
             reconnect: !self.no_reconnect,
+            once: self.once,
             asset_cache_bytes: self.asset_cache << 20,
             disk_cache: self.disk_cache(),
             share: self.share.unwrap_or_default(),
@@ -231,7 +244,7 @@ fn stop_with_stdin(ending: Ending) {
 
 /// Checks the form; whether the host is known shows when connecting.
 fn host_and_port(text: &str) -> Result<String, String> {
-    let form = "expected HOST:PORT, as in farm.local:7117 or [::1]:7117";
+    let form = "expected HOST:PORT, as in farm.local:7117, [::1]:7117 or [fe80::1%eth0]:7117";
     let (host, port) = text.rsplit_once(':').ok_or(form)?;
     let bare_v6 = host.contains(':') && !(host.starts_with('[') && host.ends_with(']'));
     if host.is_empty() || bare_v6 {
@@ -244,10 +257,12 @@ fn host_and_port(text: &str) -> Result<String, String> {
 }
 
 fn share(text: &str) -> Result<Share, String> {
-    match (text, text.parse()) {
-        ("off", _) => Ok(Share::Off),
-        (_, Ok(address)) => Ok(Share::At(address)),
-        _ => Err("expected off, or ADDR:PORT as in 192.168.1.20:7200".to_owned()),
+    if text == "off" {
+        return Ok(Share::Off);
+    }
+    match address::parse(text)? {
+        Some(address) => Ok(Share::At(address)),
+        None => Err("expected off, or ADDR:PORT as in 192.168.1.20:7200 or [fe80::1%eth0]:7200".to_owned()),
     }
 }
 

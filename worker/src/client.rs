@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::{Hello, Welcome, handshake, tcp};
+use rayfarm_protocol::{Hello, Welcome, address, handshake, tcp};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
 
+use crate::build_pool::BuildPool;
 use crate::disk_cache::DiskCache;
 use crate::disk_writer::DiskWriter;
 use crate::duty::{End, Keep, Sharing, Terms, serve};
@@ -22,6 +23,7 @@ use crate::scene_loader::SceneLoader;
 use crate::share::share;
 use crate::shelf::Shelf;
 use crate::tracer::TracerRenderer;
+use crate::waiting::{Absence, Waiting};
 
 /// How long a host may take to accept a connection.
 const CONNECT_LIMIT: Duration = Duration::from_secs(10);
@@ -40,6 +42,8 @@ pub struct WorkerOptions {
     pub name: String,
     /// Whether to connect again, with growing pauses, when the connection fails.
     pub reconnect: bool,
+    /// Whether to end with the first master that ends in order, instead of waiting for the next one.
+    pub once: bool,
     /// Bytes of scenes and meshes that are kept.
     pub asset_cache_bytes: u64,
     /// Where assets outlive the worker, if anywhere.
@@ -73,7 +77,7 @@ pub struct DiskCacheOptions {
     pub within_machine: bool,
 }
 
-/// Renders for a master until it says goodbye or the worker is told to end; both are `Ok`.
+/// Renders for one master after the other until one sends the worker away or the worker is told to end; both are `Ok`.
 ///
 /// Must run in a tokio runtime with I/O and time. Render threads end by themselves soon after this has returned.
 ///
@@ -104,7 +108,9 @@ pub async fn run_with<R: Renderer>(
         software: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let disk = options.disk_cache.as_ref().and_then(open_disk);
-    let mut keep = Keep { renderer, pool, loader: SceneLoader::new(options.asset_cache_bytes), disk };
+    let builders = BuildPool::new(threads).map_err(|source| WorkerError::Threads { threads, source })?;
+    let loader = SceneLoader::new(options.asset_cache_bytes);
+    let mut keep = Keep { renderer, pool, builders, loader, disk };
     let result = attend(&options, &hello, &mut keep, &ending).await;
     if let Some(disk) = keep.disk {
         disk.finish().await;
@@ -130,15 +136,16 @@ async fn attend<R: Renderer>(
     keep: &mut Keep<R>,
     ending: &Ending,
 ) -> Result<(), WorkerError> {
-    let mut pauses = Pauses::new();
+    let (mut pauses, mut waiting) = (Pauses::new(), Waiting::default());
     loop {
         let connected = tokio::select! {
             biased;
             () = ending.draining() => return Ok(()),
             connected = connect(&options.master, hello) => connected,
         };
-        let error = match connected {
+        let absence = match connected {
             Ok(stream) => {
+                waiting.over();
                 let begun = Instant::now();
                 // Ended with the session.
                 let mut sharers = JoinSet::new();
@@ -149,28 +156,33 @@ async fn attend<R: Renderer>(
                     pauses.reset();
                 }
                 match end {
-                    End::Lost(why) => WorkerError::Lost { master: options.master.clone(), why },
+                    End::Lost(why) => {
+                        Absence::Failed(WorkerError::Lost { master: options.master.clone(), why })
+                    }
+                    End::MasterEnded(reason) if options.reconnect && !options.once => {
+                        pauses.reset();
+                        Absence::Ended(reason)
+                    }
                     end => {
                         report(&end);
                         return Ok(());
                     }
                 }
             }
-            Err(error) => error,
+            Err(error) => Absence::Failed(error),
         };
-        if ending.is_draining() {
-            tracing::info!("{error}; leaving all the same");
-            return Ok(());
+        match absence {
+            Absence::Failed(error) if ending.is_draining() => {
+                tracing::info!("{error}; leaving all the same");
+                return Ok(());
+            }
+            Absence::Failed(error) if !options.reconnect || !error.is_passing() => return Err(error),
+            absence => waiting.log(&options.master, &absence),
         }
-        if !options.reconnect || !error.is_passing() {
-            return Err(error);
-        }
-        let pause = pauses.next();
-        tracing::warn!("{error}; trying again in {} s", pause.as_secs());
         tokio::select! {
             biased;
             () = ending.draining() => return Ok(()),
-            () = tokio::time::sleep(pause) => {}
+            () = tokio::time::sleep(pauses.next()) => {}
         }
     }
 }
@@ -181,7 +193,11 @@ async fn terms(options: &WorkerOptions, stream: &TcpStream, sharers: &mut JoinSe
     let uses_disk = options.disk_cache.as_ref().is_some_and(|disk| disk.within_machine || !within_machine);
     let ours = stream.local_addr().ok().filter(|_| !within_machine);
     let at = match options.share {
-        Share::Auto => ours.map(|ours| SocketAddr::new(ours.ip(), 0)),
+        // With the scope of a link-local address, without which nothing can be bound to it.
+        Share::Auto => ours.map(|mut ours| {
+            ours.set_port(0);
+            ours
+        }),
         Share::At(address) => Some(address),
         Share::Off => None,
     };
@@ -210,7 +226,9 @@ async fn begin_to_share(at: SocketAddr, sharers: &mut JoinSet<()>) -> Option<Sha
 
 fn report(end: &End) {
     match end {
-        End::Goodbye(reason) => tracing::info!("the master says goodbye: {reason}"),
+        End::Goodbye(reason) | End::MasterEnded(reason) => {
+            tracing::info!("the master says goodbye: {reason}");
+        }
         End::Drained => tracing::info!("all segments are done, and the master has no more"),
         End::Stopped => tracing::info!("stopped"),
         End::Lost(_) => {}
@@ -220,7 +238,7 @@ fn report(end: &End) {
 async fn connect(master: &str, hello: &Hello) -> Result<TcpStream, WorkerError> {
     let resolve_error = |source| WorkerError::Resolve { master: master.to_owned(), source };
     let connect_error = |source| WorkerError::Connect { master: master.to_owned(), source };
-    let addresses: Vec<_> = tokio::net::lookup_host(master).await.map_err(resolve_error)?.collect();
+    let addresses = address::resolve(master).await.map_err(resolve_error)?;
     let connecting = tokio::time::timeout(CONNECT_LIMIT, TcpStream::connect(addresses.as_slice()));
     let mut stream = match connecting.await {
         Ok(result) => result.map_err(connect_error)?,

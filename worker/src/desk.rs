@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use rayfarm_protocol::passing::ShareKey;
-use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, Reconnect, ToMaster, ToWorker};
 
 use crate::fetch::{FromPeer, Peer};
 use crate::frames::{Frames, Verdict};
@@ -14,6 +14,7 @@ use crate::growing::Growing;
 use crate::render_pool::ReadyFrame;
 use crate::renderer::Renderer;
 use crate::scene_loader::{SceneDone, SceneLoader, SceneWork, Step, Wish};
+use crate::wanted::Wanted;
 
 /// Something to be done by whoever owns the connection and the threads.
 pub(crate) enum Effect<R: Renderer> {
@@ -38,13 +39,13 @@ pub(crate) enum Effect<R: Renderer> {
     /// Leave when everything that was leased is done.
     Drain,
     /// The master has said goodbye.
-    End { reason: String, again: bool },
+    End { reason: String, reconnect: Reconnect },
 }
 
 /// Work that takes its time.
 pub(crate) enum Work<R: Renderer> {
     Scene(SceneWork<R>),
-    Prepare { announce: FrameAnnounce, scene: Arc<R::Scene> },
+    Prepare { announce: FrameAnnounce, scene: Arc<R::Scene>, wanted: Wanted },
 }
 
 /// What became of it.
@@ -95,7 +96,9 @@ impl<'a, R: Renderer> Desk<'a, R> {
             ToWorker::ShareKey { key } => self.effects.push_back(Effect::Key(key)),
             ToWorker::Ping { nonce } => self.effects.push_back(Effect::Say(ToMaster::Pong { nonce })),
             ToWorker::Drain => self.effects.push_back(Effect::Drain),
-            ToWorker::Goodbye { reason, again } => self.effects.push_back(Effect::End { reason, again }),
+            ToWorker::Goodbye { reason, reconnect } => {
+                self.effects.push_back(Effect::End { reason, reconnect });
+            }
         }
         self.take_steps();
     }
@@ -163,8 +166,9 @@ impl<'a, R: Renderer> Desk<'a, R> {
                 Step::Work(work) => self.effects.push_back(Effect::Work(Work::Scene(work))),
                 Step::Ready(id, scene) => {
                     let frames = self.frames.scene_ready(id).into_iter();
-                    let prepare = |announce| Work::Prepare { announce, scene: Arc::clone(&scene) };
-                    self.effects.extend(frames.map(|announce| Effect::Work(prepare(announce))));
+                    let prepare =
+                        |(announce, wanted)| Work::Prepare { announce, scene: Arc::clone(&scene), wanted };
+                    self.effects.extend(frames.map(|frame| Effect::Work(prepare(frame))));
                 }
                 Step::Failed(id, reason) => {
                     for frame in self.frames.scene_failed(id) {

@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use rayfarm_protocol::AssetId;
+use rayfarm_tracer::files::open_regular;
 
 /// Files that are kept, however small they are.
 const MAX_FILES: usize = 4096;
@@ -54,7 +55,7 @@ impl DiskCache {
     /// is neither is removed, so that the asset is fetched again.
     pub(crate) fn read(&self, id: AssetId, size: u64) -> Option<Vec<u8>> {
         let path = self.path(id);
-        let mut file = File::open(&path).ok()?;
+        let mut file = open_regular(&path).ok()?;
         match read_exactly(&mut file, size) {
             Ok(bytes) if AssetId::of(&bytes) == id => {
                 // Whoever cannot say so loses it a little earlier.
@@ -187,10 +188,13 @@ fn make_folder(folder: &Path) -> io::Result<()> {
     builder.create(folder)
 }
 
-/// A file that must be new, so that nobody else's is written into.
+/// A file that must be new, so that no other file is written into, and that only its owner reads: scenes may be secret.
 fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::options().write(true).create_new(true).open(path)?;
-    file.write_all(bytes)
+    let mut options = File::options();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(path)?.write_all(bytes)
 }
 
 /// All bytes of a file that must have `size` of them; memory for no more is asked for.

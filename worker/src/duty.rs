@@ -5,12 +5,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender, Traffic};
-use rayfarm_protocol::{ToMaster, ToWorker};
+use rayfarm_protocol::{Reconnect, ToMaster, ToWorker};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::build_pool::BuildPool;
 use crate::desk::{Desk, Done, Effect, Work};
 use crate::disk_cache::DiskCache;
 use crate::disk_writer::DiskWriter;
@@ -42,6 +43,7 @@ const FAREWELL: Duration = Duration::from_millis(800);
 pub(crate) struct Keep<R: Renderer> {
     pub(crate) renderer: Arc<R>,
     pub(crate) pool: RenderPool<R>,
+    pub(crate) builders: BuildPool,
     pub(crate) loader: SceneLoader<R>,
     pub(crate) disk: Option<DiskWriter>,
 }
@@ -69,6 +71,8 @@ pub(crate) struct Sharing {
 pub(crate) enum End {
     /// The master said goodbye for good, and why.
     Goodbye(String),
+    /// The master itself ends, and why; another may listen at its address later.
+    MasterEnded(String),
     /// All leases are done and no more will come.
     Drained,
     /// We were told to stop.
@@ -84,12 +88,13 @@ where
     S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
 {
     let (sender, receiver, traffic) = session::spawn(io);
-    let Keep { renderer, pool, loader, disk } = keep;
+    let Keep { renderer, pool, builders, loader, disk } = keep;
     let disk = disk.as_ref().filter(|_| terms.uses_disk);
-    let desk = Desk::new(loader, disk.is_some(), terms.sharing.is_some());
+    let desk = Desk::new(&mut *loader, disk.is_some(), terms.sharing.is_some());
     let duty = Duty {
         renderer,
         pool,
+        builders,
         disk,
         desk,
         sender: sender.clone(),
@@ -106,10 +111,12 @@ where
         end = duty.run(receiver) => end,
     };
     pool.cancel(|_| true);
+    // What is still being compiled is not wanted any more.
+    loader.reset(false, false);
     let farewell = match &end {
         End::Stopped => Some("this worker was told to stop"),
         End::Drained => Some("all its segments are done"),
-        End::Goodbye(_) | End::Lost(_) => None,
+        End::Goodbye(_) | End::MasterEnded(_) | End::Lost(_) => None,
     };
     if let Some(reason) = farewell {
         let goodbye = async {
@@ -127,10 +134,12 @@ where
 struct Duty<'a, R: Renderer> {
     renderer: &'a Arc<R>,
     pool: &'a RenderPool<R>,
+    builders: &'a BuildPool,
     disk: Option<&'a DiskWriter>,
     desk: Desk<'a, R>,
     sender: Sender<ToMaster>,
-    work: JoinSet<Done<R>>,
+    /// `None`: it was not wanted any more.
+    work: JoinSet<Option<Done<R>>>,
     /// Assets that other workers pass on.
     fetches: JoinSet<()>,
     sharing: Option<Sharing>,
@@ -161,8 +170,14 @@ impl<R: Renderer> Duty<'_, R> {
                 match effect {
                     Effect::Drain => draining = true,
                     // What we asked for is no loss.
-                    Effect::End { reason, again: true } if !has_asked_to_drain => {
+                    Effect::End { reason, reconnect: Reconnect::Now } if !has_asked_to_drain => {
                         return End::Lost(format!("it ends this session: {reason}"));
+                    }
+                    // One that was drained is meant to leave.
+                    Effect::End { reason, reconnect: Reconnect::NextMaster }
+                        if !has_asked_to_drain && !draining =>
+                    {
+                        return End::MasterEnded(reason);
                     }
                     Effect::End { reason, .. } => return End::Goodbye(reason),
                     Effect::Say(message) => {
@@ -188,7 +203,8 @@ impl<R: Renderer> Duty<'_, R> {
                     None => return End::Lost("the master closed the connection without a goodbye".to_owned()),
                 },
                 Some(done) = self.work.join_next() => match done {
-                    Ok(done) => self.desk.done(done),
+                    Ok(Some(done)) => self.desk.done(done),
+                    Ok(None) => {}
                     // Panics are caught inside, and nobody cancels: the runtime is shutting down.
                     Err(error) => tracing::debug!("work was not finished: {error}"),
                 },
@@ -223,8 +239,13 @@ impl<R: Renderer> Duty<'_, R> {
         match effect {
             Effect::Work(work) => {
                 let renderer = Arc::clone(self.renderer);
+                let builders = self.builders.clone();
                 let disk = self.disk.map(|disk| Arc::clone(disk.cache()));
-                self.work.spawn_blocking(move || do_work(&*renderer, disk.as_deref(), work));
+                if matches!(work, Work::Scene(SceneWork::Compile { .. })) {
+                    self.work.spawn(compile_in_turn(renderer, builders, work));
+                } else {
+                    self.work.spawn_blocking(move || do_work(&*renderer, &builders, disk.as_deref(), work));
+                }
             }
             Effect::Save(id, bytes) => {
                 if let Some(disk) = self.disk {
@@ -281,8 +302,30 @@ async fn send_finished(mut finished: mpsc::Receiver<ToMaster>, sender: Sender<To
     }
 }
 
-fn do_work<R: Renderer>(renderer: &R, disk: Option<&DiskCache>, work: Work<R>) -> Done<R> {
-    match work {
+/// Compiles when it is its turn. The session may end meanwhile: then the work does not begin, or keeps its turn until it
+/// notices.
+async fn compile_in_turn<R: Renderer>(
+    renderer: Arc<R>,
+    builders: BuildPool,
+    work: Work<R>,
+) -> Option<Done<R>> {
+    let turn = builders.turn().await;
+    let compile = move || {
+        let _turn = turn;
+        do_work(&*renderer, &builders, None, work)
+    };
+    // Panics are caught inside: otherwise the runtime is shutting down.
+    tokio::task::spawn_blocking(compile).await.ok().flatten()
+}
+
+/// `None` where the result is not wanted any more.
+fn do_work<R: Renderer>(
+    renderer: &R,
+    builders: &BuildPool,
+    disk: Option<&DiskCache>,
+    work: Work<R>,
+) -> Option<Done<R>> {
+    let done = match work {
         Work::Scene(SceneWork::Find { id }) => {
             Done::Scene(SceneDone::Found { id, size: disk.and_then(|disk| disk.find(id)) })
         }
@@ -290,22 +333,38 @@ fn do_work<R: Renderer>(renderer: &R, disk: Option<&DiskCache>, work: Work<R>) -
             Done::Scene(SceneDone::Read { id, bytes: disk.and_then(|disk| disk.read(id, size)) })
         }
         Work::Scene(SceneWork::DecodeScene { id, body }) => {
-            let result = guarded(|| renderer.decode_scene(&body)).flatten();
+            let result = guarded(|| builders.run(|| renderer.decode_scene(&body))).flatten();
             Done::Scene(SceneDone::SceneDecoded { id, result })
         }
         Work::Scene(SceneWork::DecodePart { id, bytes }) => {
-            let result = guarded(|| renderer.decode_part(&bytes)).flatten();
+            let result = guarded(|| builders.run(|| renderer.decode_part(&bytes))).flatten();
             Done::Scene(SceneDone::PartDecoded { id, result })
         }
-        Work::Scene(SceneWork::Compile { id, draft, parts }) => {
-            let result = guarded(|| renderer.compile(draft, parts)).flatten();
+        Work::Scene(SceneWork::Compile { id, draft, parts, wanted }) => {
+            let cancelled = || wanted.is_dropped();
+            if cancelled() {
+                return None;
+            }
+            let compile = || renderer.compile(draft, parts, &cancelled);
+            let result = guarded(|| builders.run(compile)).flatten();
+            if cancelled() {
+                return None;
+            }
             Done::Scene(SceneDone::Compiled { id, result })
         }
-        Work::Prepare { announce, scene } => {
-            let result = guarded(|| renderer.prepare(scene, &announce)).flatten();
+        Work::Prepare { announce, scene, wanted } => {
+            let cancelled = || wanted.is_dropped();
+            if cancelled() {
+                return None;
+            }
+            let result = guarded(|| renderer.prepare(scene, &announce, &cancelled)).flatten();
+            if cancelled() {
+                return None;
+            }
             let ready =
                 |frame| ReadyFrame { narrow: renderer.is_narrow(&frame), width: announce.width, frame };
             Done::Prepared { frame: announce.frame, result: result.map(ready) }
         }
-    }
+    };
+    Some(done)
 }

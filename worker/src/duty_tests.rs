@@ -1,6 +1,6 @@
 //! Sessions with a master at the other end of a pipe.
 
-use rayfarm_protocol::{FrameId, ToMaster, ToWorker};
+use rayfarm_protocol::{FrameId, Reconnect, ToMaster, ToWorker};
 
 use crate::duty::{End, Terms};
 use crate::ending::Ending;
@@ -233,10 +233,10 @@ async fn leases_that_make_no_sense_are_refused() {
 #[tokio::test]
 async fn a_goodbye_ends_the_worker_unless_it_may_come_back() {
     let master = Master::meet(keep(1, PLENTY).0, &[]);
-    master.say(ToWorker::Goodbye { reason: "closing time".into(), again: false }).await;
+    master.say(ToWorker::Goodbye { reason: "closing time".into(), reconnect: Reconnect::Never }).await;
     assert_eq!(master.worker.await.unwrap().0, End::Goodbye("closing time".into()));
     let master = Master::meet(keep(1, PLENTY).0, &[]);
-    master.say(ToWorker::Goodbye { reason: "you were silent".into(), again: true }).await;
+    master.say(ToWorker::Goodbye { reason: "you were silent".into(), reconnect: Reconnect::Now }).await;
     assert_eq!(master.worker.await.unwrap().0, End::Lost("it ends this session: you were silent".into()));
 }
 
@@ -327,7 +327,7 @@ async fn a_worker_that_is_to_leave_finishes_what_it_holds_and_does_not_come_back
     for rows in [0..8, 8..16] {
         assert_eq!(master.pixels().await, (lease(0, rows.clone()), expected(&body, b"wait", rows).into()));
     }
-    master.say(ToWorker::Goodbye { reason: "all done".into(), again: true }).await;
+    master.say(ToWorker::Goodbye { reason: "all done".into(), reconnect: Reconnect::Now }).await;
     assert_eq!(master.worker.await.unwrap().0, End::Goodbye("all done".into()));
 }
 

@@ -7,6 +7,8 @@ use std::time::Instant;
 
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, pixels};
 
+use crate::wanted::{Claim, Wanted};
+
 /// Frames that are held at a time. A master has two in flight; those that it spoke of longest ago give way. That need
 /// not be the oldest: while one frame takes its time, many of those after it may be replaced by newer ones.
 const MAX_FRAMES: usize = 8;
@@ -31,6 +33,8 @@ struct Held<F> {
     /// How many announcements had come when it was announced last.
     spoken_of: u64,
     state: State<F>,
+    /// On what is prepared for it.
+    claim: Claim,
     /// With the moment of their arrival.
     waiting: Vec<(Lease, Instant)>,
 }
@@ -72,7 +76,8 @@ impl<F> Frames<F> {
             held.spoken_of = spoken_of;
             return (false, None);
         }
-        self.held.insert(frame, Held { announce, spoken_of, state: State::Loading, waiting: Vec::new() });
+        let (state, claim) = (State::Loading, Claim::default());
+        self.held.insert(frame, Held { announce, spoken_of, state, claim, waiting: Vec::new() });
         let too_many = self.held.len() > MAX_FRAMES;
         let longest_ago = self.held.iter().min_by_key(|(_, held)| held.spoken_of).filter(|_| too_many);
         let dropped = longest_ago.map(|(&frame, _)| frame);
@@ -91,12 +96,12 @@ impl<F> Frames<F> {
     }
 
     /// The scene is there: the frames that waited for it are to be prepared.
-    pub(crate) fn scene_ready(&mut self, scene: AssetId) -> Vec<FrameAnnounce> {
+    pub(crate) fn scene_ready(&mut self, scene: AssetId) -> Vec<(FrameAnnounce, Wanted)> {
         let waiting = self.loading(scene);
         waiting
             .map(|held| {
                 held.state = State::Preparing;
-                held.announce.clone()
+                (held.announce.clone(), held.claim.wanted())
             })
             .collect()
     }

@@ -85,7 +85,7 @@ impl<F, A> Job<F, A> {
         Self { lease, frame, answer, arrived, cancelled: AtomicBool::new(false), progress }
     }
 
-    /// Asked between bands of rows; never taken back.
+    /// Asked between tiles; never taken back.
     pub(crate) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
@@ -191,7 +191,7 @@ impl<F, A> JobQueue<F, A> {
         self.jobs.retain(|known| !Arc::ptr_eq(known, job));
     }
 
-    /// Cancels and forgets the jobs whose frame is `stale`. Threads in the middle of a band end at the next row boundary.
+    /// Cancels and forgets the jobs whose frame is `stale`. Threads in the middle of a band end at the next tile.
     pub(crate) fn cancel(&mut self, stale: impl Fn(FrameId) -> bool) {
         self.jobs.retain(|job| {
             let is_stale = stale(job.lease.frame);

@@ -7,13 +7,15 @@
 //! 3. `scene_loader` fetches a scene by hash (`transfer`), keeps it (`asset_store`), and leaves its assets to later runs (`disk_cache`); `frames` holds the leases of a
 //!    frame until it is ready.
 //! 4. What comes in may be passed on: `fetch` gets an asset from another worker, `share` gives what is on the `shelf`.
-//! 5. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads, hands out leases.
+//! 5. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads and the `build_pool`, as long as the
+//!    result is `wanted`, and hands out leases.
 //! 6. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
 //!
 //! What is drawn, and how, is behind [`Renderer`]; the real one is [`TracerRenderer`].
 
 mod asset_store;
 mod buffers;
+mod build_pool;
 pub mod cli;
 mod client;
 mod desk;
@@ -44,6 +46,10 @@ mod silence;
 mod testing;
 mod tracer;
 mod transfer;
+mod waiting;
+mod wanted;
+#[cfg(test)]
+mod wanted_tests;
 
 pub use client::{DiskCacheOptions, Share, WorkerOptions, run, run_with};
 pub use ending::Ending;

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-const FIRST: Duration = Duration::from_secs(1);
-const LONGEST: Duration = Duration::from_secs(10);
+const FIRST: Duration = Duration::from_millis(500);
+const LONGEST: Duration = Duration::from_secs(5);
 
-/// 1 s, doubled each time up to 10 s, until it is reset.
+/// 0.5 s, doubled each time up to 5 s, until it is reset.
 #[derive(Debug)]
 pub(crate) struct Pauses {
     next: Duration,
@@ -33,11 +33,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pauses_grow_to_ten_seconds_and_start_again() {
+    fn pauses_grow_to_five_seconds_and_start_again() {
         let mut pauses = Pauses::new();
-        let seconds: Vec<u64> = (0..7).map(|_| pauses.next().as_secs()).collect();
-        assert_eq!(seconds, [1, 2, 4, 8, 10, 10, 10]);
+        let ms: Vec<u128> = (0..7).map(|_| pauses.next().as_millis()).collect();
+        assert_eq!(ms, [500, 1000, 2000, 4000, 5000, 5000, 5000]);
         pauses.reset();
-        assert_eq!(pauses.next().as_secs(), 1);
+        assert_eq!(pauses.next().as_millis(), 500);
     }
 }

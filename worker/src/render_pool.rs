@@ -78,14 +78,14 @@ impl<R: Renderer> RenderPool<R> {
         self.shared.state().queue.len()
     }
 
-    /// Drops what is queued, and stops at the next row boundary what is running, of every stale frame.
+    /// Drops what is queued, and stops at the next tile what is running, of every stale frame.
     pub(crate) fn cancel(&self, stale: impl Fn(FrameId) -> bool) {
         self.shared.state().queue.cancel(stale);
     }
 }
 
 impl<R: Renderer> Drop for RenderPool<R> {
-    /// The threads end by themselves at the next row boundary; nobody waits for them.
+    /// The threads end by themselves at the next tile; nothing waits for them.
     fn drop(&mut self) {
         let mut state = self.shared.state();
         state.stopping = true;

@@ -23,7 +23,7 @@ pub struct Cancelled;
 /// Bytes in, pixels out. Errors are texts for people: they travel to the master as the reason of a failure.
 ///
 /// Everything but [`render`](Self::render) runs on a blocking thread, never on one that serves the network. A panic
-/// anywhere is caught, and becomes such a reason.
+/// anywhere is caught, and becomes such a reason. What takes its time asks `cancelled` now and then.
 pub trait Renderer: Send + Sync + 'static {
     /// A scene body, decoded, before its parts are there.
     type Draft: Send + 'static;
@@ -55,14 +55,24 @@ pub trait Renderer: Send + Sync + 'static {
     /// Puts a scene and all its parts together.
     ///
     /// # Errors
-    /// When they do not fit.
-    fn compile(&self, draft: Self::Draft, parts: Vec<Arc<Self::Part>>) -> Result<Self::Scene, String>;
+    /// When they do not fit; or when `cancelled` says so, then the text is of no use.
+    fn compile(
+        &self,
+        draft: Self::Draft,
+        parts: Vec<Arc<Self::Part>>,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self::Scene, String>;
 
     /// Prepares a frame: its view is decoded, and must agree with the announced size.
     ///
     /// # Errors
-    /// A view that cannot be rendered.
-    fn prepare(&self, scene: Arc<Self::Scene>, announce: &FrameAnnounce) -> Result<Self::Frame, String>;
+    /// A view that cannot be rendered; or when `cancelled` says so, then the text is of no use.
+    fn prepare(
+        &self,
+        scene: Arc<Self::Scene>,
+        announce: &FrameAnnounce,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Self::Frame, String>;
 
     /// Whether every pixel of this frame has one of the colours that take two bytes on the wire.
     fn is_narrow(&self, frame: &Self::Frame) -> bool;

@@ -11,6 +11,7 @@ use rayfarm_protocol::AssetId;
 
 use crate::asset_store::AssetStore;
 use crate::renderer::Renderer;
+use crate::wanted::Claim;
 
 mod arrivals;
 mod step;
@@ -46,6 +47,8 @@ struct Load<R: Renderer> {
     body_bytes: u64,
     draft: Option<R::Draft>,
     parts: BTreeSet<AssetId>,
+    /// On the compiled scene.
+    claim: Claim,
 }
 
 /// Fetches scenes and keeps them. The store outlives sessions; the rest begins anew with each.
@@ -79,7 +82,7 @@ impl<R: Renderer> SceneLoader<R> {
         }
     }
 
-    /// A new session: nothing is on its way any more, and what failed may succeed.
+    /// A new session, or the end of one: nothing is on its way any more, and what failed may succeed.
     pub(crate) fn reset(&mut self, has_disk: bool, shares: bool) {
         (self.has_disk, self.shares) = (has_disk, shares);
         self.incoming.clear();
@@ -93,7 +96,7 @@ impl<R: Renderer> SceneLoader<R> {
         self.steps.pop_front()
     }
 
-    /// These scenes are in use, and nothing of theirs may be evicted; loads of others are given up.
+    /// These scenes are in use, and nothing of theirs may be evicted; loads of others are dropped, also while they compile.
     pub(crate) fn set_current(&mut self, scenes: BTreeSet<AssetId>) {
         self.loads.retain(|id, _| scenes.contains(id));
         self.current = scenes;
@@ -109,7 +112,12 @@ impl<R: Renderer> SceneLoader<R> {
         } else if let Some(reason) = self.refused.get(&scene) {
             self.steps.push_back(Step::Failed(scene, reason.clone()));
         } else if let Entry::Vacant(entry) = self.loads.entry(scene) {
-            entry.insert(Load { body_bytes: 0, draft: None, parts: BTreeSet::new() });
+            entry.insert(Load {
+                body_bytes: 0,
+                draft: None,
+                parts: BTreeSet::new(),
+                claim: Claim::default(),
+            });
             self.wish(scene);
         }
     }
@@ -217,7 +225,7 @@ impl<R: Renderer> SceneLoader<R> {
     fn scene_decoded(&mut self, id: AssetId, body_bytes: u64, draft: R::Draft, parts: Vec<AssetId>) {
         let Some(load) = self.loads.get_mut(&id) else { return };
         let parts: BTreeSet<AssetId> = parts.into_iter().collect();
-        *load = Load { body_bytes, draft: Some(draft), parts: parts.clone() };
+        (load.body_bytes, load.draft, load.parts) = (body_bytes, Some(draft), parts.clone());
         for part in parts {
             if self.store.get(part).is_none() {
                 self.wish(part);
@@ -242,7 +250,8 @@ impl<R: Renderer> SceneLoader<R> {
         };
         let Some(parts) = load.parts.iter().map(part_of).collect::<Option<Vec<_>>>() else { return };
         if let Some(draft) = load.draft.take() {
-            self.steps.push_back(Step::Work(SceneWork::Compile { id, draft, parts }));
+            let wanted = load.claim.wanted();
+            self.steps.push_back(Step::Work(SceneWork::Compile { id, draft, parts, wanted }));
         }
     }
 

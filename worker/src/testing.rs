@@ -3,15 +3,19 @@
 //! A scene body is `scene`, a free byte, and the names of its meshes; a mesh is `mesh` and anything. The first word of
 //! a view says how the frame behaves.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Condvar, Mutex};
+use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{self, Receiver, Sender};
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
 use tokio::task::JoinHandle;
 
+use crate::build_pool::BuildPool;
 use crate::disk_cache::DiskCache;
 use crate::disk_writer::DiskWriter;
 use crate::duty::{End, Keep, Sharing, Terms, serve};
@@ -42,9 +46,49 @@ impl Gate {
     }
 }
 
+/// The salt of scenes whose compilation does not end before it is cancelled, and then when the gate is open.
+pub(crate) const ENDLESS: u8 = 100;
+
+/// What a fake has been asked to do.
+#[derive(Debug, Default)]
+pub(crate) struct Seen {
+    /// Compilations that have begun.
+    pub(crate) compiled: AtomicUsize,
+    compiling: AtomicUsize,
+    /// Most compilations at a time.
+    pub(crate) most_compiling: AtomicUsize,
+    /// Compilations and preparations that were cancelled on the way.
+    pub(crate) cancelled: AtomicUsize,
+    /// Frames whose preparation has begun.
+    pub(crate) prepared: AtomicUsize,
+    /// Threads of the pools in which scenes were decoded and compiled.
+    pub(crate) threads: Mutex<BTreeSet<usize>>,
+}
+
+impl Seen {
+    fn until_cancelled(&self, cancelled: &(dyn Fn() -> bool + Sync)) {
+        while !cancelled() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.cancelled.fetch_add(1, Relaxed);
+    }
+
+    fn pool(&self) {
+        self.threads.lock().unwrap().insert(rayon::current_num_threads());
+    }
+}
+
+/// Waits until one of the counts of [`Seen`] is reached.
+pub(crate) async fn until(count: &AtomicUsize, reached: usize) {
+    while count.load(Relaxed) < reached {
+        tokio::time::sleep(Duration::from_millis(1)).await;
+    }
+}
+
 #[derive(Default)]
 pub(crate) struct Fake {
     pub(crate) gate: Arc<Gate>,
+    pub(crate) seen: Arc<Seen>,
 }
 
 pub(crate) struct FakeFrame {
@@ -77,22 +121,48 @@ impl Renderer for Fake {
     }
 
     fn decode_scene(&self, body: &[u8]) -> Result<(u8, Vec<AssetId>), String> {
+        self.seen.pool();
         let rest = body.strip_prefix(b"scene").ok_or("this is no scene")?;
         let (salt, meshes) = rest.split_first().ok_or("this scene has no salt")?;
         Ok((*salt, meshes.chunks_exact(32).map(|id| AssetId(id.try_into().unwrap())).collect()))
     }
 
     fn decode_part(&self, bytes: &[u8]) -> Result<(), String> {
+        self.seen.pool();
         assert!(bytes != b"mesh that panics", "this mesh is a trap");
         if bytes.starts_with(b"mesh") { Ok(()) } else { Err("this is no mesh".to_owned()) }
     }
 
-    fn compile(&self, draft: u8, _parts: Vec<Arc<()>>) -> Result<u8, String> {
+    fn compile(
+        &self,
+        draft: u8,
+        _parts: Vec<Arc<()>>,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<u8, String> {
+        self.seen.pool();
+        let compiling = self.seen.compiling.fetch_add(1, Relaxed) + 1;
+        self.seen.most_compiling.fetch_max(compiling, Relaxed);
+        self.seen.compiled.fetch_add(1, Relaxed);
+        if draft == ENDLESS {
+            self.seen.until_cancelled(cancelled);
+            self.gate.wait();
+        }
+        self.seen.compiling.fetch_sub(1, Relaxed);
         Ok(draft)
     }
 
-    fn prepare(&self, scene: Arc<u8>, announce: &FrameAnnounce) -> Result<FakeFrame, String> {
+    fn prepare(
+        &self,
+        scene: Arc<u8>,
+        announce: &FrameAnnounce,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<FakeFrame, String> {
+        self.seen.prepared.fetch_add(1, Relaxed);
         match announce.view.as_ref() {
+            b"endless" => {
+                self.seen.until_cancelled(cancelled);
+                Err("it was cancelled".to_owned())
+            }
             b"unpreparable" => Err("this view cannot be".to_owned()),
             _ => Ok(FakeFrame { view: announce.view.clone(), salt: *scene }),
         }
@@ -129,7 +199,8 @@ pub(crate) fn keep(threads: usize, cache_bytes: u64) -> (Keep<Fake>, Arc<Gate>) 
     let renderer = Arc::new(Fake::default());
     let gate = Arc::clone(&renderer.gate);
     let pool = RenderPool::new(Arc::clone(&renderer), threads).unwrap();
-    (Keep { renderer, pool, loader: SceneLoader::new(cache_bytes), disk: None }, gate)
+    let builders = BuildPool::new(threads).unwrap();
+    (Keep { renderer, pool, builders, loader: SceneLoader::new(cache_bytes), disk: None }, gate)
 }
 
 /// A worker that has just been started, with a disk cache in that folder.
@@ -222,6 +293,12 @@ impl Master {
         for (offset, bytes) in parts {
             self.say(ToWorker::AssetChunk { id, offset, bytes }).await;
         }
+    }
+
+    /// Fulfils the next wish for an asset.
+    pub(crate) async fn send_wished(&mut self) {
+        let (id, offset, _) = self.wish().await;
+        self.send_asset(id, offset).await;
     }
 
     /// The next wish for an asset, which is not fulfilled: which one, from where on, and whether it was let down.

@@ -61,7 +61,12 @@ impl Renderer for TracerRenderer {
         Ok(Part::Mesh(Arc::new(mesh)))
     }
 
-    fn compile(&self, scene: Scene, parts: Vec<Arc<Part>>) -> Result<CompiledScene, String> {
+    fn compile(
+        &self,
+        scene: Scene,
+        parts: Vec<Arc<Part>>,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<CompiledScene, String> {
         let (mut meshes, mut textures) = (Vec::new(), Vec::new());
         for part in parts {
             match part.as_ref() {
@@ -69,11 +74,16 @@ impl Renderer for TracerRenderer {
                 Part::Texture(texture) => textures.push(Arc::clone(texture)),
             }
         }
-        CompiledScene::new(scene, meshes, textures)
+        CompiledScene::new_unless(scene, meshes, textures, cancelled)
             .map_err(|error| format!("the scene does not compile: {error}"))
     }
 
-    fn prepare(&self, scene: Arc<CompiledScene>, announce: &FrameAnnounce) -> Result<PreparedFrame, String> {
+    fn prepare(
+        &self,
+        scene: Arc<CompiledScene>,
+        announce: &FrameAnnounce,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<PreparedFrame, String> {
         let view: FrameView = codec::decode(&announce.view, MAX_VIEW_BYTES)
             .map_err(|error| format!("the frame's view does not decode: {error}"))?;
         let (width, height) = (announce.width, announce.height);
@@ -81,7 +91,8 @@ impl Renderer for TracerRenderer {
             let (w, h) = (view.width, view.height);
             return Err(format!("the frame is announced as {width} x {height}, its view says {w} x {h}"));
         }
-        PreparedFrame::new(scene, &view).map_err(|error| format!("the frame cannot be prepared: {error}"))
+        PreparedFrame::new_unless(scene, &view, cancelled)
+            .map_err(|error| format!("the frame cannot be prepared: {error}"))
     }
 
     fn is_narrow(&self, frame: &PreparedFrame) -> bool {

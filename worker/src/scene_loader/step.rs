@@ -8,6 +8,7 @@ use rayfarm_protocol::AssetId;
 use crate::fetch::Peer;
 use crate::growing::Growing;
 use crate::renderer::Renderer;
+use crate::wanted::Wanted;
 
 /// Something to be done, or known.
 pub(crate) enum Step<R: Renderer> {
@@ -62,6 +63,7 @@ pub(crate) enum SceneWork<R: Renderer> {
         id: AssetId,
         draft: R::Draft,
         parts: Vec<Arc<R::Part>>,
+        wanted: Wanted,
     },
 }
 

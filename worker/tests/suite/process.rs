@@ -1,8 +1,10 @@
 //! The program itself: its exit codes, its messages, how it is ended.
 
 use std::process::{Output, Stdio};
+use std::time::Duration;
 
-use rayfarm_protocol::{ToMaster, ToWorker};
+use rayfarm_protocol::handshake::{self, Refusal};
+use rayfarm_protocol::{Hello, Reconnect, ToMaster, ToWorker};
 use tokio::process::{Child, Command};
 
 use crate::common::{Link, Stage, listen};
@@ -30,6 +32,7 @@ async fn wrong_use_is_status_2_with_what_was_expected() {
         (&["--master", "::1:7117"], "expected HOST:PORT"),
         (&["--master", "farm:7117", "--threads", "0"], "1..=1024"),
         (&["--master", "farm:7117", "--colour"], "--colour"),
+        (&["--master", "farm:7117", "--share", "[fe80::1%nothere0]:1"], "no interface \"nothere0\""),
     ] {
         let output = program(args).output().await.unwrap();
         assert_eq!(output.status.code(), Some(2), "{args:?}");
@@ -48,16 +51,102 @@ async fn nobody_there_is_status_1_with_the_address() {
 }
 
 #[tokio::test]
+async fn the_scope_of_a_master_is_an_interface_of_this_machine() {
+    let output = program(&["--master", "[fe80::1%nothere0]:7117", "--no-reconnect"]).output().await.unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let text = stderr(&output);
+    assert!(text.contains("no interface \"nothere0\"; it has ") && text.contains("lo"), "{text}");
+}
+
+#[tokio::test]
 async fn a_goodbye_is_status_0() {
     let (listener, address) = listen().await;
     let worker = start(&address, &["--name", "cellar"]);
     let mut link = Link::accept(&listener).await;
     assert_eq!(link.hello.name, "cellar");
     link.check_frame(&Stage::new(), 0, 0.0).await;
-    link.out.send(ToWorker::Goodbye { reason: "closing time".into(), again: false }).await.unwrap();
+    link.out
+        .send(ToWorker::Goodbye { reason: "closing time".into(), reconnect: Reconnect::Never })
+        .await
+        .unwrap();
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
     assert!(stderr(&output).contains("closing time"), "{}", stderr(&output));
+}
+
+#[tokio::test]
+async fn a_master_that_ends_is_followed_by_the_next_one() {
+    let (listener, address) = listen().await;
+    let stage = Stage::new();
+    let worker = start(&address, &[]);
+    for (number, goodbye) in
+        [Reconnect::NextMaster, Reconnect::NextMaster, Reconnect::Never].into_iter().enumerate()
+    {
+        let mut link = Link::accept(&listener).await;
+        link.check_frame(&stage, 0, number as f64).await;
+        assert_eq!(link.asked > 0, number == 0, "what it has it keeps");
+        link.out.send(ToWorker::Goodbye { reason: "lights out".into(), reconnect: goodbye }).await.unwrap();
+    }
+    let output = worker.wait_with_output().await.unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(stderr(&output).matches("waiting for the next one").count(), 2, "{}", stderr(&output));
+}
+
+#[tokio::test]
+async fn with_once_it_ends_with_its_master() {
+    let (listener, address) = listen().await;
+    let worker = start(&address, &["--once"]);
+    let mut link = Link::accept(&listener).await;
+    link.check_frame(&Stage::new(), 0, 0.0).await;
+    let goodbye = ToWorker::Goodbye { reason: "lights out".into(), reconnect: Reconnect::NextMaster };
+    link.out.send(goodbye).await.unwrap();
+    let output = worker.wait_with_output().await.unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(stderr(&output).contains("lights out"), "{}", stderr(&output));
+}
+
+#[tokio::test]
+async fn a_master_that_takes_no_worker_now_is_asked_again() {
+    let (listener, address) = listen().await;
+    let worker = start(&address, &[]);
+    let mut stream = listener.accept().await.unwrap().0;
+    let full = |_: &Hello| Err(Refusal::NotNow("full house".into()));
+    handshake::as_master(&mut stream, full).await.unwrap_err();
+    let mut link = Link::accept(&listener).await;
+    link.check_frame(&Stage::new(), 0, 0.0).await;
+    link.out.send(ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }).await.unwrap();
+    let output = worker.wait_with_output().await.unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(stderr(&output).contains("full house"), "{}", stderr(&output));
+}
+
+/// Processor time that a process has used, in hundredths of a second.
+#[cfg(target_os = "linux")]
+fn processor_time(worker: &Child) -> u64 {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", worker.id().unwrap())).unwrap();
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
+    fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn waiting_costs_nothing_is_one_line_and_ends_at_once() {
+    let (listener, address) = listen().await;
+    drop(listener);
+    let worker = start(&address, &[]);
+    // Several attempts fail meanwhile.
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    let before = processor_time(&worker);
+    tokio::time::sleep(Duration::from_secs(6)).await;
+    assert!(processor_time(&worker) - before <= 3, "hundredths of a second in 6 s");
+    let asked = std::time::Instant::now();
+    signal(&worker, "-INT").await;
+    let output = worker.wait_with_output().await.unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(asked.elapsed() < Duration::from_secs(3), "{:?}", asked.elapsed());
+    let text = stderr(&output);
+    assert_eq!(text.matches("cannot connect to the master").count(), 1, "{text}");
+    assert!(text.contains("waiting for it"), "{text}");
 }
 
 #[tokio::test]
@@ -92,7 +181,10 @@ async fn a_signal_drains_it_and_it_ends_with_status_0() {
         assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
         // What the master had granted meanwhile is rendered.
         link.check_frame(&stage, 1, 20.0).await;
-        link.out.send(ToWorker::Goodbye { reason: "all done".into(), again: true }).await.unwrap();
+        link.out
+            .send(ToWorker::Goodbye { reason: "all done".into(), reconnect: Reconnect::Now })
+            .await
+            .unwrap();
         assert_eq!(worker.wait().await.unwrap().code(), Some(0));
     }
 }

@@ -1,6 +1,6 @@
 //! The library against a master on 127.0.0.1.
 
-use rayfarm_protocol::{PROTOCOL_VERSION, ToMaster, ToWorker, handshake};
+use rayfarm_protocol::{PROTOCOL_VERSION, Reconnect, ToMaster, ToWorker, handshake};
 use rayfarm_worker::{Ending, Share, WorkerError, WorkerOptions, run};
 use tokio::io::AsyncWriteExt;
 
@@ -12,6 +12,7 @@ fn options(master: &str) -> WorkerOptions {
         threads: Some(2),
         name: "attic".to_owned(),
         reconnect: false,
+        once: false,
         asset_cache_bytes: 1 << 20,
         compress: None,
         disk_cache: None,
@@ -31,7 +32,7 @@ async fn a_worker_renders_the_same_pixels_as_this_process() {
         link.check_frame(&stage, frame, spin).await;
     }
     assert_eq!(link.asked, 3);
-    link.out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
+    link.out.send(ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never }).await.unwrap();
     worker.await.unwrap().unwrap();
 }
 
@@ -45,7 +46,10 @@ async fn pixels_come_packed_where_that_is_asked_for_and_raw_within_a_machine() {
         let mut link = Link::accept(&listener).await;
         link.check_frame(&stage, 0, 3.0).await;
         assert_eq!(link.packed, packed, "{compress:?}");
-        link.out.send(ToWorker::Goodbye { reason: "done".into(), again: false }).await.unwrap();
+        link.out
+            .send(ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never })
+            .await
+            .unwrap();
         worker.await.unwrap().unwrap();
     }
 }

@@ -62,7 +62,7 @@ impl Stage {
             }],
             spheres: vec![Sphere { center: DVec3::new(1.0, 0.0, 0.0), radius: 0.7, material: 0 }],
             planes: vec![Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 0 }],
-            textures: vec![TextureMap { texture: texture.id(), filter: Filter::Bilinear }],
+            textures: vec![TextureMap::new(texture.id(), Filter::Bilinear)],
             triangles: vec![],
         };
         let view = FrameView::of(&scene);
@@ -106,7 +106,7 @@ fn pyramid() -> CompiledMesh {
         triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
         triangle_materials: vec![0; 4],
         uvs: vec![[Vec2::ZERO, Vec2::new(3.0, 0.5), Vec2::new(0.5, 2.0)]; 4],
-        materials: vec![NamedMaterial { name: "plain".into(), material: Material::NEUTRAL, texture: None }],
+        materials: vec![NamedMaterial::plain("plain", Material::NEUTRAL)],
         ..Mesh::default()
     };
     CompiledMesh::compile(&mesh).unwrap().0
