@@ -141,11 +141,7 @@ mod tests {
             positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
             triangles: vec![[0, 1, 2]],
             triangle_materials: vec![0],
-            materials: vec![NamedMaterial {
-                name: "plain".into(),
-                material: Material::NEUTRAL,
-                texture: None,
-            }],
+            materials: vec![NamedMaterial::plain("plain", Material::NEUTRAL)],
             ..Mesh::default()
         };
         Arc::new(CompiledMesh::compile(&mesh).unwrap().0)
@@ -189,7 +185,7 @@ mod tests {
             Arc::new(Texture::new(&picture).unwrap())
         };
         let (named, other) = (texture(1), texture(2));
-        let maps = vec![TextureMap { texture: named.id(), filter: Filter::Nearest }];
+        let maps = vec![TextureMap::new(named.id(), Filter::Nearest)];
         let scene = Scene { textures: maps, ..test_scene::scene() };
         let assets = Assets::new(&scene, Vec::new(), vec![named.clone(), other.clone()]).unwrap();
         let bytes = assets.get(AssetId(named.id().0)).unwrap();

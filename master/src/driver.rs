@@ -17,9 +17,12 @@ use tokio_util::sync::CancellationToken;
 
 use crate::accounting::{Accounts, TraceSink};
 use crate::assets::Assets;
+use crate::delivered::{Delivered, FrameSet};
 use crate::farm::{FarmError, FarmOptions, FinishedFrame};
 use crate::framebuffer::Framebuffers;
+use crate::identity::Tickets;
 use crate::judge::Case;
+use crate::pace::Pace;
 use crate::roster::{ByteCount, Roster};
 use crate::scheduler::{Event, Scheduler};
 use crate::seals::Seals;
@@ -51,6 +54,8 @@ pub(crate) struct Driver {
     court: mpsc::UnboundedSender<Case>,
     /// What the workers' keys are made of; without it, nothing is passed on.
     secret: Option<[u8; 32]>,
+    /// What local workers introduce themselves with.
+    pub(crate) tickets: Tickets,
 }
 
 struct Inner {
@@ -59,18 +64,29 @@ struct Inner {
     trace: Option<TraceSink>,
     roster: Roster,
     seals: Seals,
+    delivered: Delivered,
     /// What the frames that wait or are in flight show.
     views: BTreeMap<FrameId, Requested>,
     unfetched: VecDeque<Result<FinishedFrame, FarmError>>,
     last_frame: u64,
     last_worker: u64,
+    run: Run,
     /// All traffic up to the frame before.
     counted: ByteCount,
     armed_for: Option<Duration>,
-    /// Whether it was told that the only worker is verified by the master.
-    alone: bool,
     /// Whether goodbye has been said to everybody.
     is_ending: bool,
+}
+
+/// Sums over the run.
+#[derive(Debug, Default)]
+struct Run {
+    /// Frames of all of it, where that is known.
+    frames: Option<u64>,
+    done: u64,
+    /// When the first frame was requested.
+    begun: Option<Duration>,
+    pace: Pace,
 }
 
 /// A frame that was asked for.
@@ -83,26 +99,39 @@ struct Requested {
 
 impl Driver {
     /// `court`: whoever traces rows for the master itself.
-    pub(crate) fn new(options: &FarmOptions, assets: Assets, court: mpsc::UnboundedSender<Case>) -> Self {
+    ///
+    /// # Errors
+    /// Segments are to be verified, and the system gives no random numbers to draw them with.
+    pub(crate) fn new(
+        options: &FarmOptions,
+        assets: Assets,
+        court: mpsc::UnboundedSender<Case>,
+    ) -> Result<Self, FarmError> {
+        let lots = match options.verify_percent {
+            0 => [0; 32],
+            _ => random().map_err(FarmError::Random)?,
+        };
         let scheduler = Scheduler::new(options.policy, MAX_PIXELS_BYTES as u64)
             .with_pipeline(!options.sequential)
-            .with_verification(options.verify_percent);
+            .with_verification(options.verify_percent, lots);
         let inner = Inner {
             scheduler,
             accounts: Accounts::default(),
             trace: None,
             roster: Roster::default(),
             seals: Seals::default(),
+            delivered: Delivered::default(),
             views: BTreeMap::new(),
             unfetched: VecDeque::new(),
             last_frame: 0,
             last_worker: 0,
+            run: Run::default(),
             counted: ByteCount::default(),
             armed_for: None,
-            alone: false,
             is_ending: false,
         };
-        Self {
+        let secret = secret();
+        Ok(Self {
             started: Instant::now(),
             assets,
             framebuffers: Arc::default(),
@@ -111,8 +140,9 @@ impl Driver {
             finished: Notify::new(),
             verified: Notify::new(),
             court,
-            secret: secret(),
-        }
+            tickets: Tickets::new(secret.as_ref(), options.local_workers),
+            secret,
+        })
     }
 
     /// Wakes the scheduler when it wants to be woken, until `stop`.
@@ -153,6 +183,11 @@ impl Driver {
         let mut inner = self.lock();
         inner.last_frame += 1;
         let frame = FrameId(inner.last_frame);
+        if inner.run.begun.is_none() {
+            let now = self.started.elapsed();
+            inner.run.begun = Some(now);
+            inner.run.pace.note(now, 0.0);
+        }
         match self.announcement(frame, &view) {
             Ok(announce) => {
                 let (FrameView { width, height, .. }, tile_rows) = (view, tile_rows(&view));
@@ -194,6 +229,11 @@ impl Driver {
         while self.lock().scheduler.verification().open > 0 {
             self.verified.notified().await;
         }
+    }
+
+    /// Finished frames with rows of workers that were found to send wrong pixels.
+    pub(crate) fn wrong_frames(&self) -> FrameSet {
+        self.lock().delivered.wrong().clone()
     }
 
     /// Reports something that callers must hear of.
@@ -250,12 +290,13 @@ impl Driver {
 
 /// Numbers that nobody can guess.
 fn secret() -> Option<[u8; 32]> {
-    let mut secret = [0; 32];
-    match getrandom::fill(&mut secret) {
-        Ok(()) => Some(secret),
-        Err(error) => {
-            tracing::warn!("workers pass no assets on: the system gives no random numbers: {error}");
-            None
-        }
-    }
+    let told = |error: &String| tracing::warn!("workers pass no assets on: {error}");
+    random().inspect_err(told).ok()
+}
+
+/// Numbers that only this process knows.
+fn random() -> Result<[u8; 32], String> {
+    let mut numbers = [0; 32];
+    let filled = getrandom::fill(&mut numbers);
+    filled.map(|()| numbers).map_err(|error| format!("the system gives no random numbers: {error}"))
 }

@@ -13,7 +13,7 @@
 //! finished. Frames may differ in size; one of another size than the one before begins when that is complete.
 
 use std::io::ErrorKind;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,10 +27,12 @@ use tokio_util::sync::{CancellationToken, DropGuard};
 use tokio_util::task::TaskTracker;
 
 use crate::accounting::TraceSink;
+use crate::addresses::Reachable;
 use crate::assets::Assets;
+use crate::delivered::FrameSet;
 use crate::driver::Driver;
 use crate::judge::{self, Trace};
-use crate::local_workers::LocalWorkers;
+use crate::local_workers::{LocalWorkers, Places};
 use crate::server;
 
 pub use crate::accounting::{FrameAccount, Parts, SegmentNote, WorkerAccount};
@@ -39,6 +41,7 @@ pub use crate::farm_control::FarmControl;
 pub use crate::framebuffer::FramePixels;
 pub use crate::scheduler::policy::SegmentPolicy;
 pub use crate::scheduler::{Verification, WorkerState};
+pub use crate::transfers::TransferStatus;
 pub use error::{FarmError, UnknownWorker};
 pub use rayfarm_protocol::{Cost as FrameCounts, FrameId};
 
@@ -62,7 +65,8 @@ pub struct FarmOptions {
     /// Whether a frame begins only when the one before it is complete. Otherwise workers that have nothing left to do in
     /// a frame begin the next one: more frames a second, each with an older camera.
     pub sequential: bool,
-    /// The share of the segments that a second worker renders as well, to find workers that send wrong pixels; 0 to 100.
+    /// The share of the segments that a second worker, or the master, renders as well, to find workers that send wrong
+    /// pixels; 0 to 100. Which ones is drawn when their pixels have come.
     pub verify_percent: u8,
 }
 
@@ -82,6 +86,7 @@ pub struct FarmScene {
 pub struct Farm {
     address: SocketAddr,
     driver: Arc<Driver>,
+    places: Arc<Places>,
     sessions: TaskTracker,
     processes: TaskTracker,
     stop_processes: CancellationToken,
@@ -123,16 +128,56 @@ pub struct FinishedFrame {
 pub struct FarmStatus {
     /// The workers connected now, in the order in which they came.
     pub workers: Vec<WorkerStatus>,
-    /// The names of workers that were kicked and are kept out.
-    pub kicked: Vec<String>,
+    /// Workers that were kicked and are kept out, in the order in which they were kicked.
+    pub kicked: Vec<KickedWorker>,
+    /// Local workers that have left, or cannot be kept running: [`FarmControl::bring_back`] starts them again.
+    pub local_gone: u32,
     /// The oldest frame being rendered.
     pub frame: Option<FrameId>,
     /// Its finished rows.
     pub rows_done: u32,
     /// Its rows.
     pub rows: u32,
+    /// Finished frames that have rows of workers which were found to send wrong pixels: they may be wrong.
+    pub wrong_frames: u64,
     /// How much was verified since the farm began, where it verifies at all.
     pub verification: Option<Verification>,
+    /// How much of the scene is at the workers that still wait for it.
+    pub transfers: TransferStatus,
+    /// Sums over the run.
+    pub totals: RunTotals,
+}
+
+/// A run up to now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RunTotals {
+    /// Frames completed.
+    pub frames_done: u64,
+    /// Frames of the whole run, where that is known.
+    pub frames: Option<u64>,
+    /// Since the first request.
+    pub elapsed: Duration,
+    /// Frames a second over the last 20 seconds or so.
+    pub fps: f64,
+    /// How long the rest takes at that pace, if that is known.
+    pub left: Option<Duration>,
+    /// Bytes sent to all workers.
+    pub sent_bytes: u64,
+    /// Bytes received from all workers.
+    pub received_bytes: u64,
+    /// The part of `sent_bytes` that describes what to draw.
+    pub scene_bytes: u64,
+}
+
+/// A worker that is kept out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KickedWorker {
+    /// The number that it had when it was kicked.
+    pub id: u64,
+    /// What it calls itself.
+    pub name: String,
+    /// Where it connected from; `None` for a local worker.
+    pub address: Option<IpAddr>,
 }
 
 /// A connected worker.
@@ -140,8 +185,10 @@ pub struct FarmStatus {
 pub struct WorkerStatus {
     /// Number given by this master; never reused.
     pub id: u64,
-    /// What it calls itself.
+    /// What it calls itself. Not unique: any worker may choose any name.
     pub name: String,
+    /// Whether this master has started it.
+    pub local: bool,
     /// Where it connects from.
     pub address: SocketAddr,
     /// Its render threads.
@@ -161,7 +208,7 @@ impl Farm {
     ///
     /// # Errors
     /// [`FarmError::Listen`] when the address is taken or does not belong to this machine, [`FarmError::Assets`]
-    /// when the scene cannot be sent.
+    /// when the scene cannot be sent, [`FarmError::Random`] when segments are to be verified and cannot be drawn.
     pub async fn start(options: FarmOptions, scene: FarmScene) -> Result<Farm, FarmError> {
         // Where even this is not known, the name alone may be found, and the failure to start is reported.
         let program = std::env::current_exe().unwrap_or_else(|_| "rayfarm-master".into());
@@ -192,8 +239,11 @@ impl Farm {
     ) -> Result<Farm, FarmError> {
         let assets = Assets::new(&scene.scene, scene.meshes, scene.textures)?;
         let (listener, address) = listen(options.listen).await?;
+        if let Some(line) = Reachable::of(address).announcement() {
+            tracing::info!("{line}");
+        }
         let (court, cases) = mpsc::unbounded_channel();
-        let driver = Arc::new(Driver::new(&options, assets, court));
+        let driver = Arc::new(Driver::new(&options, assets, court)?);
         let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());
 
         let clock = driver.clone();
@@ -211,12 +261,12 @@ impl Farm {
         };
         let bereaved = driver.clone();
         let stop_processes = stop.child_token();
-        local.start(&processes, &stop_processes, move |reason| {
+        let places = local.start(&driver.tickets, &processes, &stop_processes, move |reason| {
             if bereaved.worker_count() == 0 {
                 bereaved.report(FarmError::NoWorkers { reason, address });
             }
         });
-        Ok(Farm { address, driver, sessions, processes, stop_processes, stop: stop.drop_guard() })
+        Ok(Farm { address, driver, places, sessions, processes, stop_processes, stop: stop.drop_guard() })
     }
 
     /// Where workers connect.
@@ -228,6 +278,11 @@ impl Farm {
     /// be rendered at all (no pixels, a camera that sees nothing) is an error of [`Farm::finished`].
     pub fn request(&self, view: FrameView) -> FrameId {
         self.driver.request(view)
+    }
+
+    /// How many frames the run has: [`FarmStatus::totals`] tells how long they take.
+    pub fn expect_frames(&self, frames: u64) {
+        self.driver.expect_frames(frames);
     }
 
     /// Gives up all frames that were requested so far, begun or not: they will not be finished.
@@ -251,14 +306,19 @@ impl Farm {
         self.driver.all_verified().await;
     }
 
+    /// Finished frames that have rows of workers which were found to send wrong pixels: they may be wrong.
+    pub(crate) fn wrong_frames(&self) -> FrameSet {
+        self.driver.wrong_frames()
+    }
+
     /// What is going on right now.
     pub fn status(&self) -> FarmStatus {
-        self.driver.status()
+        FarmStatus { local_gone: self.places.gone(), ..self.driver.status() }
     }
 
     /// Another handle, for whoever steers the farm beside the one who asks for frames. Call it inside the runtime.
     pub fn control(&self) -> FarmControl {
-        FarmControl::new(self.driver.clone())
+        FarmControl::new(self.driver.clone(), self.places.clone())
     }
 
     /// Tells a timeline of everything from now on.

@@ -4,27 +4,37 @@ use std::sync::Arc;
 
 use tokio::runtime::Handle;
 
+use crate::delivered::FrameSet;
 use crate::driver::Driver;
 use crate::farm::{FarmStatus, UnknownWorker};
+use crate::identity::Identity;
+use crate::local_workers::Places;
+use crate::roster::Kicked;
 use crate::scheduler::{Event, WorkerId};
 
 /// Looks at a farm and commands its workers, from any thread. Once the farm is shut down, no worker is there.
 #[derive(Clone)]
 pub struct FarmControl {
     driver: Arc<Driver>,
+    places: Arc<Places>,
     /// Goodbyes are said on the farm's runtime, whatever thread asks for them.
     runtime: Handle,
 }
 
 impl FarmControl {
     /// Call it inside the farm's runtime.
-    pub(crate) fn new(driver: Arc<Driver>) -> Self {
-        Self { driver, runtime: Handle::current() }
+    pub(crate) fn new(driver: Arc<Driver>, places: Arc<Places>) -> Self {
+        Self { driver, places, runtime: Handle::current() }
     }
 
     /// What is going on right now.
     pub fn status(&self) -> FarmStatus {
-        self.driver.status()
+        FarmStatus { local_gone: self.places.gone(), ..self.driver.status() }
+    }
+
+    /// As [`FarmStatus::wrong_frames`], by their numbers.
+    pub(crate) fn wrong_frames(&self) -> FrameSet {
+        self.driver.wrong_frames()
     }
 
     /// Lets a worker finish what it holds and then leave for good; a worker of the same name may come later.
@@ -52,8 +62,9 @@ impl FarmControl {
         self.command(worker, |worker| Event::ResumeRequested { worker })
     }
 
-    /// Sends a worker away at once, with the reason; others render what it held. From then on, whoever connects under
-    /// its name from its address is refused, until [`FarmControl::allow`] or the end of this master.
+    /// Sends a worker away at once, with the reason; others render what it held. It is refused when it connects again,
+    /// until [`FarmControl::allow`] or the end of this master. A local worker is known by its process, any other by
+    /// its name and address.
     ///
     /// # Errors
     /// [`UnknownWorker`].
@@ -62,9 +73,26 @@ impl FarmControl {
         found(worker, self.driver.kick(WorkerId(worker), reason))
     }
 
-    /// Lets kicked workers of this name connect again. Returns how many were kept out.
+    /// Lets all kicked workers of this name connect again; local ones are started. Returns how many were kept out.
     pub fn allow(&self, name: &str) -> usize {
-        self.driver.allow(name)
+        self.let_in(|kicked| kicked.identity.name() == name)
+    }
+
+    /// Lets the kicked worker that had this number connect again; a local one is started. Whether it was kept out.
+    pub fn allow_worker(&self, worker: u64) -> bool {
+        self.let_in(|kicked| kicked.worker == WorkerId(worker)) > 0
+    }
+
+    /// Lets all kicked workers connect again, and starts the local ones that are not running.
+    pub fn bring_back(&self) {
+        self.driver.allow(|_| true);
+        self.places.start_again(|_| true);
+    }
+
+    fn let_in(&self, which: impl Fn(&Kicked) -> bool) -> usize {
+        let allowed = self.driver.allow(which);
+        self.places.start_again(|number| allowed.contains(&Identity::Local(number)));
+        allowed.len()
     }
 
     fn command(&self, worker: u64, event: impl FnOnce(WorkerId) -> Event) -> Result<(), UnknownWorker> {

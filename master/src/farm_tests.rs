@@ -20,6 +20,7 @@ use crate::farm::{
 };
 use crate::test_scene::{scene, view};
 
+mod identity;
 mod service;
 mod strangers;
 

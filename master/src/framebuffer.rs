@@ -1,6 +1,6 @@
 //! Where pixels end up: one picture per frame in flight, filled by sessions in whatever order segments arrive.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 use std::ops::{Deref, Range};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -110,6 +110,13 @@ impl Framebuffers {
         }
         let canvases = inner.open.iter_mut();
         canvases.flat_map(|(&frame, canvas)| canvas.reject(worker).map(move |rows| (frame, rows))).collect()
+    }
+
+    /// Whose rows are in a picture.
+    pub(crate) fn workers(&self, frame: FrameId) -> BTreeSet<WorkerId> {
+        let inner = self.lock();
+        let filled = inner.open.get(&frame).into_iter().flat_map(|canvas| &canvas.filled);
+        filled.flatten().copied().collect()
     }
 
     /// Closes a frame and hands out its picture; `None` if it is not open or not complete.

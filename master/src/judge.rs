@@ -66,7 +66,8 @@ pub(crate) fn tracer(scene: FarmScene, stop: CancellationToken) -> Arc<Trace> {
     Arc::new(move |view, rows| {
         let scene = compiled.get_or_init(|| {
             let FarmScene { scene, meshes, textures } = scene.clone();
-            CompiledScene::new(scene, meshes, textures).map(Arc::new).map_err(|error| error.to_string())
+            let compiled = CompiledScene::new_unless(scene, meshes, textures, &|| stop.is_cancelled());
+            compiled.map(Arc::new).map_err(|error| error.to_string())
         });
         let frame = PreparedFrame::new(scene.clone()?, view).map_err(|error| error.to_string())?;
         let mut pixels = vec![0; rows.len() * view.width as usize * 3];

@@ -8,14 +8,16 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use tokio::process::{Child, Command};
+use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::cli::LOCAL_WORKER;
+use crate::identity::{Tickets, local_name};
 
 /// A worker that dies before it has lived this long died young.
 const YOUNG: Duration = Duration::from_secs(30);
@@ -25,6 +27,53 @@ const MAX_YOUNG_DEATHS: u32 = 5;
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
 /// How long a worker may take to end when it is asked to.
 const ENDING: Duration = Duration::from_secs(3);
+
+/// Where a local worker finds the name with which it introduces itself; other processes do not see it there.
+const NAME_VARIABLE: &str = rayfarm_worker::cli::NAME_VARIABLE;
+
+/// The places of local workers: which of them are empty, and how to fill them again.
+#[derive(Debug, Default)]
+pub(crate) struct Places {
+    places: Vec<Place>,
+    empty: AtomicU32,
+}
+
+/// The place of one local worker.
+#[derive(Debug, Default)]
+struct Place {
+    is_empty: AtomicBool,
+    start_again: Notify,
+}
+
+impl Places {
+    fn new(count: u32) -> Self {
+        Self { places: (0..count).map(|_| Place::default()).collect(), empty: AtomicU32::new(0) }
+    }
+
+    /// Places without a worker.
+    pub(crate) fn gone(&self) -> u32 {
+        self.empty.load(Ordering::Acquire)
+    }
+
+    /// Starts a worker in each empty place that `which` (by number, from 1) names. Returns how many.
+    pub(crate) fn start_again(&self, which: impl Fn(u32) -> bool) -> u32 {
+        let mut started = 0;
+        for (_, place) in (1..).zip(&self.places).filter(|(number, _)| which(*number)) {
+            if place.is_empty.swap(false, Ordering::AcqRel) {
+                self.empty.fetch_sub(1, Ordering::AcqRel);
+                place.start_again.notify_one();
+                started += 1;
+            }
+        }
+        started
+    }
+
+    /// A worker is not started again by itself. Whether it was the last one.
+    fn leave(&self, place: &Place) -> bool {
+        place.is_empty.store(true, Ordering::Release);
+        self.empty.fetch_add(1, Ordering::AcqRel) + 1 == self.places.len() as u32
+    }
+}
 
 /// What to start.
 #[derive(Clone, Debug)]
@@ -38,35 +87,43 @@ pub(crate) struct LocalWorkers {
 }
 
 impl LocalWorkers {
-    /// Starts all of them, each with a task that looks after it until `stop`. When the last one has been given
-    /// up, `given_up` is told why.
+    /// Starts all of them, each with a task that looks after it until `stop`. Whenever the last one has left or cannot
+    /// be kept running, `given_up` is called with the reason.
     pub(crate) fn start(
         self,
+        tickets: &Tickets,
         tasks: &TaskTracker,
         stop: &CancellationToken,
         given_up: impl Fn(String) + Send + Sync + 'static,
-    ) {
-        let left = Arc::new(AtomicU32::new(self.count));
+    ) -> Arc<Places> {
+        let places = Arc::new(Places::new(self.count));
         let given_up = Arc::new(given_up);
-        for number in 0..self.count {
-            let (left, given_up, stop) = (left.clone(), given_up.clone(), stop.clone());
+        for number in 1..=self.count {
+            let (places, given_up, stop) = (places.clone(), given_up.clone(), stop.clone());
+            let name = tickets.of(number).unwrap_or_else(|| local_name(number));
             let nursery =
-                Nursery { number: number + 1, program: self.program.clone(), args: self.args(number) };
+                Nursery { number, name, program: self.program.clone(), args: self.args(number - 1) };
             tasks.spawn(async move {
-                let reason = nursery.run(&stop).await;
-                if let Some(reason) = reason.filter(|_| left.fetch_sub(1, Ordering::Relaxed) == 1) {
-                    given_up(reason);
+                while let Some(reason) = nursery.run(&stop).await {
+                    let Some(place) = places.places.get(number as usize - 1) else { return };
+                    if places.leave(place) {
+                        given_up(reason);
+                    }
+                    tokio::select! {
+                        () = stop.cancelled() => return,
+                        () = place.start_again.notified() => {}
+                    }
                 }
             });
         }
+        places
     }
 
     fn args(&self, number: u32) -> Vec<OsString> {
         let master = reachable(self.listening).to_string();
-        let name = format!("local-{}", number + 1);
         let mut args = vec![LOCAL_WORKER.to_owned(), "--master".into(), master, "--exit-with-stdin".into()];
         // What becomes of it, the master tells; only what is wrong it tells itself.
-        args.extend(["--quiet".into(), "--name".into(), name]);
+        args.extend(["--once".into(), "--quiet".into()]);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         if let Some(threads) = self.threads.or_else(|| share(cores, self.count, number)) {
             args.extend(["--threads".into(), threads.to_string()]);
@@ -82,7 +139,11 @@ fn reachable(listening: SocketAddr) -> SocketAddr {
         IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
         ip => ip,
     };
-    SocketAddr::new(ip, listening.port())
+    match listening {
+        // It keeps its scope.
+        SocketAddr::V6(address) if !address.ip().is_unspecified() => listening,
+        _ => SocketAddr::new(ip, listening.port()),
+    }
 }
 
 /// The `number`th worker's share of the cores, at least one; a single worker takes what it finds.
@@ -95,6 +156,8 @@ fn share(cores: usize, workers: u32, number: u32) -> Option<usize> {
 /// One place for a worker process.
 struct Nursery {
     number: u32,
+    /// What it introduces itself with.
+    name: String,
     program: PathBuf,
     args: Vec<OsString>,
 }
@@ -145,7 +208,8 @@ impl Nursery {
 
     fn spawn(&self) -> std::io::Result<Child> {
         let mut command = Command::new(&self.program);
-        command.args(&self.args).stdin(Stdio::piped()).stdout(Stdio::null()).kill_on_drop(true);
+        command.args(&self.args).env(NAME_VARIABLE, &self.name);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).kill_on_drop(true);
         // Ctrl-C is the master's to hear: it says goodbye to its workers in order.
         #[cfg(unix)]
         command.process_group(0);
@@ -183,16 +247,23 @@ mod tests {
 
     #[test]
     fn workers_are_told_an_address_that_they_can_reach() {
-        for (listening, master) in
-            [("0.0.0.0:7117", "127.0.0.1:7117"), ("[::]:7", "[::1]:7"), ("10.1.2.3:4", "10.1.2.3:4")]
-        {
+        for (listening, master) in [
+            ("0.0.0.0:7117", "127.0.0.1:7117"),
+            ("[::]:7", "[::1]:7"),
+            ("10.1.2.3:4", "10.1.2.3:4"),
+            ("[fe80::1%3]:4", "[fe80::1%3]:4"),
+        ] {
             assert_eq!(reachable(listening.parse().unwrap()).to_string(), master);
         }
     }
 
+    fn nursery(program: &str, args: Vec<OsString>) -> Nursery {
+        Nursery { number: 1, name: local_name(1), program: program.into(), args }
+    }
+
     #[tokio::test]
     async fn a_worker_that_cannot_live_is_given_up_with_the_reason() {
-        let nursery = Nursery { number: 1, program: "/nonexistent/worker".into(), args: Vec::new() };
+        let nursery = nursery("/nonexistent/worker", Vec::new());
         tokio::time::pause();
         let reason = nursery.run(&CancellationToken::new()).await.unwrap();
         assert!(reason.contains("/nonexistent/worker") && reason.contains("5 times"), "{reason}");
@@ -207,7 +278,7 @@ mod tests {
         let ended = folder.path().join("ended");
         let script = format!("cat; touch {}", ended.display());
         let args = ["-c".into(), script.into()].to_vec();
-        let shell = Nursery { number: 1, program: "sh".into(), args };
+        let shell = nursery("sh", args);
         let stopped = stop.clone();
         let task = tasks.spawn(async move { shell.run(&stopped).await });
         // Its standard input is open for as long as it is wanted.

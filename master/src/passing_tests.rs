@@ -28,6 +28,7 @@ fn options(master: SocketAddr, share: Share) -> WorkerOptions {
         master: master.to_string(),
         threads: Some(1),
         name: "worker".to_owned(),
+        once: false,
         reconnect: false,
         asset_cache_bytes: 1 << 28,
         disk_cache: None,
@@ -39,7 +40,7 @@ fn options(master: SocketAddr, share: Share) -> WorkerOptions {
 /// Bytes of scene that the master has sent until every one of the workers has rendered something.
 async fn sent_until_all_render(share: Share) -> u64 {
     let texture = texture();
-    let maps = vec![TextureMap { texture: texture.id(), filter: Filter::Nearest }];
+    let maps = vec![TextureMap::new(texture.id(), Filter::Nearest)];
     let scene = Scene { textures: maps, ..scene() };
     let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
     let farm = FarmOptions { listen, policy: SegmentPolicy::Static(4), ..FarmOptions::default() };

@@ -1,18 +1,20 @@
 //! Who is connected: their senders, what they were granted, and the bytes that went to and fro.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use rayfarm_protocol::passing::ShareKey;
 use rayfarm_protocol::session::{Sender, Traffic};
-use rayfarm_protocol::{AssetId, Hello, ToWorker};
+use rayfarm_protocol::{AssetId, Hello, Reconnect, ToWorker};
 use tokio::task::JoinHandle;
 
 use crate::chains::{Chains, Source};
+use crate::identity::Identity;
 use crate::lease_book::LeaseBook;
 use crate::scheduler::{Return, WorkerId};
+use crate::transfers::Transfers;
 
 /// How long a worker's last messages may take.
 const FAREWELL: Duration = Duration::from_secs(1);
@@ -29,22 +31,34 @@ pub(crate) struct Roster {
     sessions: BTreeMap<WorkerId, Session>,
     /// Traffic of sessions that have ended.
     ended: ByteCount,
-    /// Who was kicked, by name and address: whoever shakes hands as such is refused.
-    kicked: VecDeque<(String, IpAddr)>,
-    /// Who has left lately: a worker may be found to have lied when it is gone.
-    left: VecDeque<(WorkerId, String, IpAddr)>,
+    /// Kicked workers: each is refused when it connects again.
+    kicked: VecDeque<Kicked>,
+    /// Workers that have left lately: one may be found to have sent wrong pixels when it is gone.
+    left: VecDeque<Kicked>,
     pub(crate) chains: Chains,
+}
+
+/// A worker that was kicked, or has left.
+#[derive(Clone, Debug)]
+pub(crate) struct Kicked {
+    /// Its last number.
+    pub(crate) worker: WorkerId,
+    pub(crate) identity: Identity,
 }
 
 /// A connected worker.
 pub(crate) struct Session {
+    /// Its name is the one that is shown.
     pub(crate) hello: Hello,
+    pub(crate) identity: Identity,
     pub(crate) address: SocketAddr,
     pub(crate) leases: LeaseBook,
     /// Why it could not render, the last time it could not.
     pub(crate) trouble: Option<String>,
     /// Where it passes assets on, and what opens them there.
     pub(crate) sharing: Option<(SocketAddr, ShareKey)>,
+    /// Assets on their way to it.
+    pub(crate) transfers: Transfers,
     sender: Sender<ToWorker>,
     traffic: Arc<Traffic>,
 }
@@ -66,11 +80,22 @@ impl Session {
     /// A session that has shaken hands.
     pub(crate) fn new(
         hello: Hello,
+        identity: Identity,
         address: SocketAddr,
         sender: Sender<ToWorker>,
         traffic: Arc<Traffic>,
     ) -> Self {
-        Self { hello, address, leases: LeaseBook::default(), trouble: None, sharing: None, sender, traffic }
+        Self {
+            hello,
+            identity,
+            address,
+            leases: LeaseBook::default(),
+            trouble: None,
+            sharing: None,
+            transfers: Transfers::default(),
+            sender,
+            traffic,
+        }
     }
 }
 
@@ -123,16 +148,28 @@ impl Roster {
         }
     }
 
+    /// Says in the log that a worker leaves as it was meant to.
+    pub(crate) fn log_departure(&self, worker: WorkerId, reason: &str) {
+        if let Some(Session { hello, address, .. }) = self.sessions.get(&worker) {
+            tracing::info!("{worker} ({}, {address}) leaves: {reason}", hello.name);
+        }
+    }
+
     /// Forgets a session and sees it off in the background: a last word, if there is room for it, then the end.
     pub(crate) fn end(&mut self, worker: WorkerId, reason: &str, again: Return) -> Option<JoinHandle<()>> {
-        let Session { sender, traffic, hello, address, .. } = self.sessions.remove(&worker)?;
+        let Session { sender, traffic, identity, .. } = self.sessions.remove(&worker)?;
         self.ended.add(&traffic);
         self.chains.left(worker);
-        self.left.push_back((worker, hello.name, address.ip()));
+        self.left.push_back(Kicked { worker, identity });
         while self.left.len() > MAX_LEFT {
             self.left.pop_front();
         }
-        let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), again: again == Return::Welcome };
+        let reconnect = match again {
+            Return::Welcome => Reconnect::Now,
+            Return::Unwanted => Reconnect::Never,
+            Return::NextMaster => Reconnect::NextMaster,
+        };
+        let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), reconnect };
         Some(tokio::spawn(async move {
             let last_words = async {
                 // A session that has ended already needs none.
@@ -145,35 +182,34 @@ impl Roster {
         }))
     }
 
-    /// Keeps a worker's name and address out from now on, if it is connected or was lately. Its session goes on until it
-    /// is ended.
+    /// Keeps a worker out from now on, if it is connected or was lately. Its session goes on until it is ended.
     pub(crate) fn bar(&mut self, worker: WorkerId) {
-        let here = self.sessions.get(&worker).map(|s| (s.hello.name.clone(), s.address.ip()));
-        let gone = || self.left.iter().find(|(id, ..)| *id == worker);
-        let Some(kicked) = here.or_else(|| gone().map(|(_, name, ip)| (name.clone(), *ip))) else { return };
-        if !self.kicked.contains(&kicked) {
-            self.kicked.push_back(kicked);
+        let here = self.sessions.get(&worker).map(|session| session.identity.clone());
+        let gone = || self.left.iter().find(|left| left.worker == worker).map(|left| left.identity.clone());
+        let Some(identity) = here.or_else(gone) else { return };
+        if !self.is_barred(&identity) {
+            self.kicked.push_back(Kicked { worker, identity });
         }
         while self.kicked.len() > MAX_KICKED {
             self.kicked.pop_front();
         }
     }
 
-    /// Whether a worker of this name from this address was kicked.
-    pub(crate) fn is_barred(&self, name: &str, address: IpAddr) -> bool {
-        self.kicked.iter().any(|(kicked, from)| kicked == name && *from == address)
+    /// Whether a worker was kicked.
+    pub(crate) fn is_barred(&self, identity: &Identity) -> bool {
+        self.kicked.iter().any(|kicked| kicked.identity == *identity)
     }
 
-    /// Lets workers of this name in again. Returns how many were kept out.
-    pub(crate) fn allow(&mut self, name: &str) -> usize {
-        let before = self.kicked.len();
-        self.kicked.retain(|(kicked, _)| kicked != name);
-        before - self.kicked.len()
+    /// Lets kicked workers in again. Returns which.
+    pub(crate) fn allow(&mut self, which: impl Fn(&Kicked) -> bool) -> Vec<Identity> {
+        let (allowed, kicked) = std::mem::take(&mut self.kicked).into_iter().partition::<Vec<_>, _>(which);
+        self.kicked = kicked.into();
+        allowed.into_iter().map(|kicked| kicked.identity).collect()
     }
 
-    /// The names of those who are kept out, in the order in which they were kicked.
-    pub(crate) fn barred(&self) -> Vec<String> {
-        self.kicked.iter().map(|(name, _)| name.clone()).collect()
+    /// Those that are kept out, in the order in which they were kicked.
+    pub(crate) fn barred(&self) -> impl Iterator<Item = &Kicked> {
+        self.kicked.iter()
     }
 
     /// Where a worker gets an asset, and what opens it there, if another worker passes it on.
@@ -203,9 +239,9 @@ impl Roster {
 
 impl ByteCount {
     fn add(&mut self, traffic: &Traffic) {
-        self.sent += traffic.sent_bytes();
-        self.received += traffic.received_bytes();
-        self.scene += traffic.scene_sent_bytes();
+        self.sent = self.sent.saturating_add(traffic.sent_bytes());
+        self.received = self.received.saturating_add(traffic.received_bytes());
+        self.scene = self.scene.saturating_add(traffic.scene_sent_bytes());
     }
 
     /// What came after an earlier count.

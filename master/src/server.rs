@@ -14,6 +14,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::driver::{AnswerError, Driver};
+use crate::identity::Identity;
 use crate::roster::Session;
 use crate::scheduler::{Event, WorkerId};
 
@@ -81,6 +82,7 @@ pub(crate) async fn accept(
 struct Newcomer {
     worker: WorkerId,
     hello: Hello,
+    identity: Identity,
     stream: TcpStream,
 }
 
@@ -89,13 +91,25 @@ async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> O
     if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
-    let mut number = None;
-    let decide = |hello: &Hello| match driver.refusal(hello, address.ip()) {
-        Some(reason) => Err(reason),
-        None => Ok(Welcome { worker: number.insert(driver.next_worker()).0 }),
+    let mut admitted = None;
+    let decide = |hello: &Hello| {
+        let identity = driver.tickets.identify(&hello.name, address.ip());
+        match driver.refusal(&identity) {
+            Some(reason) => Err(reason),
+            None => Ok(Welcome { worker: admitted.insert((driver.next_worker(), identity)).0.0 }),
+        }
     };
     match handshake::as_master(&mut stream, decide).await {
-        Ok(hello) => number.map(|worker| Newcomer { worker, hello, stream }),
+        Ok(hello) => admitted.map(|(worker, identity)| {
+            // A ticket is never shown.
+            let hello = Hello { name: identity.name(), ..hello };
+            Newcomer { worker, hello, identity, stream }
+        }),
+        // It comes back every few seconds.
+        Err(error @ ProtocolError::NotNow { .. }) => {
+            tracing::debug!("{address} was not let in: {error}");
+            None
+        }
         Err(error) => {
             tracing::warn!("{address} was not let in: {error}");
             None
@@ -105,12 +119,12 @@ async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> O
 
 /// A session from its beginning to its end.
 async fn serve(driver: &Driver, newcomer: Newcomer, address: SocketAddr) {
-    let Newcomer { worker, hello, stream } = newcomer;
+    let Newcomer { worker, hello, identity, stream } = newcomer;
     let Hello { name, threads, simd, software } = hello.clone();
     tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
     let (sender, receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
     let (want, wanted) = mpsc::channel(MAX_WANTED_ASSETS);
-    driver.join(worker, Session::new(hello, address, sender.clone(), traffic));
+    driver.join(worker, Session::new(hello, identity, address, sender.clone(), traffic));
     let ended = tokio::select! {
         ended = listen(driver, worker, receiver, want) => ended,
         () = send_assets(driver, worker, &sender, wanted) => Err(SessionError::Closed),
@@ -141,7 +155,7 @@ async fn listen(
         match message? {
             ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
             ToMaster::NeedAsset { id, offset, again } => {
-                if !driver.asset_wanted(worker, id, again) {
+                if !driver.asset_wanted(worker, id, offset, again) {
                     want.try_send((id, offset)).map_err(|_| SessionError::Greedy)?;
                 }
             }
@@ -195,7 +209,7 @@ async fn send_asset(
         sender.send(ToWorker::AssetChunk { id, offset, bytes: chunk }).await?;
         offset = next;
         // On a slow link its answers to pings wait behind megabytes in the operating system's buffers.
-        driver.handle(Event::Heard { worker });
+        driver.asset_sent(worker, id, offset);
     }
     Ok(())
 }

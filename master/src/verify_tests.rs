@@ -70,7 +70,8 @@ async fn the_one_who_lies_is_named_sent_away_and_kept_out() {
             render_past_the_lie(&mut farm, honest).await;
             let goodbye = patiently(liar).await.unwrap().goodbye.unwrap();
             assert!(goodbye.contains("wrong pixels"), "{goodbye}");
-            assert_eq!(farm.status().kicked, ["liar"]);
+            let kicked = farm.status().kicked;
+            assert_eq!(kicked.iter().map(|kicked| kicked.name.as_str()).collect::<Vec<_>>(), ["liar"]);
             let mut again = TcpStream::connect(farm.address()).await.unwrap();
             let hello =
                 Hello { name: "liar".into(), threads: 1, simd: String::new(), software: String::new() };
@@ -110,6 +111,25 @@ async fn a_lone_worker_is_verified_by_the_master() {
     let goodbye = patiently(liar).await.unwrap().goodbye.unwrap();
     assert!(goodbye.contains("wrong pixels"), "{goodbye}");
     assert_eq!(counts(&farm).mismatches, 1);
+    farm.shut_down().await;
+}
+
+#[tokio::test]
+async fn complete_pictures_with_rows_of_a_liar_are_named() {
+    // One segment a picture: it is complete when its pixels are here, and shown before they are verified.
+    let mut farm = farm(SegmentPolicy::Static(64), 100).await;
+    let liar = fake_worker::start(farm.address(), Script::Lie).await;
+    until(&farm, |status| status.workers.len() == 1).await;
+    let wrong = farm.request(view());
+    assert!(!is_picture(&view(), &patiently(farm.finished()).await.unwrap().pixels));
+    patiently(liar).await.unwrap();
+    until(&farm, |status| status.wrong_frames == 1).await;
+    fake_worker::start_named(farm.address(), "honest", Script::Honest).await;
+    let right = farm.request(view());
+    assert!(is_picture(&view(), &patiently(farm.finished()).await.unwrap().pixels));
+    patiently(farm.verified()).await;
+    let named = farm.wrong_frames();
+    assert!(named.contains(wrong) && !named.contains(right) && farm.status().wrong_frames == 1);
     farm.shut_down().await;
 }
 

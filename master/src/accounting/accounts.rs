@@ -23,6 +23,19 @@ pub struct FrameAccount {
     pub segments: Vec<SegmentNote>,
 }
 
+impl FrameAccount {
+    /// The account without the time before the frame in which nothing was requested: that time is no loss.
+    pub(crate) fn without_rest(&self, rest: Duration) -> Self {
+        let mut account = self.clone();
+        for worker in &mut account.workers {
+            let idle = rest.as_nanos().saturating_mul(u128::from(worker.threads));
+            let idle = u64::try_from(idle).unwrap_or(u64::MAX);
+            worker.parts.wait = worker.parts.wait.saturating_sub(idle);
+        }
+        account
+    }
+}
+
 /// What one worker did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WorkerAccount {
@@ -144,7 +157,7 @@ impl Accounts {
     /// Something happens to the scheduler.
     pub(crate) fn event(&mut self, now: Duration, event: &Event) {
         match *event {
-            Event::WorkerJoined { worker, threads } => {
+            Event::WorkerJoined { worker, threads, .. } => {
                 self.leave(now, worker);
                 let account = WorkerAccount { id: worker.0, threads, ..WorkerAccount::default() };
                 let ledger = Ledger::new(now, threads);
@@ -231,9 +244,9 @@ impl Accounts {
         let Cost { trace_ns, wait_ns, encode_ns, span_ns, .. } = cost;
         let answer = Answer { trace_ns, wait_ns, encode_ns, span_ns, decode };
         let Some(stretch) = member.ledger.answer(&lease, answer) else { return };
-        member.account.segments += 1;
-        member.account.rows += u64::from(lease.row_count);
-        member.account.bytes += bytes;
+        member.account.segments = member.account.segments.saturating_add(1);
+        member.account.rows = member.account.rows.saturating_add(lease.row_count.into());
+        member.account.bytes = member.account.bytes.saturating_add(bytes);
         if shown {
             self.note(worker, lease, trace_ns);
         }

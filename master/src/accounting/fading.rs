@@ -106,6 +106,17 @@ mod tests {
     }
 
     #[test]
+    fn a_rest_is_no_wait() {
+        let account = |threads| {
+            let mut account = frame(1, 1000, 60_500);
+            account.workers[0].threads = threads;
+            account.without_rest(Duration::from_nanos(30_000)).workers[0].parts
+        };
+        assert_eq!(account(2), Parts { trace: 1000, wait: 500, ..Parts::default() });
+        assert_eq!(account(3), Parts { trace: 1000, ..Parts::default() }, "never less than nothing");
+    }
+
+    #[test]
     fn who_has_left_is_forgotten() {
         let mut fading = Fading::default();
         fading.add(Duration::ZERO, &frame(1, 1, 1));

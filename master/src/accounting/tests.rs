@@ -3,7 +3,7 @@ use std::time::Duration;
 use rayfarm_protocol::{Cost, FrameId, Lease};
 
 use super::*;
-use crate::scheduler::{Action, Event, Return, WorkerId};
+use crate::scheduler::{Action, Event, HostId, Return, WorkerId};
 
 mod properties;
 
@@ -20,8 +20,8 @@ impl Told {
     /// Two workers that have been there for a while: one with two threads, one with one.
     fn new() -> Self {
         let mut told = Self { accounts: Accounts::default() };
-        told.event(0, Event::WorkerJoined { worker: MILL, threads: 2 });
-        told.event(0, Event::WorkerJoined { worker: BARN, threads: 1 });
+        told.event(0, Event::WorkerJoined { worker: MILL, threads: 2, host: HostId(1) });
+        told.event(0, Event::WorkerJoined { worker: BARN, threads: 1, host: HostId(1) });
         told.accounts.name(MILL, "mill");
         told
     }

@@ -25,11 +25,14 @@ impl Driver {
 
     /// A worker asks for an asset. Whether another worker passes it on: the one that asks is told which. `again`: that was
     /// tried.
-    pub(crate) fn asset_wanted(&self, worker: WorkerId, id: AssetId, again: bool) -> bool {
+    pub(crate) fn asset_wanted(&self, worker: WorkerId, id: AssetId, offset: u64, again: bool) -> bool {
         let mut inner = self.lock();
         let now = self.started.elapsed();
         inner.accounts.asset_wanted(now, worker);
         let size = self.assets.get(id).map_or(0, |bytes| bytes.len());
+        if let Some(session) = inner.roster.get_mut(worker).filter(|_| size > 0) {
+            session.transfers.requested(id, size as u64, offset);
+        }
         if size <= LEAST_PASSED_BYTES {
             return false;
         }
@@ -40,9 +43,21 @@ impl Driver {
         true
     }
 
+    /// The bytes of an asset up to `end` are on their way to a worker.
+    pub(crate) fn asset_sent(&self, worker: WorkerId, id: AssetId, end: u64) {
+        let mut inner = self.lock();
+        if let Some(session) = inner.roster.get_mut(worker) {
+            session.transfers.sent(id, end);
+        }
+        self.drive(&mut inner, Event::Heard { worker });
+    }
+
     /// A worker has all of an asset.
     pub(crate) fn asset_taken(&self, worker: WorkerId, id: AssetId) {
         let mut inner = self.lock();
+        if let Some(session) = inner.roster.get_mut(worker) {
+            session.transfers.complete(id);
+        }
         inner.roster.chains.complete(self.started.elapsed(), worker, id);
         self.drive(&mut inner, Event::Heard { worker });
     }

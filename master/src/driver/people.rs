@@ -1,12 +1,14 @@
 //! Who comes, who goes, and what users want of them.
 
-use std::net::IpAddr;
+use std::time::Duration;
 
 use rayfarm_protocol::Hello;
+use rayfarm_protocol::handshake::Refusal;
 
-use super::Driver;
-use crate::farm::{FarmStatus, WorkerStatus};
-use crate::roster::Session;
+use super::{Driver, Inner, Run};
+use crate::farm::{FarmStatus, KickedWorker, RunTotals, TransferStatus, WorkerStatus};
+use crate::identity::{Identity, host};
+use crate::roster::{Kicked, Session};
 use crate::scheduler::{Event, Return, WorkerId};
 
 /// Workers that are let in.
@@ -33,9 +35,10 @@ impl Driver {
     /// A session has begun.
     pub(crate) fn join(&self, worker: WorkerId, session: Session) {
         let Hello { name, threads, .. } = session.hello.clone();
+        let host = host(session.address.ip());
         let mut inner = self.lock();
         inner.roster.add(worker, session);
-        self.drive(&mut inner, Event::WorkerJoined { worker, threads });
+        self.drive(&mut inner, Event::WorkerJoined { worker, threads, host });
         inner.accounts.name(worker, &name);
     }
 
@@ -62,25 +65,26 @@ impl Driver {
         known
     }
 
-    /// Lets kicked workers of this name in again. Returns how many were kept out.
-    pub(crate) fn allow(&self, name: &str) -> usize {
-        self.lock().roster.allow(name)
+    /// Lets kicked workers in again. Returns which.
+    pub(crate) fn allow(&self, which: impl Fn(&Kicked) -> bool) -> Vec<Identity> {
+        self.lock().roster.allow(which)
     }
 
     /// Why a worker that shakes hands is not let in, if it is not.
-    pub(crate) fn refusal(&self, hello: &Hello, address: IpAddr) -> Option<String> {
+    pub(crate) fn refusal(&self, identity: &Identity) -> Option<Refusal> {
         let inner = self.lock();
         if inner.is_ending {
-            return Some("the master ends".to_owned());
+            return Some(Refusal::NotNow("the master ends".to_owned()));
         }
         let count = inner.roster.len();
-        if inner.roster.is_barred(&hello.name, address) {
-            return Some(format!(
+        if inner.roster.is_barred(identity) {
+            return Some(Refusal::Final(format!(
                 "a worker called {} was kicked from this master; it is kept out until the master allows it or ends",
-                hello.name
-            ));
+                identity.name()
+            )));
         }
-        (count >= MAX_WORKERS).then(|| format!("this master has {count} workers already, the most it takes"))
+        let full = || Refusal::NotNow(format!("it has {count} workers already, the most it takes"));
+        (count >= MAX_WORKERS).then(full)
     }
 
     /// A session has ended; its worker is told why, where it still listens.
@@ -98,6 +102,7 @@ impl Driver {
             Some(WorkerStatus {
                 id: record.worker.0,
                 name: session.hello.name.clone(),
+                local: session.identity.is_local(),
                 address: session.address,
                 threads: session.hello.threads,
                 segments_done: record.segments_done,
@@ -106,15 +111,51 @@ impl Driver {
                 trouble: session.trouble.clone(),
             })
         });
+        let kicked = inner.roster.barred().map(|Kicked { worker, identity }| KickedWorker {
+            id: worker.0,
+            name: identity.name(),
+            address: match identity {
+                Identity::Local(_) => None,
+                Identity::Remote { address, .. } => Some(*address),
+            },
+        });
         let progress = inner.scheduler.progress();
+        let part =
+            progress.map_or(0.0, |progress| f64::from(progress.rows_done) / f64::from(progress.rows.max(1)));
         FarmStatus {
+            transfers: transfers(&inner),
+            totals: self.totals(&inner, part),
             workers: workers.collect(),
-            kicked: inner.roster.barred(),
+            kicked: kicked.collect(),
+            local_gone: 0,
             frame: progress.map(|progress| progress.frame),
             rows_done: progress.map_or(0, |progress| progress.rows_done),
             rows: progress.map_or(0, |progress| progress.rows),
+            wrong_frames: inner.delivered.wrong().count(),
             verification: Some(inner.scheduler.verification())
                 .filter(|verification| verification.percent > 0),
+        }
+    }
+
+    /// How many frames the run has.
+    pub(crate) fn expect_frames(&self, frames: u64) {
+        self.lock().run.frames = Some(frames);
+    }
+
+    /// Sums over the run; `part` of a frame is done beside the complete ones.
+    fn totals(&self, inner: &Inner, part: f64) -> RunTotals {
+        let Run { frames, done, begun, pace } = &inner.run;
+        let (now, bytes) = (self.started.elapsed(), inner.roster.byte_count());
+        let so_far = *done as f64 + part;
+        RunTotals {
+            frames_done: *done,
+            frames: *frames,
+            elapsed: begun.map_or(Duration::ZERO, |begun| now.saturating_sub(begun)),
+            fps: pace.per_second(now, so_far),
+            left: frames.and_then(|frames| pace.left(now, so_far, frames as f64)),
+            sent_bytes: bytes.sent,
+            received_bytes: bytes.received,
+            scene_bytes: bytes.scene,
         }
     }
 
@@ -124,7 +165,7 @@ impl Driver {
             let mut inner = self.lock();
             inner.is_ending = true;
             let farewells = inner.roster.ids().into_iter().map(|worker| {
-                let farewell = inner.roster.end(worker, reason, Return::Unwanted);
+                let farewell = inner.roster.end(worker, reason, Return::NextMaster);
                 self.drive(&mut inner, Event::WorkerLeft { worker });
                 farewell
             });
@@ -135,4 +176,15 @@ impl Driver {
             let _ = farewell.await;
         }
     }
+}
+
+/// What workers wait for that have rendered nothing yet: one that renders has the scene.
+fn transfers(inner: &Inner) -> TransferStatus {
+    let mut status = TransferStatus::default();
+    for record in inner.scheduler.workers().filter(|record| record.segments_done == 0) {
+        if let Some(session) = inner.roster.get(record.worker) {
+            session.transfers.add_to(&mut status);
+        }
+    }
+    status
 }

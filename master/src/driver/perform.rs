@@ -8,7 +8,7 @@ use rayfarm_protocol::{FrameId, ToWorker};
 use super::{Driver, Inner, Requested};
 use crate::farm::{FarmError, FinishedFrame};
 use crate::roster::Unreachable;
-use crate::scheduler::{Action, Cost, Event, WorkerId};
+use crate::scheduler::{Action, Cost, Event, Return, WorkerId};
 
 impl Driver {
     /// Performs an action; what comes of it at once goes to `events`.
@@ -52,7 +52,11 @@ impl Driver {
             Action::Ping { worker, nonce } => events.extend(send(inner, worker, ToWorker::Ping { nonce })),
             Action::Drain { worker } => events.extend(send(inner, worker, ToWorker::Drain)),
             Action::Dismiss { worker, reason, again } => {
-                inner.roster.log_dismissal(worker, &reason);
+                match again {
+                    // It was drained, as its user or the master's wanted.
+                    Return::Unwanted => inner.roster.log_departure(worker, &reason),
+                    Return::Welcome | Return::NextMaster => inner.roster.log_dismissal(worker, &reason),
+                }
                 inner.roster.end(worker, &reason, again);
             }
             Action::Seal { worker, lease } => self.seal(inner, worker, lease),
@@ -69,11 +73,16 @@ impl Driver {
     }
 
     fn frame_done(&self, inner: &mut Inner, frame: FrameId, cost: Cost, elapsed: Duration) {
+        if inner.scheduler.verification().percent > 0 {
+            inner.delivered.add(frame, self.framebuffers.workers(frame));
+        }
         let picture = inner.views.remove(&frame).zip(self.framebuffers.finish(frame));
         let Some((Requested { view, at, .. }, pixels)) = picture else {
             debug_assert!(false, "frame {frame} was done without all of its pixels");
             return;
         };
+        inner.run.done += 1;
+        inner.run.pace.note(self.started.elapsed(), inner.run.done as f64);
         let now = inner.roster.byte_count();
         let bytes = now.since(std::mem::replace(&mut inner.counted, now));
         let finished = FinishedFrame {

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use rayfarm_protocol::{FrameId, Lease, PixelsHeader};
 
 use super::{Driver, Inner, Requested};
+use crate::delivered::as_text;
 use crate::framebuffer::{Misfit, digest};
 use crate::judge::Case;
 use crate::scheduler::{Event, Finding, Return, Verdict, WorkerId};
@@ -35,13 +36,9 @@ impl Driver {
     }
 
     /// Has the master trace sealed rows. Those that were never sealed are nobody's fault.
-    pub(super) fn judge(&self, inner: &mut Inner, frame: FrameId, segment: u32) -> Option<Event> {
+    pub(super) fn judge(&self, inner: &Inner, frame: FrameId, segment: u32) -> Option<Event> {
         let acquitted = Event::SegmentJudged { frame, segment, verdict: Verdict::default() };
         let Some(seal) = inner.seals.get(frame, segment) else { return Some(acquitted) };
-        if seal.checker.is_none() && !std::mem::replace(&mut inner.alone, true) {
-            let painter = seal.painter.worker;
-            tracing::info!("{painter} has nobody to verify it: the master does, one segment at a time");
-        }
         let (painter, checker) = (seal.painter.hash, seal.checker.map(|checker| checker.hash));
         let Lease { first_row, row_count, .. } = seal.lease;
         let rows = first_row..first_row.saturating_add(row_count);
@@ -50,7 +47,8 @@ impl Driver {
         self.court.send(case).is_err().then_some(acquitted)
     }
 
-    /// Sends a worker away for good. What it has put into pictures that nobody has seen yet is rendered again.
+    /// Sends a worker away for good. What it has put into pictures that are not complete is rendered again; complete
+    /// ones with its rows are wrong from now on.
     pub(super) fn expel(
         &self,
         inner: &mut Inner,
@@ -61,6 +59,11 @@ impl Driver {
         inner.roster.bar(worker);
         inner.roster.log_dismissal(worker, reason);
         inner.roster.end(worker, reason, Return::Unwanted);
+        let wrong = inner.delivered.accuse(worker);
+        if wrong.count() > 0 {
+            let (count, frames) = (wrong.count(), as_text(wrong.runs()));
+            tracing::error!("{count} complete frames have rows of {worker} and may be wrong: {frames}");
+        }
         for (frame, rows) in self.framebuffers.reject(worker) {
             let row_count = rows.end - rows.start;
             events.push_back(Event::RowsRejected { frame, first_row: rows.start, row_count });

@@ -27,6 +27,9 @@ pub enum FarmError {
     /// The scene cannot be sent to workers.
     #[error(transparent)]
     Assets(#[from] AssetError),
+    /// Segments are to be verified, and nothing draws which: workers could foresee them.
+    #[error("cannot draw which segments to verify: {0}; run without --verify")]
+    Random(String),
     /// A frame was requested that cannot be rendered.
     #[error("this frame cannot be rendered: {0}")]
     View(#[source] ValidateError),

@@ -119,6 +119,8 @@ pub enum Action {
 pub enum Return {
     /// It is this session that has failed: a worker that was suspended is welcome when it wakes.
     Welcome,
-    /// It was meant to leave, or the farm itself ends: it need not try again.
+    /// It was meant to leave: it need not try again.
     Unwanted,
+    /// The farm itself ends: it may wait for the next one.
+    NextMaster,
 }

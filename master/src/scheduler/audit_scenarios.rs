@@ -13,7 +13,7 @@ fn finished_segments_are_rendered_again_by_somebody_else_while_the_picture_does_
         8 verified 1 1.3 same
         9 verified 2 1.2 same";
     expect(
-        "static:10, verify 100",
+        "static:10, verify 100 1",
         script,
         "
         > 0 join 1 1
@@ -55,7 +55,7 @@ fn who_lies_is_expelled_and_its_rows_in_flight_are_rendered_again() {
         9 done 2 1.0
         9 done 2 1.2";
     expect(
-        "static:10, verify 100",
+        "static:10, verify 100 1",
         script,
         "
         > 0 join 1 1
@@ -102,7 +102,7 @@ fn what_a_lost_worker_was_to_verify_goes_to_another() {
         8 done 3 1.1
         9 verified 3 1.3 same";
     expect(
-        "static:10, verify 100",
+        "static:10, verify 100 1",
         script,
         "
         > 0 join 1 1
@@ -141,7 +141,7 @@ fn a_lone_worker_is_verified_by_the_master() {
         7 judged 1.2 right right
         8 judged 1.3 right right";
     expect(
-        "static:10, verify 100",
+        "static:10, verify 100 1",
         script,
         "
         > 0 join 1 1
@@ -165,7 +165,7 @@ fn a_lone_worker_is_verified_by_the_master() {
 }
 
 #[test]
-fn audits_that_nobody_comes_to_are_given_up_two_frames_later() {
+fn what_the_master_has_not_come_to_waits_for_it() {
     let script = "
         0 join 1 1
         0 join 2 1
@@ -175,9 +175,10 @@ fn audits_that_nobody_comes_to_are_given_up_two_frames_later() {
         5 frame 2 10x10
         6 done 1 2.0
         6 frame 3 10x10
-        7 done 1 3.0";
+        7 done 1 3.0
+        8 judged 1.1 right right";
     expect(
-        "static:10, verify 100",
+        "static:10, verify 100 1",
         script,
         "
         > 0 join 1 1
@@ -207,8 +208,134 @@ fn audits_that_nobody_comes_to_are_given_up_two_frames_later() {
         1: render 3.0, rows 0+10
         > 7 done 1 3.0
         seal 3.1, rows 0+10 of 1
+        finished 3 after 1 ms, 1 rays
+        > 8 judged 1.1 right right
+        unseal 1.1
+        judge 2.1",
+    );
+}
+
+#[test]
+fn audits_that_a_worker_does_not_come_to_are_given_up_two_frames_later() {
+    let script = "
+        0 join 1 1
+        0 join 2 1
+        0 frame 1 10x10
+        5 done 1 1.0
+        5 frame 2 10x10
+        6 done 1 2.0
+        6 frame 3 10x10
+        7 done 1 3.0";
+    expect(
+        "static:10, verify 100 1",
+        script,
+        "
+        > 0 join 1 1
+        > 0 join 2 1
+        > 0 frame 1 10x10
+        begin 1
+        1: frame 1
+        1: render 1.0, rows 0+10
+        2: frame 1
+        2: render 1.0 (attempt 1), rows 0+10
+        > 5 done 1 1.0
+        seal 1.1, rows 0+10 of 1
+        2: cancel before 2
+        finished 1 after 5 ms, 1 rays
+        2: frame 1
+        2: verify 1.1, rows 0+10
+        > 5 frame 2 10x10
+        begin 2
+        1: frame 2
+        1: render 2.0, rows 0+10
+        > 6 done 1 2.0
+        seal 2.1, rows 0+10 of 1
+        finished 2 after 1 ms, 1 rays
+        2: frame 2
+        2: verify 2.1, rows 0+10
+        > 6 frame 3 10x10
+        begin 3
+        1: frame 3
+        1: render 3.0, rows 0+10
+        > 7 done 1 3.0
+        seal 3.1, rows 0+10 of 1
         unseal 1.1
         finished 3 after 1 ms, 1 rays
-        judge 2.1",
+        2: frame 3
+        2: verify 3.1, rows 0+10",
+    );
+}
+
+#[test]
+fn a_worker_of_another_host_renders_the_second_time() {
+    let script = "
+        0 join 1 1 7
+        0 join 2 1 7
+        0 join 3 1 8
+        0 frame 1 10x30
+        5 done 1 1.0
+        6 done 2 1.1
+        7 done 3 1.2";
+    expect(
+        "static:10, verify 100 1",
+        script,
+        "
+        > 0 join 1 1 7
+        > 0 join 2 1 7
+        > 0 join 3 1 8
+        > 0 frame 1 10x30
+        begin 1
+        1: frame 1
+        1: render 1.0, rows 0+10
+        2: frame 1
+        2: render 1.1, rows 10+10
+        3: frame 1
+        3: render 1.2, rows 20+10
+        > 5 done 1 1.0
+        seal 1.3, rows 0+10 of 1
+        1: render 1.1 (attempt 1), rows 10+10
+        3: verify 1.3, rows 0+10
+        > 6 done 2 1.1
+        seal 1.4, rows 10+10 of 2
+        2: render 1.2 (attempt 1), rows 20+10
+        > 7 done 3 1.2
+        seal 1.5, rows 20+10 of 3
+        1: cancel before 2
+        2: cancel before 2
+        finished 1 after 7 ms, 3 rays
+        1: frame 1
+        1: verify 1.5, rows 20+10
+        3: verify 1.4, rows 10+10",
+    );
+}
+
+#[test]
+fn what_a_worker_cannot_render_again_the_master_does() {
+    let script = "
+        0 join 1 1
+        0 join 2 1
+        0 frame 1 10x10
+        5 done 1 1.0
+        6 fail 2 1";
+    expect(
+        "static:10, verify 100 1",
+        script,
+        "
+        > 0 join 1 1
+        > 0 join 2 1
+        > 0 frame 1 10x10
+        begin 1
+        1: frame 1
+        1: render 1.0, rows 0+10
+        2: frame 1
+        2: render 1.0 (attempt 1), rows 0+10
+        > 5 done 1 1.0
+        seal 1.1, rows 0+10 of 1
+        2: cancel before 2
+        finished 1 after 5 ms, 1 rays
+        2: frame 1
+        2: verify 1.1, rows 0+10
+        > 6 fail 2 1
+        judge 1.1",
     );
 }

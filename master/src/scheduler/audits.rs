@@ -1,22 +1,26 @@
-//! Verifying what workers send: a share of the finished segments is rendered again by another worker, and compared.
+//! Verifying what workers send: a share of the finished segments is rendered again, and compared.
 //!
-//! Which segments are verified follows from the numbers of frame and segment, so nobody can choose. The pictures do not
+//! Which segments are verified is drawn with a secret of the run when their pixels are here, so no worker can know it
+//! while it renders; by whom is drawn as well, see [`second`](super::second). The pictures do not
 //! wait: a segment is in its picture at once. Its *audit* comes after the rows of the oldest frame and before those of the
 //! next one. Where workers are always busy that would never be, so what is left over from frames that are complete comes
-//! first, one audit at a time for each worker. An audit that has not ended two complete frames later is given up.
+//! first, one audit at a time for each worker. An audit that a worker has not ended two complete frames later is given up.
 //!
 //! Whether two renderings are the same is the shell's to say: it keeps a hash of the first one. Where they differ, the
 //! master traces the rows itself, and whoever sent others is expelled. A majority of workers would be cheaper to ask, and
-//! could be wrong: two machines with the same fault agree. Where there is nobody to ask, the master traces one segment at a
-//! time, as far as it gets.
+//! could be wrong: two machines with the same fault agree. What was drawn for the master, or has no other worker, it traces
+//! one segment at a time, as far as it gets, in an order that follows from the secret too.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 use std::time::Duration;
 
 use super::adaptive::Crew;
 use super::assign::Load;
-use super::worker::{Service, Worker};
-use super::{Action, Cost, FrameId, Lease, Scheduler, WorkerId};
+use super::lots::Lots;
+use super::second::{MAX_FOR_MASTER, Second};
+use super::worker::Worker;
+use super::{Action, Cost, FrameId, HostId, Lease, Scheduler, WorkerId};
 
 /// Audits that are open at a time; what would be picked beyond that is not.
 pub(super) const MAX_AUDITS: usize = 1024;
@@ -68,26 +72,37 @@ pub(super) struct Audit {
     /// Its rows, under a number of their own; the attempt is that of the next lease.
     pub(super) lease: Lease,
     load: Load,
-    /// Who rendered them for the picture.
+    /// Who rendered them for the picture, and where.
     pub(super) painter: WorkerId,
+    pub(super) host: HostId,
+    /// Its place in the master's queue: the lowest comes first.
+    lot: u64,
     pub(super) stage: Stage,
 }
 
 /// How far an audit is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
-    /// Somebody has to render it again.
-    Waiting,
+    /// This one has to render it again.
+    Waiting(Second),
     /// This worker does.
     Leased(WorkerId),
-    /// The master does, because this one's bytes differ, or because nobody else is there.
+    /// The master does, because this worker's bytes differ, or because it was drawn.
     Judged(Option<WorkerId>),
+}
+
+impl Stage {
+    /// Whether the audit is the master's to end.
+    pub(super) fn is_masters(self) -> bool {
+        matches!(self, Self::Judged(_) | Self::Waiting(Second::Master))
+    }
 }
 
 /// All audits.
 #[derive(Debug, Default)]
 pub(super) struct Audits {
     pub(super) counts: Verification,
+    pub(super) lots: Lots,
     pub(super) open: BTreeMap<(FrameId, u32), Audit>,
     /// The newest complete frames, oldest first.
     complete: VecDeque<FrameId>,
@@ -96,24 +111,36 @@ pub(super) struct Audits {
 }
 
 impl Audits {
-    /// Whether a segment is to be verified: (frame, segment) through the finaliser of splitmix64, as evenly as chance.
-    fn picks(&self, lease: &Lease) -> bool {
-        let mut z = (lease.frame.0 << 20) ^ u64::from(lease.segment) ^ 0x9e37_79b9_7f4a_7c15;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % 100 < u64::from(self.counts.percent) && self.open.len() < MAX_AUDITS
+    /// Whether a segment is to be verified.
+    fn picks(&mut self) -> bool {
+        self.lots.hits(self.counts.percent) && self.open.len() < MAX_AUDITS
+    }
+
+    /// Audits that are the master's, and of which none has begun.
+    pub(super) fn waiting_for_master(&self) -> usize {
+        self.open.values().filter(|audit| audit.stage == Stage::Waiting(Second::Master)).count()
     }
 
     fn is_judging_alone(&self) -> bool {
         self.open.values().any(|audit| audit.stage == Stage::Judged(None))
     }
+
+    /// The key of the audit with the lowest lot, or the highest, of those that wait for the master.
+    fn of_master(&self, highest: bool) -> Option<(FrameId, u32)> {
+        let waiting = self.open.iter().filter(|(_, audit)| audit.stage == Stage::Waiting(Second::Master));
+        let lots = waiting.map(|(&key, audit)| (audit.lot, key));
+        let found = if highest { lots.max() } else { lots.min() };
+        found.map(|(_, key)| key)
+    }
 }
 
 impl Scheduler {
-    /// Verifies so many per cent of the segments; none unless this is called.
+    /// Verifies that percentage of the segments; none unless this is called. Which ones, and by whom, follows from
+    /// `secret`: a worker that does not know it cannot tell.
     #[must_use]
-    pub fn with_verification(mut self, percent: u8) -> Self {
+    pub fn with_verification(mut self, percent: u8, secret: [u8; 32]) -> Self {
         self.audits.counts.percent = percent.min(100);
+        self.audits.lots = Lots::new(secret);
         self
     }
 
@@ -122,18 +149,24 @@ impl Scheduler {
         Verification { open: self.audits.open.len() as u64, ..self.audits.counts }
     }
 
-    /// A worker has rendered all rows of a lease for the picture: perhaps they are to be verified.
-    pub(super) fn pick(&mut self, worker: WorkerId, lease: &Lease) {
-        if !self.audits.picks(lease) {
-            return;
+    /// A worker has rendered rows for the picture, each of these runs as the first: perhaps some are to be verified.
+    pub(super) fn pick(&mut self, painter: WorkerId, lease: &Lease, fresh: Vec<Range<u32>>) {
+        let Some(host) = self.workers.get(&painter).map(|worker| worker.host) else { return };
+        for rows in fresh {
+            if !self.audits.picks() {
+                continue;
+            }
+            let stage = Stage::Waiting(self.draw_second(painter, host, None));
+            let lot = self.audits.lots.draw();
+            let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
+            let load = Load::of(&frame.forecast, rows.clone());
+            let (first_row, row_count) = (rows.start, rows.end - rows.start);
+            let lease = Lease { segment: frame.next_number(), attempt: 0, first_row, row_count, ..*lease };
+            let audit = Audit { lease, load, painter, host, lot, stage };
+            self.audits.open.insert((lease.frame, lease.segment), audit);
+            self.audits.counts.picked += 1;
+            self.actions.push_back(Action::Seal { worker: painter, lease });
         }
-        let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
-        let load = Load::of(&frame.forecast, lease.first_row..lease.first_row + lease.row_count);
-        let lease = Lease { segment: frame.next_number(), attempt: 0, ..*lease };
-        let audit = Audit { lease, load, painter: worker, stage: Stage::Waiting };
-        self.audits.open.insert((lease.frame, lease.segment), audit);
-        self.audits.counts.picked += 1;
-        self.actions.push_back(Action::Seal { worker, lease });
     }
 
     /// Leases what is left to verify of frames that are complete, if the worker verifies nothing yet.
@@ -155,8 +188,8 @@ impl Scheduler {
         crew: Option<&mut Crew>,
         before: FrameId,
     ) -> bool {
-        let able = |audit: &&mut Audit| audit.stage == Stage::Waiting && audit.painter != id;
-        let some = self.audits.open.range_mut(..(before, 0)).map(|(_, audit)| audit).find(able);
+        let its = |audit: &&mut Audit| audit.stage == Stage::Waiting(Second::Worker(id));
+        let some = self.audits.open.range_mut(..(before, 0)).map(|(_, audit)| audit).find(its);
         let Some(audit) = some else { return false };
         audit.stage = Stage::Leased(id);
         let (lease, load) = (audit.lease, audit.load);
@@ -165,20 +198,19 @@ impl Scheduler {
         true
     }
 
-    /// Where nobody but its painter could verify a segment, the master does, one at a time.
-    pub(super) fn judge_alone(&mut self) {
-        if self.audits.open.is_empty() || self.audits.is_judging_alone() {
-            return;
-        }
-        let mut active = self.workers.iter().filter(|(_, worker)| worker.service == Service::Active);
-        let (first, second) = (active.next().map(|(&id, _)| id), active.next());
-        if second.is_some() {
-            return;
-        }
-        let alone = |audit: &&mut Audit| audit.stage == Stage::Waiting && Some(audit.painter) == first;
-        if let Some(audit) = self.audits.open.values_mut().find(alone) {
+    /// Has the master trace the next segment that is its own to verify, one at a time, and bounds how many of them wait.
+    pub(super) fn judge_next(&mut self) {
+        if !self.audits.is_judging_alone()
+            && let Some(key) = self.audits.of_master(false)
+            && let Some(audit) = self.audits.open.get_mut(&key)
+        {
             audit.stage = Stage::Judged(None);
             self.actions.push_back(Action::Judge { frame: audit.lease.frame, segment: audit.lease.segment });
+        }
+        while self.audits.waiting_for_master() > MAX_FOR_MASTER
+            && let Some(key) = self.audits.of_master(true)
+        {
+            self.close_audit(key);
         }
     }
 
@@ -245,28 +277,27 @@ impl Scheduler {
         }
     }
 
-    /// A lease of an audit was taken from a worker: somebody else may have it.
-    pub(super) fn reopen_audit(&mut self, id: WorkerId, key: (FrameId, u32)) {
-        if let Some(audit) = self.audits.open.get_mut(&key).filter(|a| a.stage == Stage::Leased(id)) {
-            audit.stage = Stage::Waiting;
-        }
-    }
-
-    /// A frame is complete: audits of frames that are too old by now are given up. Where two renderings differ they are not:
-    /// somebody has lied, and how long the master takes to see who must not save him.
+    /// A frame is complete: audits of frames that are too old by now are given up. The master's are not: how long it takes
+    /// must save no worker that has sent wrong pixels.
     pub(super) fn outlive_audits(&mut self, frame: FrameId) {
         self.audits.complete.push_back(frame);
         if self.audits.complete.len() > TRAILING_FRAMES {
             self.audits.complete.pop_front();
         }
         let oldest = self.audits.complete.front().copied().unwrap_or(frame);
-        let is_judged = |audit: &Audit| matches!(audit.stage, Stage::Judged(Some(_)));
-        self.forget_audits(|audit| audit.lease.frame < oldest && !is_judged(audit));
+        self.forget_audits(|audit| audit.lease.frame < oldest && !audit.stage.is_masters());
     }
 
-    /// A worker says that it cannot render a frame which is complete: what it was to verify of it is given up.
+    /// A worker says that it cannot render a frame which is complete: what it was to verify of it, the master does.
     pub(super) fn fail_audits(&mut self, id: WorkerId, frame: FrameId) {
-        self.forget_audits(|audit| audit.lease.frame == frame && audit.stage == Stage::Leased(id));
+        let its = self
+            .audits
+            .open
+            .iter_mut()
+            .filter(|(_, audit)| audit.lease.frame == frame && audit.stage == Stage::Leased(id));
+        let keys: Vec<_> =
+            its.map(|(&key, audit)| (audit.stage = Stage::Waiting(Second::Master), key).1).collect();
+        keys.into_iter().for_each(|key| self.take_audit(Stage::Leased(id), key));
     }
 
     /// Gives up audits.

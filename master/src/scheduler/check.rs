@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::audits::{MAX_AUDITS, Stage, TRAILING_FRAMES};
 use super::frame::Frame;
 use super::policy::{MAX_WINDOW, SEED_WINDOW};
+use super::second::{MAX_FOR_MASTER, Second};
 use super::{Scheduler, SegmentPolicy};
 
 /// The first invariant that does not hold, in words:
@@ -104,13 +105,20 @@ fn leases_are_known(scheduler: &Scheduler) -> Option<String> {
 
 fn audits_are_in_order(scheduler: &Scheduler) -> Option<String> {
     let audits = &scheduler.audits;
-    // The master may take its time where two renderings differ.
-    let trailing = audits.open.iter().filter(|(_, audit)| !matches!(audit.stage, Stage::Judged(Some(_))));
+    // The master may take its time.
+    let trailing = audits.open.iter().filter(|(_, audit)| !audit.stage.is_masters());
     let frames: BTreeSet<_> = trailing.map(|((frame, _), _)| frame).collect();
     if audits.open.len() > MAX_AUDITS || frames.len() > scheduler.max_frames() + TRAILING_FRAMES {
         return Some(format!("{} audits of {} frames are open", audits.open.len(), frames.len()));
     }
+    if audits.waiting_for_master() > MAX_FOR_MASTER {
+        return Some(format!("{} audits wait for the master", audits.waiting_for_master()));
+    }
     audits.open.iter().find_map(|(&(frame, number), audit)| {
+        if let Stage::Waiting(Second::Worker(second)) = audit.stage {
+            let able = second != audit.painter && scheduler.workers.contains_key(&second);
+            return (!able).then(|| format!("{frame:?} audit {number} waits for {second}, which cannot"));
+        }
         let Stage::Leased(holder) = audit.stage else { return None };
         let worker = scheduler.workers.get(&holder);
         let holds = worker.is_some_and(|worker| worker.leases.contains_key(&(frame, number)));

@@ -14,6 +14,11 @@ impl fmt::Display for WorkerId {
     }
 }
 
+/// The machine on which a worker runs, as far as the shell can tell. Workers of one machine do not vouch for each other
+/// where a worker of another one can.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct HostId(pub u128);
+
 /// What the shell reports. Events of unknown workers and of frames that are over are ignored, so the shell need
 /// not know what has become of either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +45,8 @@ pub enum Event {
         worker: WorkerId,
         /// Its render threads: a first guess at its speed.
         threads: u32,
+        /// Where it runs.
+        host: HostId,
     },
     /// A session is over, for whatever reason.
     WorkerLeft {

@@ -158,11 +158,11 @@ impl Frame {
         Some(Lease { frame: self.id, segment: number, attempt, first_row, row_count })
     }
 
-    /// Marks the rows of a lease done; how many of them were not. Every row's cost is counted once.
+    /// Marks the rows of a lease done; which of them were not, as runs. Every row's cost is counted once.
     ///
     /// The lease may have been taken back as overdue, and its rows be queued again or leased to others in pieces: each
     /// of these pieces lies within it.
-    pub(super) fn finish(&mut self, lease: &Lease, cost: Cost) -> u32 {
+    pub(super) fn finish(&mut self, lease: &Lease, cost: Cost) -> Vec<Range<u32>> {
         let rows = lease.first_row..lease.first_row.saturating_add(lease.row_count);
         let within = |first: u32, count: u32| rows.start <= first && first + count <= rows.end;
         for index in (0..self.queue.len()).rev() {
@@ -170,15 +170,23 @@ impl Frame {
                 self.settle(index);
             }
         }
-        let mut fresh = 0;
+        let mut fresh = Vec::new();
         for segment in self.segments.values_mut().filter(|s| !s.done && within(s.first, s.count)) {
             segment.done = true;
             segment.holders.clear();
             segment.cost = share(cost, segment.count, lease.row_count);
-            fresh += segment.count;
+            self.rows_done += segment.count;
+            fresh.push(segment.first..segment.first + segment.count);
         }
-        self.rows_done += fresh;
         self.refusals.clear();
+        fresh.sort_unstable_by_key(|rows| rows.start);
+        fresh.dedup_by(|next, run| {
+            let adjoins = run.end == next.start;
+            if adjoins {
+                run.end = next.end;
+            }
+            adjoins
+        });
         fresh
     }
 

@@ -29,6 +29,7 @@ impl Scheduler {
                 frame.give_up(segment, id);
             }
         }
+        self.draw_anew(id);
     }
 
     /// Sends away who answers pings but has long given nothing of what it owes.

@@ -19,9 +19,11 @@ mod forecast;
 mod frame;
 mod held;
 mod lapses;
+mod lots;
 mod motion;
 pub mod policy;
 mod record;
+mod second;
 mod speed;
 mod worker;
 
@@ -38,7 +40,7 @@ mod transcript;
 
 pub use action::{Action, Return};
 pub use audits::{Finding, Verdict, Verification};
-pub use event::{Event, WorkerId};
+pub use event::{Event, HostId, WorkerId};
 pub use policy::SegmentPolicy;
 pub use rayfarm_protocol::{Cost, FrameId, Lease};
 pub use record::{Progress, WorkerRecord, WorkerState};
@@ -161,9 +163,9 @@ impl Scheduler {
                 self.request(Request { frame, width, height, tile_rows });
             }
             Event::RequestsGivenUp { next } => self.give_up(next),
-            Event::WorkerJoined { worker, threads } => {
+            Event::WorkerJoined { worker, threads, host } => {
                 self.lose(worker);
-                self.workers.insert(worker, Worker::new(threads, now));
+                self.workers.insert(worker, Worker::new(threads, host, now));
             }
             Event::WorkerLeft { worker } => self.lose(worker),
             Event::WorkerDrains { worker } => self.serve(worker, Service::Draining),
@@ -189,7 +191,7 @@ impl Scheduler {
         self.take_overdue(now);
         self.fail_frames();
         self.complete_frames();
-        self.judge_alone();
+        self.judge_next();
         self.assign(now);
         self.dismiss_drained();
         debug_assert_eq!(check::violated(self), None);
@@ -214,13 +216,11 @@ impl Scheduler {
     fn segment_done(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) {
         let Some(work) = self.finish(now, id, lease, cost) else { return };
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
-        let fresh_rows = frame.finish(&lease, cost);
-        if let Some(work) = work.filter(|_| fresh_rows > 0) {
+        let fresh = frame.finish(&lease, cost);
+        if let Some(work) = work.filter(|_| !fresh.is_empty()) {
             frame.forecast.learn(lease.first_row..lease.first_row + lease.row_count, work);
         }
-        if fresh_rows == lease.row_count {
-            self.pick(id, &lease);
-        }
+        self.pick(id, &lease, fresh);
     }
 
     /// Takes a lease off a worker that has answered it, if it held it; the work that it turned out to be, if that can be
@@ -237,8 +237,12 @@ impl Scheduler {
 
     /// Changes whether a worker gets leases. One that drains goes on draining: it has been told already.
     fn serve(&mut self, id: WorkerId, service: Service) {
-        if let Some(worker) = self.workers.get_mut(&id).filter(|w| w.service != Service::Draining) {
-            worker.service = service;
+        let Some(worker) = self.workers.get_mut(&id).filter(|w| w.service != Service::Draining) else {
+            return;
+        };
+        worker.service = service;
+        if service != Service::Active {
+            self.draw_anew(id);
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::{Action, Cost, Event, FrameId, Lease, Scheduler, SegmentPolicy, WorkerId};
+use super::{Action, Cost, Event, FrameId, HostId, Lease, Scheduler, SegmentPolicy, WorkerId};
 
 #[test]
 fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
@@ -13,11 +13,15 @@ fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
     assert!(last[1] > 2 * last[0], "rows of the worker and of one four times as fast, by frame: {rows:?}");
 }
 
+fn joined(worker: u64) -> Event {
+    Event::WorkerJoined { worker: WorkerId(worker), threads: 1, host: HostId(worker.into()) }
+}
+
 /// Renders frames of 512 rows with two workers whose speeds, in rows a millisecond, are given. Returns the rows
 /// that each did, by frame.
 fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u32; 2]> {
     for worker in [0, 1] {
-        scheduler.handle(Duration::ZERO, Event::WorkerJoined { worker: WorkerId(worker), threads: 1 });
+        scheduler.handle(Duration::ZERO, joined(worker));
     }
     let mut now_us = 0;
     let mut rows = Vec::new();
@@ -62,7 +66,7 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
 fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
     for policy in ["static:1000", "smart:1000", "adaptive"] {
         let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000);
-        scheduler.handle(Duration::ZERO, Event::WorkerJoined { worker: WorkerId(1), threads: 1 });
+        scheduler.handle(Duration::ZERO, joined(1));
         let request = Event::FrameRequested { frame: FrameId(1), width: 300, height: 100, tile_rows: 16 };
         scheduler.handle(Duration::ZERO, request);
         while let Some(action) = scheduler.poll_action() {

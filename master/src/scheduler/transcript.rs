@@ -1,21 +1,22 @@
 //! Scripts and transcripts: what is told to the scheduler (`>`), and exactly what it answers.
 //!
-//! A line of a script is `MILLISECONDS COMMAND`: `frame N WxH`, `join W THREADS`, `leave W`, `drain W`,
+//! A line of a script is `MILLISECONDS COMMAND`: `frame N WxH`, `join W THREADS [HOST]` (without it, a host of its own), `leave W`, `drain W`,
 //! `retire W` (the user wants it to drain), `pause W`, `resume W`, `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`,
 //! `verified W FRAME.SEGMENT same|different`, `judged FRAME.SEGMENT right|wrong right|wrong` (painter, checker),
-//! `reject FRAME FIRST+ROWS`. After the policy, `, verify PERCENT` may stand.
+//! `reject FRAME FIRST+ROWS`. After the policy, `, verify PERCENT SEED` may stand.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use super::{Action, Cost, Event, Finding, FrameId, Lease, Return, Scheduler, Verdict, WorkerId};
+use super::{Action, Cost, Event, Finding, FrameId, HostId, Lease, Return, Scheduler, Verdict, WorkerId};
 
 /// Runs a script and writes the transcript.
 pub(super) fn transcript(policy: &str, script: &str) -> String {
-    let (policy, percent) = policy.split_once(", verify ").unwrap_or((policy, "0"));
+    let (policy, verify) = policy.split_once(", verify ").unwrap_or((policy, "0 0"));
+    let (percent, seed) = verify.split_once(' ').unwrap();
     let scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20);
-    let mut scheduler = scheduler.with_verification(percent.parse().unwrap());
+    let mut scheduler = scheduler.with_verification(percent.parse().unwrap(), [seed.parse().unwrap(); 32]);
     let mut granted = BTreeMap::new();
     let mut log = String::new();
     for line in script.lines().map(str::trim).filter(|line| !line.is_empty()) {
@@ -44,7 +45,14 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height, tile_rows: 8 }
         }
         ["give-up", next] => Event::RequestsGivenUp { next: FrameId(number(next)) },
-        ["join", _, threads] => Event::WorkerJoined { worker, threads: number(threads) as u32 },
+        ["join", _, threads] => {
+            let host = HostId(1000 + u128::from(worker.0));
+            Event::WorkerJoined { worker, threads: number(threads) as u32, host }
+        }
+        ["join", _, threads, host] => {
+            let host = HostId(number(host).into());
+            Event::WorkerJoined { worker, threads: number(threads) as u32, host }
+        }
         ["leave", _] => Event::WorkerLeft { worker },
         ["drain", _] => Event::WorkerDrains { worker },
         ["retire", _] => Event::DrainRequested { worker },
@@ -106,6 +114,9 @@ fn spoken(action: &Action) -> String {
         Action::Ping { worker, nonce } => format!("{}: ping {nonce}", worker.0),
         Action::Dismiss { worker, reason, again: Return::Welcome } => {
             format!("{}: goodbye, {reason}", worker.0)
+        }
+        Action::Dismiss { worker, reason, again: Return::NextMaster } => {
+            format!("{}: goodbye until the next master, {reason}", worker.0)
         }
         Action::Dismiss { worker, reason, again: Return::Unwanted } => {
             format!("{}: goodbye for good, {reason}", worker.0)

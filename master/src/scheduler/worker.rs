@@ -7,7 +7,7 @@ use super::assign::MAX_FRAMES;
 use super::audits::TRAILING_FRAMES;
 use super::held::Held;
 use super::speed::{Observation, Speed};
-use super::{Cost, FrameId, Lease};
+use super::{Cost, FrameId, HostId, Lease};
 
 /// A worker is asked for a sign of life this often.
 pub(super) const PING_EVERY: Duration = Duration::from_secs(2);
@@ -48,6 +48,7 @@ pub(super) enum Service {
 #[derive(Debug)]
 pub(super) struct Worker {
     pub(super) threads: u32,
+    pub(super) host: HostId,
     pub(super) leases: BTreeMap<(FrameId, u32), Held>,
     /// Leases that were taken from it because they were overdue: its answer is still welcome.
     pub(super) owed: BTreeMap<(FrameId, u32), Held>,
@@ -75,9 +76,10 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    pub(super) fn new(threads: u32, now: Duration) -> Self {
+    pub(super) fn new(threads: u32, host: HostId, now: Duration) -> Self {
         Self {
             threads: threads.max(1),
+            host,
             leases: BTreeMap::new(),
             owed: BTreeMap::new(),
             stale: false,

@@ -12,6 +12,7 @@ mod clock;
 mod costs;
 mod dice;
 mod faults;
+mod lies;
 mod link;
 mod machine;
 mod passing;
@@ -29,6 +30,7 @@ mod tests;
 pub use costs::CostProfile;
 #[cfg(test)]
 pub(crate) use dice::Dice;
+pub use lies::Lie;
 pub use passing::{Passed, PassingSetup, pass};
 pub use survival::{Schedule, Survivor, survive};
 pub use tally::Measured;
@@ -79,8 +81,12 @@ pub struct Setup {
     pub input_rate: f64,
     /// The share of the segments that is verified, in per cent.
     pub verify_percent: u8,
-    /// Workers of which half of what they send is wrong: the first to join.
+    /// Workers that send wrong pixels: the first to join.
     pub liars: u32,
+    /// How they lie.
+    pub lie: Lie,
+    /// Workers that share one machine: the first to join. Each of the others has its own.
+    pub neighbours: u32,
     /// Frames measured, after some that are not.
     pub frames: u64,
     /// What everything random follows from.
@@ -111,6 +117,8 @@ impl Default for Setup {
             input_rate: 0.0,
             verify_percent: 0,
             liars: 0,
+            lie: Lie::Half,
+            neighbours: 0,
             frames: 30,
             seed: 1,
         }

@@ -80,8 +80,7 @@ impl World {
     /// A finished lease goes to the master; where faults happen, now and then late, twice or wrong.
     fn deliver(&mut self, id: WorkerId, lease: Lease, cost: Cost) {
         let fits = !(self.faults && self.dice.one_in(500));
-        let lies = self.shell.liars.contains(&id) && self.dice.one_in(2);
-        let content = if lies { 1 + self.dice.roll(1 << 32) } else { 0 };
+        let content = self.content(id, &lease);
         self.say(id, Up::Pixels { lease, cost, fits, content });
         if self.faults && self.dice.one_in(300) {
             self.say(id, Up::Pixels { lease, cost, fits, content });

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::lies::Lie;
 use super::pictures::Picture;
 use crate::lease_book::{LeaseBook, Standing};
 use crate::scheduler::{Event, Finding, FrameId, Lease, Verdict, WorkerId};
@@ -15,7 +16,7 @@ pub(crate) struct Shell {
     pictures: BTreeMap<FrameId, Picture>,
     seals: BTreeMap<(FrameId, u32), Seal>,
     /// Workers that send wrong pixels, and those that were sent away for it.
-    pub(crate) liars: BTreeSet<WorkerId>,
+    pub(crate) liars: BTreeMap<WorkerId, Lie>,
     pub(crate) expelled: BTreeSet<WorkerId>,
     /// Frames that have ended, complete or not.
     pub(crate) ended: BTreeSet<FrameId>,
@@ -25,6 +26,7 @@ pub(crate) struct Shell {
 /// What was sent for the picture, and what was sent to verify it.
 #[derive(Debug)]
 struct Seal {
+    worker: WorkerId,
     painter: u64,
     checker: Option<u64>,
 }
@@ -124,7 +126,7 @@ impl Shell {
     pub(crate) fn seal(&mut self, worker: WorkerId, lease: Lease) {
         let picture = self.pictures.get(&lease.frame);
         if let Some(painter) = picture.and_then(|picture| picture.digest(worker, &lease)) {
-            self.seals.insert((lease.frame, lease.segment), Seal { painter, checker: None });
+            self.seals.insert((lease.frame, lease.segment), Seal { worker, painter, checker: None });
         }
     }
 
@@ -141,6 +143,12 @@ impl Shell {
         })
     }
 
+    /// Where a lease is a second rendering: whose the first one was, and what was sent for each row.
+    pub(super) fn sealed_by(&self, lease: &Lease) -> Option<(WorkerId, u64)> {
+        let seal = self.seals.get(&(lease.frame, lease.segment))?;
+        Some((seal.worker, seal.painter / u64::from(lease.row_count.max(1))))
+    }
+
     /// Rows that are sealed.
     pub(crate) fn sealed(&self) -> u64 {
         self.seals.len() as u64
@@ -154,7 +162,7 @@ impl Shell {
             picture.reject(worker).into_iter().map(event)
         };
         let events = self.pictures.iter_mut().flat_map(rejected).collect();
-        let deserved = self.liars.contains(&worker);
+        let deserved = self.liars.contains_key(&worker);
         (events, if deserved { Ok(()) } else { Err(format!("{worker} is expelled and never lied")) })
     }
 

@@ -5,7 +5,7 @@ use super::dice::Dice;
 #[cfg(test)]
 use super::machine::Ailment;
 use super::world::World;
-use super::{CostProfile, SECOND, Setup};
+use super::{CostProfile, Lie, SECOND, Setup};
 use crate::scheduler::{Event, FrameId, SegmentPolicy, WorkerId};
 
 /// Faults happen for this long at most.
@@ -85,7 +85,11 @@ fn any_setup(dice: &mut Dice, seed: u64) -> Setup {
         SegmentPolicy::Smart(rows),
     ];
     let costs = [CostProfile::Flat, CostProfile::Bust, CostProfile::Corner];
+    // Dice of their own: what older seeds are known for stays.
+    let mut lies = Dice::new(seed ^ 0x11e);
     Setup {
+        lie: lies.pick(&[Lie::Half, Lie::Knowing, Lie::Accomplice]).unwrap_or_default(),
+        neighbours: lies.roll(6) as u32,
         workers: dice.roll(12) as u32,
         threads: 1 + dice.roll(8) as u32,
         policy: dice.pick(&policies).unwrap_or_default(),

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::machine::Ailment;
 use super::world::World;
-use super::{CostProfile, SECOND, Schedule, Setup, measure, survive};
+use super::{CostProfile, Lie, SECOND, Schedule, Setup, measure, survive};
 use crate::scheduler::SegmentPolicy;
 
 #[test]
@@ -107,6 +107,61 @@ fn liars_are_found_and_the_picture_is_right_from_then_on() {
             let what = format!("{policy} {workers} workers, {liars} liars: {expelled} expelled");
             assert_eq!((expelled + more, wrong), (u64::from(liars), 0), "{what}");
         }
+    }
+}
+
+/// Workers that were expelled within that number of frames, or with all of them gone.
+fn found(setup: Setup) -> u64 {
+    let (frames, liars) = (setup.frames, u64::from(setup.liars));
+    let mut world = World::new(setup);
+    world.checking = true;
+    world.begin();
+    world.run(1000 * SECOND, |world| world.tally.frames >= frames || world.tally.expelled == liars);
+    // The audits of the last frames end, too.
+    world.requests_more = false;
+    world.run(world.clock.now + 100 * SECOND, |world| {
+        world.tally.expelled == liars || world.scheduler.verification().open == 0
+    });
+    assert_eq!(world.violation, None);
+    world.tally.expelled
+}
+
+/// One in two segments is verified, in 120 pictures, as they were when 62 of them were wrong.
+fn verified(workers: u32, liars: u32, lie: Lie, seed: u64) -> Setup {
+    // Of one speed: what a slow worker sends comes too late to be in a picture under a fixed policy.
+    let base = Setup { frame_seconds: 0.1, size: (64, 64), spread: 1.0, ..Setup::default() };
+    Setup { workers, liars, lie, seed, verify_percent: 50, frames: 120, ..base }
+}
+
+#[test]
+fn who_knows_the_algorithm_and_not_the_secret_is_found() {
+    for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Static(16)] {
+        for seed in 0..20 {
+            let setup = Setup { policy, ..verified(2, 1, Lie::Knowing, seed) };
+            assert_eq!(found(setup), 1, "{policy}, seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn accomplices_are_found_wherever_they_are() {
+    for seed in 0..6 {
+        // At one address, with an independent worker; at addresses of their own, with one and without.
+        for (workers, liars, neighbours) in [(3, 2, 2), (3, 2, 0), (4, 3, 2), (2, 2, 0), (2, 2, 2)] {
+            let setup = Setup { neighbours, ..verified(workers, liars, Lie::Accomplice, seed) };
+            let what = format!("{liars} of {workers} workers, {neighbours} at one address, seed {seed}");
+            assert_eq!(found(setup), u64::from(liars), "{what}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    #[test]
+    fn liars_are_found_whatever_the_secret(seed: u64, liars in 1_u32..4, honest in 0_u32..3, neighbours in 0_u32..7) {
+        let setup = Setup { neighbours, ..verified(liars + honest, liars, Lie::Accomplice, seed) };
+        prop_assert_eq!(found(setup), u64::from(liars));
     }
 }
 

@@ -9,7 +9,7 @@ use super::machine::Machine;
 use super::shell::Shell;
 use super::tally::{Measured, Tally};
 use super::{SECOND, Setup};
-use crate::scheduler::{Action, Event, FrameId, Lease, Scheduler, WorkerId, check};
+use crate::scheduler::{Action, Event, FrameId, HostId, Lease, Scheduler, WorkerId, check};
 
 /// Nobody waits longer for a measurement.
 const PATIENCE: u64 = 3600 * SECOND;
@@ -64,7 +64,7 @@ impl World {
         let scheduler = Scheduler::new(setup.policy, MAX_SEGMENT_BYTES)
             .with_pipeline(setup.pipeline)
             .with_tile_share(setup.tile_share)
-            .with_verification(setup.verify_percent);
+            .with_verification(setup.verify_percent, blake3::hash(&setup.seed.to_le_bytes()).into());
         Self {
             clock: Clock::default(),
             dice: Dice::new(setup.seed),
@@ -136,13 +136,15 @@ impl World {
         if self.last_worker <= u64::from(self.setup.liars) {
             self.corrupt(id);
         }
-        self.tell(Event::WorkerJoined { worker: id, threads: self.setup.threads });
+        let host = if self.last_worker <= u64::from(self.setup.neighbours) { 0 } else { self.last_worker };
+        let threads = self.setup.threads;
+        self.tell(Event::WorkerJoined { worker: id, threads, host: HostId(host.into()) });
         id
     }
 
-    /// From now on, half of what a worker sends is wrong.
+    /// From now on, a worker lies.
     pub(crate) fn corrupt(&mut self, id: WorkerId) {
-        self.shell.liars.insert(id);
+        self.shell.liars.insert(id, self.setup.lie);
     }
 
     /// Workers that have ever joined.

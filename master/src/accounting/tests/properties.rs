@@ -55,7 +55,8 @@ impl Told {
         let now = Duration::from_nanos(ns);
         match *step {
             Step::Join(worker, threads) => {
-                self.accounts.event(now, &Event::WorkerJoined { worker: WorkerId(worker), threads });
+                self.accounts
+                    .event(now, &Event::WorkerJoined { worker: WorkerId(worker), threads, host: HostId(1) });
             }
             Step::Leave(worker) => self.accounts.event(now, &Event::WorkerLeft { worker: WorkerId(worker) }),
             Step::Grant(worker, segment) => {
@@ -117,7 +118,7 @@ proptest! {
     #[test]
     fn every_nanosecond_is_put_down_once(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
         let mut told = Told { accounts: Accounts::default() };
-        told.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(9), threads: 3 });
+        told.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(9), threads: 3, host: HostId(1) });
         let (mut now, mut frame, mut begun, mut settled) = (0, 1, None, 0);
         for (passed, step) in steps {
             now += passed;
@@ -147,7 +148,7 @@ proptest! {
     #[test]
     fn a_busy_workers_parts_sum_to_its_time(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
         let mut told = Told { accounts: Accounts::default() };
-        told.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(1), threads: 3 });
+        told.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(1), threads: 3, host: HostId(1) });
         told.begin(0, 1);
         let (mut now, mut frame, mut settled) = (0, 1, 0);
         // The same worker all the time, and never paused: what it does is its account.

@@ -6,6 +6,11 @@ use super::*;
 const A: WorkerId = WorkerId(1);
 const B: WorkerId = WorkerId(2);
 
+/// The runs of rows that an answer is the first for: first row, and the one after the last.
+fn fresh(frame: &mut Frame, lease: &Lease, cost: Cost) -> Vec<(u32, u32)> {
+    frame.finish(lease, cost).into_iter().map(|rows| (rows.start, rows.end)).collect()
+}
+
 fn frame(rows: u32) -> Frame {
     let forecast = Forecast::new(vec![1.0; rows as usize], Tiles { rows: 16, share: 0.0 });
     Frame::new(FrameId(7), (10, rows), forecast, [Run::new(0, rows)])
@@ -51,8 +56,8 @@ fn only_the_first_result_counts() {
     let lease = frame.take(A, 8).unwrap();
     frame.copy(lease.segment, B).unwrap();
     let cost = Cost { primary: 80, ..Cost::default() };
-    assert_eq!(frame.finish(&lease, cost), 8);
-    assert_eq!(frame.finish(&lease, cost), 0);
+    assert_eq!(fresh(&mut frame, &lease, cost), [(0, 8)]);
+    assert!(fresh(&mut frame, &lease, cost).is_empty());
     assert_eq!((frame.rows_done, frame.cost().primary), (8, 80));
 }
 
@@ -63,10 +68,10 @@ fn a_late_result_settles_what_its_rows_have_become() {
     frame.give_up(late.segment, A);
     let piece = frame.take(B, 8).unwrap();
     let done = frame.take(B, 4).unwrap();
-    assert_eq!(frame.finish(&done, Cost { primary: 40, ..Cost::default() }), 4);
-    assert_eq!(frame.finish(&late, Cost { primary: 200, ..Cost::default() }), 16);
+    assert_eq!(fresh(&mut frame, &done, Cost { primary: 40, ..Cost::default() }), [(8, 12)]);
+    assert_eq!(fresh(&mut frame, &late, Cost { primary: 200, ..Cost::default() }), [(0, 8), (12, 20)]);
     assert_eq!((frame.rows_done, frame.cost().primary), (20, 200));
-    assert_eq!(frame.finish(&piece, Cost::default()), 0);
+    assert!(fresh(&mut frame, &piece, Cost::default()).is_empty());
     assert_eq!(frame.queue.iter().map(|run| (run.first, run.count)).collect::<Vec<_>>(), [(20, 10)]);
 }
 
@@ -75,7 +80,7 @@ fn rejected_rows_are_rendered_again_and_paid_once() {
     let mut frame = frame(30);
     let cost = Cost { primary: 100, ..Cost::default() };
     let leases = [frame.take(A, 10).unwrap(), frame.take(B, 10).unwrap(), frame.take(A, 10).unwrap()];
-    leases[..2].iter().for_each(|lease| assert_eq!(frame.finish(lease, cost), 10));
+    leases[..2].iter().for_each(|lease| assert_eq!(frame.finish(lease, cost).len(), 1));
     frame.reject(9..11);
     assert_eq!((frame.rows_done, frame.cost().primary), (0, 0));
     assert_eq!(frame.take(B, 30), Some(Lease { attempt: 1, ..leases[0] }));

@@ -21,7 +21,7 @@ fn hold(worker: &mut Worker, segment: u32, at: Duration) -> Lease {
 
 #[test]
 fn what_arrives_slower_than_it_is_traced_counts_as_it_arrives() {
-    let mut worker = Worker::new(1, Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
     let leases = [0, 1, 2].map(|segment| hold(&mut worker, segment, Duration::ZERO));
     let cost = Cost { trace_ns: 1_000_000_000, ..Cost::default() };
     worker.finish(SECOND * 20, leases[0], cost, SECOND);
@@ -33,7 +33,7 @@ fn what_arrives_slower_than_it_is_traced_counts_as_it_arrives() {
 
 #[test]
 fn who_is_late_rests_until_it_answers() {
-    let mut worker = Worker::new(1, Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
     let lease = hold(&mut worker, 0, Duration::ZERO);
     assert_eq!(worker.overdue_at(), Some(SECOND));
     assert_eq!(worker.lapse(SECOND), [(FrameId(1), 0)]);
@@ -45,7 +45,7 @@ fn who_is_late_rests_until_it_answers() {
 
 #[test]
 fn a_lease_is_finished_once_and_only_as_granted() {
-    let mut worker = Worker::new(1, Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
     let lease = hold(&mut worker, 0, Duration::ZERO);
     assert!(worker.finish(SECOND, Lease { attempt: 1, ..lease }, Cost::default(), SECOND).is_none());
     assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
@@ -54,7 +54,7 @@ fn a_lease_is_finished_once_and_only_as_granted() {
 
 #[test]
 fn rests_double_up_to_a_limit_and_end_with_success() {
-    let mut worker = Worker::new(1, Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
     let mut now = Duration::ZERO;
     let mut rests = Vec::new();
     for _ in 0..7 {
@@ -72,7 +72,7 @@ fn rests_double_up_to_a_limit_and_end_with_success() {
 
 #[test]
 fn only_the_open_ping_measures_the_round_trip() {
-    let mut worker = Worker::new(1, Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
     worker.pinged(SECOND, 5);
     worker.pong(SECOND * 2, 4);
     assert_eq!(worker.round_trip, None);
