@@ -1,5 +1,7 @@
 //! What a line asks for.
 
+use rayfarm_text::printable;
+
 /// A command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Command {
@@ -19,7 +21,7 @@ pub(super) enum Command {
     Pause(Whom),
     /// Give it leases again.
     Resume(Whom),
-    /// Let kicked workers of this name come back.
+    /// Let a kicked worker come back, by number or by name.
     Allow(String),
 }
 
@@ -38,7 +40,7 @@ pub(super) const COMMANDS: [(&str, &str); 9] = [
     ("status", "how far the run is"),
     ("drain ID|NAME", "a worker finishes what it holds and leaves"),
     ("kick ID|NAME", "a worker is sent away at once and kept out"),
-    ("allow NAME", "a kicked worker may come back"),
+    ("allow ID|NAME", "a kicked worker may come back"),
     ("pause [ID|NAME]", "a worker, or all, get no more work"),
     ("resume [ID|NAME]", "a paused worker, or all, get work again"),
     ("help", "this list"),
@@ -61,20 +63,29 @@ impl Command {
             "quit" => Self::Quit,
             "drain" => return Ok(Self::Drain(one(word, rest)?)),
             "kick" => return Ok(Self::Kick(one(word, rest)?)),
-            "allow" => return name(word, rest).map(Self::Allow),
+            "allow" => return kicked(word, rest).map(Self::Allow),
             "pause" => return Ok(Self::Pause(one_or_all(rest))),
             "resume" => return Ok(Self::Resume(one_or_all(rest))),
             "" => return Err("an empty line; help lists the commands".to_owned()),
-            other => return Err(format!("there is no command {other:?}; help lists those there are")),
+            other => {
+                let other = printable(other);
+                return Err(format!("there is no command \"{other}\"; help lists those there are"));
+            }
         };
-        if rest.is_empty() { Ok(command) } else { Err(format!("{word} stands alone, without {rest:?}")) }
+        if rest.is_empty() {
+            Ok(command)
+        } else {
+            Err(format!("{word} stands alone, without \"{}\"", printable(rest)))
+        }
     }
 }
 
-fn name(word: &str, rest: &str) -> Result<String, String> {
+fn kicked(word: &str, rest: &str) -> Result<String, String> {
     match rest {
-        "" => Err(format!("{word} whom? expected a worker's name after it")),
-        name => Ok(name.to_owned()),
+        "" => Err(format!(
+            "{word} whom? expected a worker's number or name after it; status lists those kicked"
+        )),
+        whom => Ok(whom.to_owned()),
     }
 }
 

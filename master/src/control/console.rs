@@ -1,11 +1,14 @@
 //! Commands performed, and their answers.
 
+use std::borrow::Cow;
+
+use rayfarm_text::printable;
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
 use super::command::{COMMANDS, Command, Whom};
-use super::lines::{Line, MAX_LINE_BYTES};
-use crate::farm::{FarmControl, FarmStatus, UnknownWorker, WorkerStatus};
+use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
+use crate::farm::{FarmControl, FarmStatus, KickedWorker, TransferStatus, UnknownWorker, WorkerStatus};
 
 /// What a kicked worker is told.
 pub(crate) const KICKED: &str = "it was kicked by the master's user";
@@ -47,13 +50,12 @@ impl Console {
         let text = match line {
             Line::Text(text) => text,
             Line::TooLong => {
-                return refused(&format!("a line has {MAX_LINE_BYTES} bytes at most"), Then::Listen);
+                return refused(&format!("a line has {MAX_LINE_BYTES} bytes at most"), Then::Close);
             }
+            Line::Binary => return refused("commands are text", Then::Close),
         };
-        // A web page can make its visitor's browser talk to this machine's ports: what it says after its first line,
-        // it shall say to nobody.
-        if text.contains("HTTP/1") {
-            return refused("this is no web server", Then::Close);
+        if is_foreign(text) {
+            return refused("this is no web server; commands are words, such as help", Then::Close);
         }
         match Command::parse(text).and_then(|command| self.perform(&command)) {
             Ok((value, then)) => Answer { line: format!("{value}\n"), then },
@@ -77,14 +79,10 @@ impl Console {
             Command::Pause(whom) => self.to_each(&status, whom, FarmControl::pause)?,
             Command::Resume(whom) => self.to_each(&status, whom, FarmControl::resume)?,
             Command::Kick(whom) => self.to_each(&status, whom, |farm, id| farm.kick(id, KICKED))?,
-            Command::Allow(name) => match self.farm.allow(name) {
-                0 => {
-                    return Err(format!(
-                        "no worker called {name:?} was kicked; status lists those that were"
-                    ));
-                }
-                allowed => json!({ "ok": true, "allowed": allowed }),
-            },
+            Command::Allow(whom) => {
+                let worker = find_kicked(&status, whom)?;
+                json!({ "ok": true, "allowed": usize::from(self.farm.allow_worker(worker)) })
+            }
         };
         Ok((value, Then::Listen))
     }
@@ -102,25 +100,41 @@ impl Console {
         // One of many may have left meanwhile; the one that was named must be there.
         let done: Vec<u64> = ids.iter().copied().filter(|&id| act(&self.farm, id).is_ok()).collect();
         match (whom, done.is_empty()) {
-            (Whom::One(whom), true) => Err(format!("worker {whom} has just left")),
+            (Whom::One(whom), true) => Err(format!("worker {} has just left", printable(whom))),
             _ => Ok(json!({ "ok": true, "workers": done })),
         }
     }
 }
 
-/// The one worker of that number, or else of that name.
+/// The one connected worker of that number, or else of that name.
 fn find(status: &FarmStatus, whom: &str) -> Result<u64, String> {
-    let by_number = |worker: &&WorkerStatus| whom.parse() == Ok(worker.id);
-    if let Some(worker) = status.workers.iter().find(by_number) {
-        return Ok(worker.id);
+    let known = status.workers.iter().map(|worker| (worker.id, worker.name.as_str()));
+    let none = |whom: Cow<str>| format!("no worker \"{whom}\" is connected; workers lists those that are");
+    one_of(known, whom, none)
+}
+
+/// The one kicked worker of that number, or else of that name.
+fn find_kicked(status: &FarmStatus, whom: &str) -> Result<u64, String> {
+    let known = status.kicked.iter().map(|worker| (worker.id, worker.name.as_str()));
+    let none = |whom: Cow<str>| format!("no worker \"{whom}\" was kicked; status lists those that were");
+    one_of(known, whom, none)
+}
+
+fn one_of<'a>(
+    known: impl Iterator<Item = (u64, &'a str)> + Clone,
+    whom: &str,
+    none: impl Fn(Cow<str>) -> String,
+) -> Result<u64, String> {
+    if let Some((id, _)) = known.clone().find(|(id, _)| whom.parse() == Ok(*id)) {
+        return Ok(id);
     }
-    let named: Vec<u64> =
-        status.workers.iter().filter(|worker| worker.name == whom).map(|worker| worker.id).collect();
+    let named: Vec<u64> = known.filter(|(_, name)| *name == whom).map(|(id, _)| id).collect();
+    let shown = printable(whom);
     match *named {
         [id] => Ok(id),
-        [] => Err(format!("no worker {whom:?} is connected; workers lists those that are")),
+        [] => Err(none(shown)),
         [first, ..] => Err(format!(
-            "{} workers are called {whom:?}; name one by its number, such as {first}",
+            "{} workers are called \"{shown}\"; name one by its number, such as {first}",
             named.len()
         )),
     }
@@ -131,6 +145,7 @@ fn workers(status: &FarmStatus) -> Vec<Value> {
         json!({
             "id": worker.id,
             "name": worker.name,
+            "local": worker.local,
             "address": worker.address.to_string(),
             "threads": worker.threads,
             "state": worker.state.to_string(),
@@ -144,6 +159,8 @@ fn workers(status: &FarmStatus) -> Vec<Value> {
 
 fn progress(status: &FarmStatus) -> Value {
     let threads: u32 = status.workers.iter().map(|worker| worker.threads).fold(0, u32::saturating_add);
+    let (totals, transfers) =
+        (&status.totals, Some(status.transfers).filter(|transfers| transfers.workers > 0));
     json!({
         "ok": true,
         "frame": status.frame.map(|frame| frame.0),
@@ -151,8 +168,30 @@ fn progress(status: &FarmStatus) -> Value {
         "rows": status.rows,
         "workers": status.workers.len(),
         "threads": threads,
-        "kicked": status.kicked,
+        "kicked": status.kicked.iter().map(|kicked| &kicked.name).collect::<Vec<_>>(),
+        "kicked_workers": status.kicked.iter().map(kicked).collect::<Vec<_>>(),
+        "local_gone": status.local_gone,
+        "frames_done": totals.frames_done,
+        "frames": totals.frames,
+        "fps": rounded(totals.fps),
+        "elapsed_seconds": rounded(totals.elapsed.as_secs_f64()),
+        "seconds_left": totals.left.map(|left| rounded(left.as_secs_f64())),
+        "sent_bytes": totals.sent_bytes,
+        "received_bytes": totals.received_bytes,
+        "scene_bytes": totals.scene_bytes,
+        "scene_transfer": transfers.map(|TransferStatus { workers, done, total }| {
+            json!({ "workers": workers, "done_bytes": done, "bytes": total })
+        }),
     })
+}
+
+fn kicked(worker: &KickedWorker) -> Value {
+    json!({ "id": worker.id, "name": worker.name, "address": worker.address.map(|address| address.to_string()) })
+}
+
+/// Three digits behind the point: what clocks can tell.
+fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
 }
 
 fn help() -> Value {
@@ -160,6 +199,6 @@ fn help() -> Value {
     json!({ "ok": true, "commands": lines })
 }
 
-fn refused(error: &str, then: Then) -> Answer {
+pub(super) fn refused(error: &str, then: Then) -> Answer {
     Answer { line: format!("{}\n", json!({ "ok": false, "error": error })), then }
 }

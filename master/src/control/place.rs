@@ -3,6 +3,8 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use rayfarm_protocol::address;
+
 /// The value of `--control`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
@@ -23,16 +25,16 @@ impl Place {
         if text == "-" {
             return Ok(Self::StandardInput);
         }
-        match text.parse::<SocketAddr>() {
-            Ok(address) if address.ip().is_loopback() => Ok(Self::Tcp(address)),
-            Ok(address) => Err(format!(
+        match address::parse(text)? {
+            Some(address) if address.ip().is_loopback() => Ok(Self::Tcp(address)),
+            Some(address) => Err(format!(
                 "{} can be reached by other machines, and whoever reaches it may give commands; expected an address of \
                  this machine alone, such as 127.0.0.1:{}",
                 address.ip(),
                 address.port()
             )),
-            Err(_) if text.contains('/') => Ok(Self::Unix(text.into())),
-            Err(_) => Err(
+            None if text.contains('/') => Ok(Self::Unix(text.into())),
+            None => Err(
                 "expected - for standard input, an address such as 127.0.0.1:7118, or a path with a slash in it, \
                  such as ./control, for a Unix socket"
                     .to_owned(),

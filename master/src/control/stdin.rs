@@ -36,7 +36,7 @@ fn listen(console: &Console) {
     }
 }
 
-/// Whether to listen on.
+/// Whether to listen on: no other program speaks here, so a line that is no command ends nothing.
 fn answered(console: &Console, line: &Line) -> bool {
     let answer = console.answer(line);
     let mut out = io::stdout().lock();
@@ -44,5 +44,5 @@ fn answered(console: &Console, line: &Line) -> bool {
     if answer.then == Then::Quit {
         console.quit();
     }
-    written.is_ok() && answer.then == Then::Listen
+    written.is_ok() && answer.then != Then::Quit
 }

@@ -67,7 +67,7 @@ fn lines_are_read_as_documented() {
         ("kik 3", "\"kik\""),
         ("kick", "kick whom?"),
         ("drain ", "drain whom?"),
-        ("allow", "expected a worker's name"),
+        ("allow", "expected a worker's number or name"),
         ("quit now", "stands alone"),
     ] {
         let error = Command::parse(line).unwrap_err();
@@ -90,7 +90,7 @@ fn only_this_machine_may_give_commands() {
 
 proptest! {
     #[test]
-    fn lines_do_not_depend_on_how_they_arrive(lines in prop::collection::vec("[^\r\n]{0,40}", 0..10), open in "[a-z]{0,9}") {
+    fn lines_do_not_depend_on_how_they_arrive(lines in prop::collection::vec("[^\\x00-\\x08\\x0a-\\x1f\\x7f]{0,40}", 0..10), open in "[a-z]{0,9}") {
         let text: String = lines.iter().map(|line| format!("{line}\r\n")).chain([open.clone()]).collect();
         let mut cutter = Lines::default();
         let mut said: Vec<Line> = text.bytes().filter_map(|byte| cutter.push(byte)).collect();
@@ -164,37 +164,192 @@ async fn a_name_that_two_workers_have_is_not_guessed_at() {
     farm.shut_down().await;
 }
 
+/// A port for commands, and how it is opened.
+struct Port {
+    address: SocketAddr,
+    folder: tempfile::TempDir,
+    stop: CancellationToken,
+}
+
+impl Port {
+    fn open(console: Console) -> Self {
+        let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let (folder, stop) = (tempfile::tempdir().unwrap(), CancellationToken::new());
+        let folders = [folder.path().join("rayfarm")];
+        socket::listen_tcp(address, &folders, console, stop.clone()).unwrap();
+        Self { address, folder, stop }
+    }
+
+    fn file(&self) -> std::path::PathBuf {
+        self.folder.path().join(format!("rayfarm/control-127.0.0.1-{}", self.address.port()))
+    }
+
+    /// A connection that may give commands.
+    async fn connect(&self) -> BufReader<TcpStream> {
+        let mut stream = BufReader::new(TcpStream::connect(self.address).await.unwrap());
+        stream.write_all(&std::fs::read(self.file()).unwrap()).await.unwrap();
+        assert_eq!(read_line(&mut stream).await, "{\"ok\":true}\n");
+        stream
+    }
+
+    /// What is answered until the end, to something other than the token.
+    async fn heard_by(&self, says: &[u8]) -> String {
+        let mut stream = TcpStream::connect(self.address).await.unwrap();
+        // Closing over unread bytes may reset the connection.
+        let _ = stream.write_all(says).await;
+        let mut heard = Vec::new();
+        let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut heard)).await.expect("it stays open");
+        String::from_utf8(heard).unwrap()
+    }
+}
+
+async fn read_line(stream: &mut (impl tokio::io::AsyncBufRead + Unpin)) -> String {
+    let mut line = String::new();
+    let read = tokio::time::timeout(PATIENCE, stream.read_line(&mut line)).await;
+    // The other side may have closed over what it has not read.
+    let _ = read.expect("no answer comes");
+    line
+}
+
 #[tokio::test]
-async fn every_connection_gets_its_answers_and_a_web_page_gets_none() {
+async fn a_port_is_opened_by_the_token_in_its_owners_file() {
     let farm = farm().await;
     let (console, quit) = console(&farm);
-    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    start(&Place::Tcp(free), console, CancellationToken::new()).unwrap();
+    let port = Port::open(console);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = |path: &std::path::Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!((mode(&port.file()), mode(port.file().parent().unwrap())), (0o600, 0o700));
+    }
+    for says in ["quit\n", "status\n", "token 00\nquit\n", "token\nquit\n", "\nquit\n"] {
+        let heard = port.heard_by(says.as_bytes()).await;
+        assert!(heard.matches('\n').count() <= 1 && !heard.contains("true"), "{says:?}: {heard}");
+    }
+    let mut stream = port.connect().await;
+    stream.write_all(b"status\nnonsense\n").await.unwrap();
+    for ok in ["\"ok\":true", "\"ok\":false"] {
+        let line = read_line(&mut stream).await;
+        assert!(line.contains(ok), "{line}");
+    }
+    assert!(!quit.is_cancelled());
+    stream.write_all(b"quit\n").await.unwrap();
+    tokio::time::timeout(PATIENCE, quit.cancelled()).await.unwrap();
+    port.stop.cancel();
+    let gone = async {
+        while port.file().exists() {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    };
+    tokio::time::timeout(PATIENCE, gone).await.expect("the token outlives its run");
+    farm.shut_down().await;
+}
+
+/// What browsers, and others that have come to the wrong port, say.
+fn strangers() -> Vec<Vec<u8>> {
+    let long = "x".repeat(3 * MAX_LINE_BYTES);
+    let mut all: Vec<Vec<u8>> = [
+        "POST / HTTP/1.1\r\nHost: 127.0.0.1:7118\r\n\r\nquit\r\n",
+        "GET /\r\nquit\r\n",
+        "PROPFIND / http/1.1\r\nquit\r\n",
+        "M-SEARCH *\r\nquit\r\n",
+        "quit / HTTP/1.1\r\nquit\r\n",
+        "Host: 127.0.0.1\r\nquit\r\n",
+        "host:127.0.0.1\nquit\n",
+        "\x16\x03\x01\x02\0\x01\0\x01\nquit\n",
+        "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\nquit\r\n",
+        "{\"command\":\"quit\"}\nquit\n",
+    ]
+    .map(|text| text.as_bytes().to_vec())
+    .to_vec();
+    all.push(format!("POST /{long} HTTP/1.1\r\nquit\r\n").into_bytes());
+    all.push(format!("{long}\nquit\n").into_bytes());
+    all.push(b"\xff\xfe\nquit\n".to_vec());
+    all
+}
+
+#[tokio::test]
+async fn a_web_page_ends_no_run() {
+    let farm = farm().await;
+    let (console, quit) = console(&farm);
+    let port = Port::open(console.clone());
+    for says in strangers() {
+        port.heard_by(&says).await;
+        // The same behind a token: even then, nothing after it is a command.
+        let mut stream = port.connect().await;
+        let _ = stream.write_all(&says).await;
+        let refusal = read_line(&mut stream).await;
+        assert!(!refusal.contains("\"ok\":true"), "{refusal}");
+        assert_eq!(read_line(&mut stream).await, "", "{:?}", String::from_utf8_lossy(&says));
+    }
+    assert!(!quit.is_cancelled());
+    farm.shut_down().await;
+}
+
+#[cfg(unix)]
+#[tokio::test]
+async fn a_unix_socket_takes_no_http_either() {
+    let farm = farm().await;
+    let (console, quit) = console(&farm);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("control");
+    start(&Place::Unix(path.clone()), console, CancellationToken::new()).unwrap();
+    for says in strangers() {
+        let mut stream = BufReader::new(tokio::net::UnixStream::connect(&path).await.unwrap());
+        let _ = stream.write_all(&says).await;
+        let refusal = read_line(&mut stream).await;
+        assert!(!refusal.contains("\"ok\":true"), "{refusal}");
+        assert_eq!(read_line(&mut stream).await, "", "{:?}", String::from_utf8_lossy(&says));
+    }
+    assert!(!quit.is_cancelled());
+    farm.shut_down().await;
+}
+
+#[tokio::test]
+async fn idle_connections_give_way_to_new_ones() {
+    let farm = farm().await;
+    let port = Port::open(console(&farm).0);
     let mut streams = Vec::new();
     for _ in 0..8 {
-        let mut stream = BufReader::new(TcpStream::connect(free).await.unwrap());
-        stream.write_all(b"status\nnonsense\n").await.unwrap();
-        for ok in ["\"ok\":true", "\"ok\":false"] {
-            let mut line = String::new();
-            stream.read_line(&mut line).await.unwrap();
-            assert!(line.contains(ok), "{line}");
-        }
-        streams.push(stream);
+        streams.push(port.connect().await);
     }
-    let mut heard = String::new();
-    TcpStream::connect(free).await.unwrap().read_to_string(&mut heard).await.unwrap();
-    assert!(heard.contains("8 connections"), "{heard}");
-
-    let mut browser = streams.pop().unwrap();
-    browser.write_all(b"POST / HTTP/1.1\r\nquit\r\n").await.unwrap();
-    let mut heard = String::new();
-    // Closing over unread bytes may reset the connection.
-    let _ = browser.read_to_string(&mut heard).await;
-    assert!(!quit.is_cancelled());
-
-    streams[0].write_all(b"quit\n").await.unwrap();
-    tokio::time::timeout(PATIENCE, quit.cancelled()).await.unwrap();
+    // The first one is not the idlest any more.
+    streams[0].write_all(b"help\n").await.unwrap();
+    assert!(read_line(&mut streams[0]).await.contains("true"));
+    let mut ninth = port.connect().await;
+    let farewell = read_line(&mut streams[1]).await;
+    assert!(farewell.contains("8 connections"), "{farewell}");
+    assert_eq!(read_line(&mut streams[1]).await, "");
+    // Those without a token give way first, however many come.
+    for _ in 0..20 {
+        drop(TcpStream::connect(port.address).await.unwrap());
+    }
+    let mut silent = Vec::new();
+    for _ in 0..20 {
+        silent.push(TcpStream::connect(port.address).await.unwrap());
+    }
+    for stream in [&mut streams[0], &mut ninth] {
+        stream.write_all(b"help\n").await.unwrap();
+        assert!(read_line(stream).await.contains("true"), "a stranger took the place of an operator");
+    }
     farm.shut_down().await;
+}
+
+#[tokio::test]
+async fn a_connection_that_says_nothing_ends() {
+    let farm = farm().await;
+    let port = Port::open(console(&farm).0);
+    let mut trusted = port.connect().await;
+    let mut silent = BufReader::new(TcpStream::connect(port.address).await.unwrap());
+    // A byte now and then is no command.
+    silent.write_all(b"t").await.unwrap();
+    tokio::time::pause();
+    assert!(read_line(&mut silent).await.contains("token"));
+    tokio::time::timeout(Duration::from_secs(3600), trusted.read_line(&mut String::new()))
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(read_line(&mut trusted).await, "");
 }
 
 #[cfg(unix)]
@@ -216,7 +371,7 @@ async fn a_unix_socket_is_the_owners_alone_and_gone_after_the_run() {
     stream.read_line(&mut line).await.unwrap();
     assert_eq!(line, "{\"ok\":true,\"workers\":[]}\n");
     let taken = start(&place, console(&farm).0, stop.clone()).unwrap_err().to_string();
-    assert!(taken.contains("choose another"), "{taken}");
+    assert!(taken.contains("another run") && taken.contains("choose another"), "{taken}");
     stop.cancel();
     let gone = async {
         while path.exists() {
