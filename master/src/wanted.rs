@@ -48,7 +48,7 @@ impl WantedPicture {
 
     /// The positions of all knobs, for reports.
     pub(crate) fn knobs(&self) -> Knobs {
-        let Quality { adaptive, shadows, shading, filter, exponent, colors } = self.view.quality;
+        let Quality { adaptive, shadows, shading, filter, exponent, colors, dither } = self.view.quality;
         Knobs {
             shadows,
             shading: word_of(&Shading::WORDS, &shading),
@@ -57,12 +57,15 @@ impl WantedPicture {
             colors: word_of(&ColorDepth::WORDS, &colors),
             scale: self.scale.factor(),
             adaptive,
+            dither,
         }
     }
 
     /// Each knob that is not at full quality, in a few words.
     pub(crate) fn reductions(&self) -> Vec<String> {
-        let Quality { adaptive: _, shadows, shading, filter, exponent, colors } = self.view.quality;
+        // Dither takes nothing away.
+        let Quality { adaptive: _, shadows, shading, filter, exponent, colors, dither: _ } =
+            self.view.quality;
         let mut reductions = Vec::new();
         let mut name = |reduced: bool, words: &str| {
             if reduced {
@@ -93,6 +96,7 @@ pub(crate) struct Knobs {
     /// Rendered pixels per pixel along a side.
     scale: f64,
     adaptive: bool,
+    dither: bool,
 }
 
 #[cfg(test)]
@@ -110,7 +114,7 @@ mod tests {
         assert_eq!(full().rendered(), test_scene::view());
         assert_eq!(
             serde_json::to_string(&full().knobs()).unwrap(),
-            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false}"#
+            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false,"dither":false}"#
         );
     }
 
@@ -125,6 +129,7 @@ mod tests {
             filter: Some(Filter::Nearest),
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
+            dither: true,
         };
         let expected = [
             "scale 1/2",
@@ -138,7 +143,7 @@ mod tests {
         assert_eq!(wanted.reductions(), expected);
         assert_eq!(
             serde_json::to_string(&wanted.knobs()).unwrap(),
-            r#"{"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","scale":0.5,"adaptive":true}"#
+            r#"{"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","scale":0.5,"adaptive":true,"dither":true}"#
         );
         let (rendered, view) = (wanted.rendered(), wanted.view);
         assert_eq!((rendered.width, rendered.height), (view.width / 2, view.height / 2));

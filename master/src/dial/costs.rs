@@ -79,6 +79,12 @@ impl Costs {
         }
     }
 
+    /// The full frame takes about so long, as frames of another ladder tell.
+    pub(super) fn expect(&mut self, full: Duration) {
+        let mean = full.as_secs_f64().max(SHORTEST).ln();
+        self.load = Some(Estimate { mean, variance: self.noise + UNTRIED });
+    }
+
     /// Rungs of the ladder.
     pub(super) fn len(&self) -> usize {
         self.ratios.len()

@@ -75,6 +75,14 @@ impl Governor {
         }
     }
 
+    /// Likewise, where the full frame is known to take `full`.
+    pub(crate) fn starting(ratios: impl IntoIterator<Item = f64>, budget: Duration, full: Duration) -> Self {
+        let mut governor = Self::new(ratios, budget);
+        governor.costs.expect(full);
+        governor.descend((0..governor.costs.len()).find(|&rung| governor.fits(rung, FRESH.enter)));
+        governor
+    }
+
     /// The rung for the next frame.
     pub(crate) fn rung(&self) -> usize {
         self.rung

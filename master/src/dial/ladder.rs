@@ -9,13 +9,34 @@ use super::setting::Setting;
 pub(crate) struct Rung {
     /// What it does to a picture.
     pub(crate) setting: Setting,
-    /// The time of a frame, as a part of the full one's.
+    /// The work of a frame, as a part of the full one's.
     pub(crate) cost: f64,
+    /// The bytes of its pixels, as a part of the full one's.
+    pub(crate) wire: f64,
     /// The mean FLIP error, 0..=1.
     pub(crate) loss: f64,
 }
 
-/// Rungs that are nearer to each other in cost than this factor are one: a step that changes the rate by less than its
+impl Rung {
+    const FULL: Self = Self { setting: Setting::FULL, cost: 1.0, wire: 1.0, loss: 0.0 };
+
+    /// The time of a frame as a part of the full one's, where the wire takes `balance` of the time of the threads for
+    /// the full one: the longer of both.
+    pub(crate) fn time(&self, balance: f64) -> f64 {
+        self.cost.max(balance * self.wire) / balance.max(1.0)
+    }
+}
+
+/// Where costs and losses are from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// A table of the scene.
+    Measured,
+    /// What other scenes had in common.
+    General,
+}
+
+/// Rungs that are nearer to each other in time than this factor are one: a step that changes the rate by less than its
 /// noise is no use.
 const LEAST_STEP: f64 = 0.93;
 /// Rungs at most: so many steps go down to a ten-thousandth of the time.
@@ -23,50 +44,77 @@ const MAX_RUNGS: usize = 128;
 
 /// The Pareto front of settings, the full one first.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Ladder(Vec<Rung>);
+pub(crate) struct Ladder {
+    /// All that is known, in the order of their losses.
+    known: Vec<Rung>,
+    rungs: Vec<Rung>,
+    origin: Origin,
+}
 
 impl Ladder {
-    /// The front of what is measured. What is not finite, or cheaper than nothing, was not measured.
-    pub(crate) fn of(measured: impl IntoIterator<Item = Rung>) -> Self {
-        let full = Rung { setting: Setting::FULL, cost: 1.0, loss: 0.0 };
-        let is_sound = |rung: &Rung| rung.cost > 0.0 && rung.cost.is_finite() && rung.loss.is_finite();
-        let mut rungs: Vec<Rung> = measured.into_iter().filter(is_sound).collect();
-        rungs.sort_by(|a, b| a.loss.total_cmp(&b.loss).then(a.cost.total_cmp(&b.cost)));
-        let mut front = vec![full];
-        let mut cheapest = full.cost;
-        for rung in rungs {
-            if rung.cost <= cheapest * LEAST_STEP && front.len() < MAX_RUNGS {
-                cheapest = rung.cost;
-                front.push(rung);
-            }
-        }
-        Self(front)
+    /// The front of what is measured, where threads are the limit. What is not finite, or cheaper than nothing, was not
+    /// measured.
+    pub(crate) fn of(measured: impl IntoIterator<Item = Rung>, origin: Origin) -> Self {
+        let is_positive = |value: f64| value > 0.0 && value.is_finite();
+        let is_sound =
+            |rung: &Rung| is_positive(rung.cost) && is_positive(rung.wire) && rung.loss.is_finite();
+        let mut known: Vec<Rung> = measured.into_iter().filter(is_sound).collect();
+        known.sort_by(|a, b| a.loss.total_cmp(&b.loss).then(a.cost.total_cmp(&b.cost)));
+        let rungs = front(&known, 0.0);
+        Self { known, rungs, origin }
+    }
+
+    /// The front where the wire takes `balance` of the time of the threads for the full picture: knobs that make
+    /// nothing shorter of what a frame waits for are not on it.
+    pub(crate) fn balanced(&self, balance: f64) -> Self {
+        Self { rungs: front(&self.known, balance), ..self.clone() }
     }
 
     /// Without the rungs that lose more than `most`.
     #[must_use]
     pub(crate) fn up_to(mut self, most: f64) -> Self {
-        self.0.retain(|rung| rung.loss <= most || rung.setting == Setting::FULL);
+        for rungs in [&mut self.known, &mut self.rungs] {
+            rungs.retain(|rung| rung.loss <= most || rung.setting == Setting::FULL);
+        }
         self
     }
 
     /// All rungs; the first is the full one.
     pub(crate) fn rungs(&self) -> &[Rung] {
-        &self.0
+        &self.rungs
+    }
+
+    /// Where its figures are from.
+    pub(crate) fn origin(&self) -> Origin {
+        self.origin
     }
 
     /// The fastest one.
     pub(crate) fn cheapest(&self) -> Setting {
-        self.0.last().map_or(Setting::FULL, |rung| rung.setting)
+        self.rungs.last().map_or(Setting::FULL, |rung| rung.setting)
     }
 }
 
-/// How a loss is told.
+/// Of rungs in the order of their losses, the full one and those that are notably faster than all before them.
+fn front(known: &[Rung], balance: f64) -> Vec<Rung> {
+    let mut front = vec![Rung::FULL];
+    let mut fastest = 1.0;
+    for rung in known {
+        let time = rung.time(balance);
+        if time <= fastest * LEAST_STEP && front.len() < MAX_RUNGS {
+            fastest = time;
+            front.push(*rung);
+        }
+    }
+    front
+}
+
+/// How a loss is told: it is an estimate.
 pub(crate) struct Loss(pub(crate) f64);
 
 impl fmt::Display for Loss {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "FLIP {:.3}", self.0)
+        write!(f, "about FLIP {:.3}", self.0)
     }
 }
 
@@ -77,7 +125,11 @@ mod tests {
     use super::*;
 
     fn rung(cost: f64, loss: f64) -> Rung {
-        Rung { setting: Setting { samples: 1, ..Setting::FULL }, cost, loss }
+        Rung { setting: Setting { samples: 1, ..Setting::FULL }, cost, wire: 1.0, loss }
+    }
+
+    fn of(rungs: impl IntoIterator<Item = Rung>) -> Ladder {
+        Ladder::of(rungs, Origin::General)
     }
 
     fn figures(ladder: &Ladder) -> Vec<(f64, f64)> {
@@ -86,7 +138,7 @@ mod tests {
 
     #[test]
     fn what_another_beats_in_both_is_left_out() {
-        let ladder = Ladder::of([rung(0.3, 0.1), rung(0.5, 0.02), rung(0.6, 0.05), rung(0.2, 0.1)]);
+        let ladder = of([rung(0.3, 0.1), rung(0.5, 0.02), rung(0.6, 0.05), rung(0.2, 0.1)]);
         assert_eq!(figures(&ladder), [(1.0, 0.0), (0.5, 0.02), (0.2, 0.1)]);
         assert_eq!(figures(&ladder.clone().up_to(0.05)), [(1.0, 0.0), (0.5, 0.02)]);
         assert_eq!(figures(&ladder.up_to(0.0)), [(1.0, 0.0)]);
@@ -94,16 +146,28 @@ mod tests {
 
     #[test]
     fn without_any_measurement_there_is_the_full_one() {
-        let ladder =
-            Ladder::of([rung(f64::NAN, 0.1), rung(0.5, f64::INFINITY), rung(0.0, 0.1), rung(-1.0, 0.1)]);
+        let ladder = of([rung(f64::NAN, 0.1), rung(0.5, f64::INFINITY), rung(0.0, 0.1), rung(-1.0, 0.1)]);
         assert_eq!(figures(&ladder), [(1.0, 0.0)]);
         assert_eq!(ladder.cheapest(), Setting::FULL);
+    }
+
+    #[test]
+    fn where_the_wire_is_the_limit_only_what_makes_fewer_bytes_is_a_rung() {
+        let dark = Rung { wire: 1.0, ..rung(0.5, 0.01) };
+        let coarse = Rung { wire: 0.25, ..rung(0.4, 0.02) };
+        let pale = Rung { wire: 0.6, ..rung(1.0, 0.015) };
+        let ladder = of([dark, coarse, pale]);
+        assert_eq!(figures(&ladder), [(1.0, 0.0), (0.5, 0.01), (0.4, 0.02)]);
+        assert_eq!(figures(&ladder.balanced(4.0)), [(1.0, 0.0), (1.0, 0.015), (0.4, 0.02)]);
+        assert_eq!(ladder.balanced(4.0).balanced(0.0), ladder);
+        // At twice the time of the threads, fewer bytes help until the threads are the limit.
+        assert!((pale.time(2.0) - 0.6).abs() < 1e-12 && (coarse.time(1.25) - 0.32).abs() < 1e-12);
     }
 
     proptest! {
         #[test]
         fn losses_rise_and_costs_fall(measured in prop::collection::vec((0.0..2.0_f64, 0.0..1.0_f64), 0..60)) {
-            let ladder = Ladder::of(measured.into_iter().map(|(cost, loss)| rung(cost, loss)));
+            let ladder = of(measured.into_iter().map(|(cost, loss)| rung(cost, loss)));
             for pair in ladder.rungs().windows(2) {
                 prop_assert!(pair[0].cost > pair[1].cost && pair[0].loss <= pair[1].loss);
             }

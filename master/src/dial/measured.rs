@@ -1,9 +1,12 @@
 //! The ladder of a scene that was measured: a table of `tradeoff`.
 
-use super::ladder::{Ladder, Rung};
-use super::setting::Setting;
+use rayfarm_tracer::scene::RenderScale;
+
+use super::ladder::{Ladder, Origin, Rung};
+use super::setting::{Setting, bytes};
+use super::small_scales::continued;
 use crate::tradeoff::setting::Setting as Measured;
-use crate::tradeoff::table::Table;
+use crate::tradeoff::table::{Row, Table};
 use crate::wanted::WantedPicture;
 
 /// The front of a table, for pictures that rest as `wanted`. Costs are parts of that row's time, losses what the mean FLIP
@@ -31,12 +34,30 @@ pub(crate) fn ladder(table: &Table, wanted: &WantedPicture) -> Result<Ladder, St
             names.join(", ")
         ));
     };
-    let rungs = table.rows.iter().filter_map(|row| {
+    let small = small_rows(table);
+    let rungs = table.rows.iter().chain(&small).filter_map(|row| {
         let picture = known(&row.setting).filter(|picture| is_below(picture, wanted))?;
         let cost = row.median_ms / full.median_ms;
-        Some(Rung { setting: Setting::of(&picture), cost, loss: (row.flip - full.flip).max(0.0) })
+        let (setting, wire) = (Setting::of(&picture), bytes(&picture) / bytes(wanted));
+        Some(Rung { setting, cost, wire, loss: (row.flip - full.flip).max(0.0) })
     });
-    Ok(Ladder::of(rungs))
+    Ok(Ladder::of(rungs, Origin::Measured))
+}
+
+/// What a table that was written before there were scales of a third and a quarter would say of them.
+fn small_rows(table: &Table) -> Vec<Row> {
+    let row = |name: &str| table.rows.iter().find(|row| row.setting == name);
+    let larger = ["samples-1", "scale-3-4", "scale-1-2"].map(row);
+    let [Some(full), Some(three_quarters), Some(half)] = larger else { return Vec::new() };
+    let known = [full, three_quarters, half].map(|row| (row.median_ms, row.flip));
+    let small = [("scale-1-3", RenderScale::Third), ("scale-1-4", RenderScale::Quarter)];
+    let missing = small.into_iter().filter(|(name, _)| row(name).is_none());
+    missing
+        .map(|(name, scale)| {
+            let (median_ms, flip) = continued(known, scale);
+            Row { setting: name.to_owned(), median_ms, flip, ..half.clone() }
+        })
+        .collect()
 }
 
 /// Whether a picture asks for nothing that the other one does not.
@@ -46,10 +67,9 @@ fn is_below(picture: &WantedPicture, wanted: &WantedPicture) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use rayfarm_tracer::scene::{FrameView, RenderScale};
+    use rayfarm_tracer::scene::FrameView;
 
     use super::*;
-    use crate::tradeoff::table::Row;
 
     fn row(setting: &str, ms: f64, flip: f64) -> Row {
         let (max_error, rmse, psnr_db, ssim) = (9, 1.0, 40.0, 0.9);
@@ -86,6 +106,22 @@ mod tests {
         assert!(adaptive.quality.adaptive && adaptive.samples == 4);
         let last = ladder.cheapest().applied(&wanted);
         assert_eq!((last.scale, last.view.samples), (RenderScale::Half, 1));
+    }
+
+    #[test]
+    fn a_table_without_the_small_scales_gets_them_from_its_larger_ones() {
+        let mut table = table();
+        let smallest = |table: &Table| {
+            let ladder = ladder(table, &resting(1)).unwrap();
+            let rung = *ladder.rungs().iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).unwrap();
+            (rung.setting.scale, rung.cost)
+        };
+        assert_eq!(smallest(&table).0, RenderScale::Half, "from two rows nothing is continued");
+        table.rows.push(row("scale-3-4", 12.0, 0.08));
+        let (scale, cost) = smallest(&table);
+        assert!(scale == RenderScale::Quarter && (cost - 0.09).abs() < 1e-9, "{scale:?} {cost}");
+        table.rows.push(row("scale-1-4", 1.0, 0.2));
+        assert_eq!(smallest(&table), (RenderScale::Quarter, 0.05), "what was measured wins");
     }
 
     #[test]

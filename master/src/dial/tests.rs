@@ -11,15 +11,24 @@ fn wanted(samples: u32) -> WantedPicture {
 }
 
 fn dial(target_fps: f64) -> Dial {
-    let rung = |cost, loss, scale| ladder::Rung { setting: Setting { scale, ..Setting::FULL }, cost, loss };
-    let ladder =
-        Ladder::of([rung(0.6, 0.03, RenderScale::ThreeQuarters), rung(0.3, 0.05, RenderScale::Half)]);
+    let rung =
+        |cost, loss, scale| Rung { setting: Setting { scale, ..Setting::FULL }, cost, wire: cost, loss };
+    let rungs = [rung(0.6, 0.03, RenderScale::ThreeQuarters), rung(0.3, 0.05, RenderScale::Half)];
+    let ladder = Ladder::of(rungs, Origin::General);
     Dial::new(ladder, target_fps, false)
+}
+
+fn moving(rung: usize) -> Shown {
+    Shown::Moving(Step { rung, ladder: 0 })
+}
+
+fn finish(dial: &mut Dial, now: Duration, elapsed: Duration, shown: Shown, asked_at: Duration) {
+    dial.finished(now, elapsed, shown, asked_at, &FrameAccount::default());
 }
 
 /// Full frames of 20 ms, one after the other.
 fn rest(dial: &mut Dial, frames: u32) {
-    (1..=frames).for_each(|frame| dial.finished(MS * 20 * frame, MS * 20, Shown::Resting, Duration::ZERO));
+    (1..=frames).for_each(|frame| finish(dial, MS * 20 * frame, MS * 20, Shown::Resting, Duration::ZERO));
 }
 
 #[test]
@@ -27,7 +36,7 @@ fn the_picture_at_rest_is_the_one_that_is_wanted() {
     let mut dial = dial(100.0);
     assert_eq!(dial.next(MS), Shown::Resting);
     assert_eq!(dial.picture(&wanted(4), Shown::Resting), wanted(4));
-    assert_eq!(dial.picture(&wanted(4), Shown::Moving(0)), wanted(4));
+    assert_eq!(dial.picture(&wanted(4), moving(0)), wanted(4));
     assert_eq!(dial.told(Shown::Resting), ["at rest: all that was asked for"]);
 }
 
@@ -37,14 +46,17 @@ fn a_moving_one_is_at_the_rung_that_holds() {
     rest(&mut dial, 5);
     dial.changed(MS * 101);
     let shown = dial.next(MS * 101);
-    assert_eq!(shown, Shown::Moving(2));
+    assert_eq!(shown, moving(2));
     assert_eq!(dial.picture(&wanted(1), shown).scale, RenderScale::Half);
-    assert_eq!(dial.told(shown), ["moving: loses FLIP 0.050"]);
+    assert_eq!(
+        dial.told(shown),
+        ["moving: loses about FLIP 0.050", "by the general table", "waits for render threads"]
+    );
 }
 
 #[test]
 fn only_the_full_picture_of_an_older_camera_is_given_up() {
-    let (full, reduced) = (Shown::Moving(0), Shown::Moving(2));
+    let (full, reduced) = (moving(0), moving(2));
     assert!(Shown::Resting.gives_way_to(reduced) && !Shown::Resting.gives_way_to(full));
     assert!(!full.gives_way_to(reduced) && !reduced.gives_way_to(Shown::Resting));
 }
@@ -55,16 +67,22 @@ fn it_comes_to_rest_when_its_last_camera_has_been_shown() {
     rest(&mut dial, 5);
     dial.changed(MS * 101);
     assert_eq!(dial.rests_at(), None);
-    dial.finished(MS * 107, MS * 6, Shown::Moving(2), MS * 101);
+    finish(&mut dial, MS * 107, MS * 6, moving(2), MS * 101);
     assert_eq!(dial.rests_at(), Some(MS * 201));
-    assert_eq!((dial.next(MS * 200), dial.next(MS * 201)), (Shown::Moving(2), Shown::Resting));
+    assert_eq!((dial.next(MS * 200), dial.next(MS * 201)), (moving(2), Shown::Resting));
 }
 
 #[test]
 fn a_rate_that_is_out_of_reach_is_told() {
     let mut dial = dial(1000.0);
     rest(&mut dial, 20);
-    assert_eq!(dial.told(Shown::Moving(2)), ["moving: loses FLIP 0.050", "1000 FPS: out of reach"]);
+    let told = [
+        "moving: loses about FLIP 0.050",
+        "by the general table",
+        "1000 FPS: out of reach",
+        "waits for render threads",
+    ];
+    assert_eq!(dial.told(moving(2)), told);
     assert_eq!(dial.told(Shown::Resting), ["at rest: all that was asked for"]);
 }
 
@@ -99,8 +117,8 @@ fn knobs_that_make_no_difference_to_a_scene_are_not_on_its_ladder() {
         let Setting { shadows, shading, exponent, .. } = rung.setting;
         assert_eq!((shadows, shading, exponent), (true, Shading::Full, ExponentPrecision::Exact));
     }
-    assert_eq!(rungs.cheapest().scale, RenderScale::Half);
-    let mut half = wanted(1);
-    half.scale = RenderScale::Half;
-    assert_eq!(prior_ladder(&scene, &half).rungs().len(), 1);
+    assert_eq!(rungs.cheapest().scale, RenderScale::Quarter);
+    let mut least = wanted(1);
+    least.scale = RenderScale::Quarter;
+    assert_eq!(prior_ladder(&scene, &least).rungs().len(), 1);
 }

@@ -1,7 +1,8 @@
 //! Keeps the farm busy with what the window wants to see, and holds the newest picture for it.
 //!
-//! Always two frames are asked for: the one being rendered and the one after it, so that workers which have nothing
-//! left to do in the first begin the second. A moved camera replaces the second as long as it has not begun.
+//! While something moves, two frames are requested: the one being rendered and the one after it, so that workers which
+//! have nothing left to do in the first begin the second. A moved camera replaces the second as long as it has not begun.
+//! At rest the picture is requested once, and then nothing until something changes.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -13,26 +14,25 @@ use tokio_util::sync::CancellationToken;
 
 use super::frame_rate::FrameRate;
 use super::latency::Latency;
-use super::requests::{Answered, Requests};
+use super::requests::{Answered, Pace, Requests, WindowState};
 use crate::accounting::Fading;
 use crate::dial::Dial;
 use crate::error::CommandError;
 use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame};
-use crate::orbit::Animation;
 use crate::report::{FpsLog, FrameLine};
-use crate::wanted::WantedPicture;
 
 /// How often the window learns of workers that come and go.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
+/// A picture is called at rest when nothing has been requested for this long: between two frames of a moving camera
+/// there may be a moment without a request.
+const QUIET: Duration = Duration::from_millis(300);
 
 /// What is asked of the farm.
 pub(crate) struct Orders {
     /// What the window wants to see; the newest counts.
-    pub(crate) wanted: watch::Receiver<WantedPicture>,
-    /// What moves by itself.
-    pub(crate) animation: Animation,
-    /// End after so many frames.
-    pub(crate) limit: Option<u64>,
+    pub(crate) wanted: watch::Receiver<WindowState>,
+    /// How frames are requested.
+    pub(crate) pace: Pace,
     /// Where each frame is noted.
     pub(crate) log: Option<FpsLog<BufWriter<File>>>,
     /// What holds a rate, if one is to be held.
@@ -61,7 +61,12 @@ pub(crate) struct News {
     latency: Latency,
     accounts: Fading,
     completed: u64,
+    /// When a frame was completed, or frames were requested again after a rest.
     last_completed: Duration,
+    /// Since when nothing has been requested, and what the dial says of the picture.
+    quiet: Option<(Duration, Vec<String>)>,
+    /// How long nothing was requested before the frame that is on the way.
+    rest: Duration,
     trouble: Option<String>,
 }
 
@@ -81,6 +86,8 @@ impl NewsDesk {
             accounts: Fading::default(),
             completed: 0,
             last_completed: Duration::ZERO,
+            quiet: None,
+            rest: Duration::ZERO,
             trouble: None,
         })))
     }
@@ -121,10 +128,32 @@ impl NewsDesk {
         self.lock().completed
     }
 
-    /// How long no frame has been completed.
+    /// How long no frame has been completed although one was requested.
     pub(crate) fn since_last_frame(&self) -> Duration {
         let news = self.lock();
         news.started.elapsed().saturating_sub(news.last_completed)
+    }
+
+    /// Whether the picture rests: nothing has been requested for a while. With a dial, what it says of the picture.
+    pub(crate) fn resting(&self) -> Option<Vec<String>> {
+        let news = self.lock();
+        let (since, dial) = news.quiet.as_ref()?;
+        (news.started.elapsed().saturating_sub(*since) >= QUIET).then(|| dial.clone())
+    }
+
+    /// Notes whether anything is requested. Figures of the time before a rest say nothing of the time after it.
+    fn note_rest(&self, rests: Option<Vec<String>>) {
+        let mut news = self.lock();
+        let now = news.started.elapsed();
+        match (rests, news.quiet.take()) {
+            (Some(dial), before) => news.quiet = Some((before.map_or(now, |(since, _)| since), dial)),
+            (None, Some((since, _))) if now.saturating_sub(since) >= QUIET => {
+                news.rate.rested();
+                news.last_completed = now;
+                news.rest = now.saturating_sub(since);
+            }
+            (None, _) => {}
+        }
     }
 
     /// What keeps frames from coming, if that is known.
@@ -151,7 +180,11 @@ impl NewsDesk {
         let mut news = self.lock();
         let at = news.started.elapsed();
         news.rate.completed(at, frame.elapsed);
-        news.accounts.add(at, &frame.account);
+        let rest = std::mem::take(&mut news.rest);
+        match rest {
+            Duration::ZERO => news.accounts.add(at, &frame.account),
+            rest => news.accounts.add(at, &frame.account.without_rest(rest)),
+        }
         let line = FrameLine::of(&frame, news.completed, at, frame.elapsed, news.rate.fps(at));
         news.completed += 1;
         news.last_completed = at;
@@ -189,18 +222,20 @@ async fn drive(
     desk: &NewsDesk,
     stop: &CancellationToken,
 ) -> Result<(), CommandError> {
-    let Orders { mut wanted, animation, limit, mut log, dial } = orders;
-    let mut requests = Requests::new(animation, limit, dial);
+    let Orders { mut wanted, pace, mut log, dial } = orders;
+    let limit = pace.limit;
+    let mut requests = Requests::new(pace, dial);
     let mut look = tokio::time::interval(STATUS_EVERY);
     let mut window_is_there = true;
     requests.fill(farm, &wanted.borrow_and_update().clone());
     loop {
+        desk.note_rest(requests.at_rest());
         tokio::select! {
             biased;
             () = stop.cancelled() => return Ok(()),
             frame = farm.finished() => {
                 let Some(frame) = desk.frame_or_trouble(frame)? else { continue };
-                let answered = requests.finished(&frame);
+                let answered = requests.finished(frame.frame, frame.elapsed, &frame.account);
                 let line = desk.completed_frame(frame, answered);
                 if let Some(log) = &mut log {
                     log.add(&line)?;

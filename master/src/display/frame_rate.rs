@@ -13,16 +13,27 @@ const MAX_FRAMES: usize = 512;
 pub(crate) struct FrameRate {
     /// When each frame completed and what it took; the first is the one before the window.
     frames: VecDeque<(Duration, Duration)>,
+    /// Whether nothing has been requested since the last frame.
+    rested: bool,
 }
 
 impl FrameRate {
     /// A frame that took `elapsed` was completed `at`.
     pub(crate) fn completed(&mut self, at: Duration, elapsed: Duration) {
+        if std::mem::take(&mut self.rested) {
+            self.frames.clear();
+            self.frames.push_back((at.saturating_sub(elapsed), elapsed));
+        }
         self.frames.push_back((at, elapsed));
         let old = |frame: Option<&(Duration, Duration)>| frame.is_some_and(|(then, _)| *then + WINDOW < at);
         while self.frames.len() > MAX_FRAMES || old(self.frames.get(1)) {
             self.frames.pop_front();
         }
+    }
+
+    /// Nothing was requested for a while: the rate counts anew from the beginning of the next frame.
+    pub(crate) fn rested(&mut self) {
+        self.rested = true;
     }
 
     /// Frames per second at the moment `now`; zero before the second frame. Falls when frames stop coming.
@@ -78,6 +89,17 @@ mod tests {
             rate.completed(MS * 4000 * frame, MS * 4000);
         }
         assert!((rate.fps(MS * 16_000) - 0.25).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_rest_is_no_slow_frame() {
+        let mut rate = FrameRate::default();
+        (0..50).for_each(|frame| rate.completed(MS * 20 * frame, MS * 15));
+        rate.rested();
+        assert_eq!(rate.frame_time(), MS * 15, "what the last frames took is still known");
+        rate.completed(MS * 60_000, MS * 25);
+        assert!((rate.fps(MS * 60_000) - 40.0).abs() < 1e-9, "{}", rate.fps(MS * 60_000));
+        assert_eq!(rate.frame_time(), MS * 25);
     }
 
     #[test]

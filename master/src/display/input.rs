@@ -53,15 +53,19 @@ pub(super) struct Happened {
     pub(super) let_go: bool,
     /// K was pressed.
     pub(super) kick: bool,
+    /// B was pressed.
+    pub(super) bring_back: bool,
     /// Esc was pressed.
     pub(super) end: bool,
+    /// A key is down or was, or the mouse has moved.
+    pub(super) any: bool,
 }
 
 impl Happened {
     /// Whether workers are meant.
     pub(super) fn steers(&self) -> bool {
-        let Self { toggle_accounts, select_next, toggle_pause, let_go, kick, .. } = *self;
-        toggle_accounts || select_next > 0 || toggle_pause || let_go || kick
+        let Self { toggle_accounts, select_next, toggle_pause, let_go, kick, bring_back, .. } = *self;
+        toggle_accounts || select_next > 0 || toggle_pause || let_go || kick || bring_back
     }
 }
 
@@ -88,7 +92,9 @@ impl Controls {
         let drag = self.mouse.drag(at, pressed, window.get_size().1);
         let wheel =
             window.get_scroll_wheel().map_or(0.0, |(_, units)| f64::from(units) * self.notches_per_unit);
+        let moved = self.mouse.moved(window.get_unscaled_mouse_pos(MouseMode::Discard));
         Happened {
+            any: moved || pressed || wheel != 0.0 || !strokes.held.is_empty(),
             camera: Input {
                 held: held(&strokes.held),
                 drag,
@@ -103,6 +109,7 @@ impl Controls {
             toggle_pause: strokes.toggled(Key::P),
             let_go: strokes.pressed.contains(&Key::L),
             kick: strokes.pressed.contains(&Key::K),
+            bring_back: strokes.pressed.contains(&Key::B),
             end: strokes.pressed.contains(&Key::Escape),
         }
     }
@@ -188,13 +195,19 @@ fn held(keys: &[Key]) -> Held {
     }
 }
 
-/// Where a drag was last seen.
+/// Where the mouse and a drag were last seen.
 #[derive(Debug, Default)]
 struct Mouse {
+    at: Option<(f32, f32)>,
     dragged_from: Option<(f32, f32)>,
 }
 
 impl Mouse {
+    /// Whether it has moved since the last look.
+    fn moved(&mut self, at: Option<(f32, f32)>) -> bool {
+        std::mem::replace(&mut self.at, at) != at
+    }
+
     /// How far the pressed mouse moved since the last look, as shares of the window's height.
     fn drag(&mut self, at: Option<(f32, f32)>, pressed: bool, window_height: usize) -> (f64, f64) {
         let to = if pressed { at } else { None };

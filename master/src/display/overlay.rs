@@ -3,9 +3,15 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use accounts::AccountPanel;
+use legend::Entry;
+
 use super::canvas::{Canvas, GLYPH, Rect};
+use crate::addresses::Reachable;
+use crate::farm::KickedWorker;
 
 pub(super) mod accounts;
+mod kicked;
 pub(super) mod legend;
 
 /// Between lines, and between text and the edge of its panel, in dots.
@@ -15,7 +21,7 @@ const WHITE: u32 = 0x00f4_f4f4;
 const SOFT: u32 = 0x00c4_ccd4;
 
 /// The keys of the window, and what each does.
-const KEYS: [(&str, &str); 15] = [
+const KEYS: [(&str, &str); 16] = [
     ("W A S D", "move"),
     ("Q E", "move down, up"),
     ("arrows", "look around"),
@@ -29,16 +35,53 @@ const KEYS: [(&str, &str); 15] = [
     ("P", "pause, resume (all or selected)"),
     ("L", "let the selected worker go"),
     ("K", "kick the selected worker"),
+    ("B", "bring back who was kicked or let go"),
     ("H", "hide this list"),
     ("Esc", "end"),
 ];
 
+/// All that is written over a picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Overlay {
+    pub(super) figures: Option<Figures>,
+    /// A title and what each colour means.
+    pub(super) legend: Option<(&'static str, Vec<Entry>)>,
+    pub(super) accounts: Option<AccountPanel>,
+    pub(super) help: bool,
+    /// What the window waits for: the picture is not the newest.
+    pub(super) message: Option<Vec<String>>,
+}
+
+impl Overlay {
+    /// Draws it over what is there.
+    pub(super) fn draw(&self, canvas: &mut Canvas) {
+        // The picture alone: panels on it stay as readable as ever.
+        if self.message.is_some() {
+            canvas.darken(Rect { x: 0, y: 0, width: canvas.width(), height: canvas.height() });
+        }
+        if let Some(figures) = &self.figures {
+            draw_figures(canvas, figures);
+        }
+        if let Some((title, entries)) = &self.legend {
+            legend::draw_legend(canvas, title, entries);
+        }
+        if let Some(accounts) = &self.accounts {
+            accounts.draw(canvas);
+        }
+        if self.help {
+            draw_help(canvas);
+        } else if let Some(message) = &self.message {
+            draw_centred(canvas, message, 1);
+        }
+    }
+}
+
 /// The figures in the corner.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Figures {
-    /// Completed frames per second.
-    pub(super) fps: f64,
-    /// What a frame takes.
+    /// Completed frames per second; `None` at rest, when none are requested.
+    pub(super) fps: Option<f64>,
+    /// What a frame takes, or took.
     pub(super) frame_time: Duration,
     /// From an input to its picture on the screen, where that is known.
     pub(super) latency: Option<Duration>,
@@ -85,12 +128,16 @@ impl Figures {
 
     /// As it also stands in the title.
     pub(super) fn speed(&self) -> String {
-        format!("{} FPS  {} ms", three_digits(self.fps), three_digits(self.frame_time.as_secs_f64() * 1e3))
+        let frame_time = three_digits(self.frame_time.as_secs_f64() * 1e3);
+        match self.fps {
+            Some(fps) => format!("{} FPS  {frame_time} ms", three_digits(fps)),
+            None => format!("at rest  {frame_time} ms"),
+        }
     }
 }
 
 /// Draws the figures in the upper left corner.
-pub(super) fn draw_figures(canvas: &mut Canvas, figures: &Figures) {
+fn draw_figures(canvas: &mut Canvas, figures: &Figures) {
     let lines = figures.lines();
     let panel = Panel::fit(canvas, &lines);
     let at = MARGIN * panel.scale;
@@ -98,16 +145,10 @@ pub(super) fn draw_figures(canvas: &mut Canvas, figures: &Figures) {
 }
 
 /// Draws the list of keys in the middle.
-pub(super) fn draw_help(canvas: &mut Canvas) {
+fn draw_help(canvas: &mut Canvas) {
     let widest = KEYS.iter().map(|(keys, _)| keys.len()).max().unwrap_or(0);
     let lines: Vec<String> = KEYS.iter().map(|(keys, what)| format!("{keys:widest$}  {what}")).collect();
     draw_centred(canvas, &lines, lines.len());
-}
-
-/// Draws a message in the middle, the rest of the picture darkened: it is not the newest.
-pub(super) fn draw_message(canvas: &mut Canvas, lines: &[String]) {
-    canvas.darken(Rect { x: 0, y: 0, width: canvas.width(), height: canvas.height() });
-    draw_centred(canvas, lines, 1);
 }
 
 /// What the window says while there is no worker. `trouble` is what became of this machine's own.
@@ -115,6 +156,7 @@ pub(super) fn waiting_for_workers(
     address: SocketAddr,
     local_workers: u32,
     trouble: Option<&str>,
+    kicked: &[KickedWorker],
 ) -> Vec<String> {
     let first = match (trouble, local_workers) {
         (Some(trouble), _) => format!("Waiting for a worker: {trouble}."),
@@ -122,43 +164,16 @@ pub(super) fn waiting_for_workers(
         (None, 1) => "Waiting for this machine's worker.".to_owned(),
         (None, n) => format!("Waiting for this machine's {n} workers."),
     };
-    let where_to = if address.ip().is_loopback() { "on this machine" } else { "on any machine" };
-    vec![first, String::new(), format!("To start one {where_to}:"), worker_command(address)]
+    let mut lines = vec![first];
+    lines.extend(kicked::way_back(kicked, trouble.is_some() && local_workers > 0));
+    lines.push(String::new());
+    lines.extend(Reachable::of(address).for_window());
+    lines
 }
 
 /// What the window says while nobody may render.
 pub(super) fn all_paused() -> Vec<String> {
     vec!["All workers are paused.".to_owned(), String::new(), "P: go on".to_owned()]
-}
-
-/// The command line that starts a worker for a master that listens on `address`.
-pub(crate) fn worker_command(address: SocketAddr) -> String {
-    format!("rayfarm-worker --master {}", reachable(address))
-}
-
-/// An address that others can connect to: "any" is where a socket listens, not where one connects.
-fn reachable(address: SocketAddr) -> SocketAddr {
-    if !address.ip().is_unspecified() {
-        return address;
-    }
-    SocketAddr::new(own_address(address.is_ipv6()), address.port())
-}
-
-/// The address of the interface that leads out of this machine. Connecting a datagram socket only asks the routing
-/// table; nothing is sent. Without a route it is the loopback address.
-fn own_address(ipv6: bool) -> std::net::IpAddr {
-    use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, UdpSocket};
-    // Addresses reserved for documentation: RFC 5737 and RFC 3849.
-    let (any, outside): (IpAddr, IpAddr) = if ipv6 {
-        (Ipv6Addr::UNSPECIFIED.into(), Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into())
-    } else {
-        (Ipv4Addr::UNSPECIFIED.into(), Ipv4Addr::new(192, 0, 2, 1).into())
-    };
-    let asked = UdpSocket::bind((any, 0))
-        .and_then(|socket| socket.connect((outside, 9)).and_then(|()| socket.local_addr()))
-        .map(|own| own.ip());
-    let loopback = if ipv6 { Ipv6Addr::LOCALHOST.into() } else { Ipv4Addr::LOCALHOST.into() };
-    asked.unwrap_or(loopback)
 }
 
 fn draw_centred(canvas: &mut Canvas, lines: &[String], bright: usize) {
@@ -177,7 +192,7 @@ struct Panel {
 impl Panel {
     /// The largest text that fits and suits the canvas; lines that are too long even for the smallest are broken.
     fn fit(canvas: &Canvas, lines: &[String]) -> Self {
-        let suits = Self::suited_to(canvas);
+        let suits = Self::suited_to(canvas.height());
         let panel = |scale| Self { lines: lines.to_vec(), scale };
         let fits = |panel: &Self| {
             panel.width() + 2 * MARGIN <= canvas.width() && panel.height() + 2 * MARGIN <= canvas.height()
@@ -189,8 +204,8 @@ impl Panel {
     }
 
     /// The scale of text that suits a canvas of this height.
-    fn suited_to(canvas: &Canvas) -> usize {
-        ((canvas.height() + 225) / 450).clamp(1, 4)
+    fn suited_to(height: usize) -> usize {
+        ((height + 225) / 450).clamp(1, 4)
     }
 
     fn width(&self) -> usize {
@@ -255,7 +270,7 @@ pub(crate) fn grouped(number: u64) -> String {
     text
 }
 
-fn three_digits(value: f64) -> String {
+pub(crate) fn three_digits(value: f64) -> String {
     match value {
         value if value < 10.0 => format!("{value:.2}"),
         value if value < 100.0 => format!("{value:.1}"),

@@ -2,9 +2,6 @@
 
 use minifb::{ScaleMode, Window, WindowOptions};
 
-/// Looks at the input this many times a second; pictures are shown as they come.
-const UPDATES_PER_SECOND: usize = 120;
-
 /// Opens a window whose inside has the given size.
 ///
 /// # Errors
@@ -13,10 +10,7 @@ pub(super) fn open(title: &str, width: u32, height: u32) -> Result<Window, Strin
     let _probe = x11::Probe::new()?;
     let options =
         WindowOptions { resize: true, scale_mode: ScaleMode::UpperLeft, ..WindowOptions::default() };
-    let mut window =
-        Window::new(title, width as usize, height as usize, options).map_err(|error| error.to_string())?;
-    window.set_target_fps(UPDATES_PER_SECOND);
-    Ok(window)
+    Window::new(title, width as usize, height as usize, options).map_err(|error| error.to_string())
 }
 
 /// minifb 0.29 needs 32 bits a pixel. It does notice an X screen without them, but then frees the screen's graphics
@@ -28,7 +22,7 @@ pub(super) fn open(title: &str, width: u32, height: u32) -> Result<Window, Strin
     target_os = "netbsd",
     target_os = "openbsd"
 ))]
-mod x11 {
+pub(super) mod x11 {
     use std::ptr;
 
     use x11_dl::xlib::{Display, Xlib};
@@ -36,15 +30,21 @@ mod x11 {
     /// A connection to the X screen, if there is one, that minifb would survive too.
     ///
     /// Keep it until the window is open: a server without clients resets itself, and would refuse the next one meanwhile.
-    pub(super) struct Probe(Option<(Xlib, *mut Display)>);
+    pub(in crate::display) struct Probe(Option<Connection>);
+
+    /// An open connection to the X server that `$DISPLAY` names; closed when dropped.
+    pub(in crate::display) struct Connection {
+        pub(in crate::display) xlib: Xlib,
+        pub(in crate::display) display: *mut Display,
+    }
 
     impl Probe {
         /// Refuses an X screen whose pixels do not have 32 bits. One that cannot be asked is left to minifb's report.
-        pub(super) fn new() -> Result<Self, String> {
+        pub(in crate::display) fn new() -> Result<Self, String> {
             if std::env::var_os("WAYLAND_DISPLAY").is_some() {
                 return Ok(Self(None)); // minifb tries Wayland first
             }
-            let probe = Self(Xlib::open().ok().and_then(connect));
+            let probe = Self(Connection::open());
             match probe.bits_per_pixel() {
                 Some(bits) if bits != 32 => Err(format!(
                     "the screen has {bits} bits per pixel; a depth of 24 with 32 bits per pixel is needed"
@@ -55,7 +55,7 @@ mod x11 {
 
         /// Bits that a pixel of the default screen takes in memory.
         fn bits_per_pixel(&self) -> Option<i32> {
-            let (xlib, display) = self.0.as_ref()?;
+            let Connection { xlib, display } = self.0.as_ref()?;
             let mut count = 0;
             // SAFETY: the display is open until `self` is dropped. XListPixmapFormats returns null, or an array of
             // `count` formats that is the caller's to read until it is freed with XFree; the slice ends before that.
@@ -75,23 +75,27 @@ mod x11 {
         }
     }
 
-    impl Drop for Probe {
-        fn drop(&mut self) {
-            if let Some((xlib, display)) = self.0.take() {
-                // SAFETY: `connect` opened the display, `take` makes this its only closing, and nothing uses it after.
-                unsafe { (xlib.XCloseDisplay)(display) };
-            }
+    impl Connection {
+        /// `None` where there is no X, or no server that takes clients.
+        pub(in crate::display) fn open() -> Option<Self> {
+            let xlib = Xlib::open().ok()?;
+            // SAFETY: XInitThreads has no precondition but to come before all other Xlib calls of the process, and the
+            // first of these is here; it may be called again. XOpenDisplay takes null for "what $DISPLAY names" and
+            // returns null where it cannot connect.
+            let display = unsafe {
+                (xlib.XInitThreads)();
+                (xlib.XOpenDisplay)(ptr::null())
+            };
+            // Made only where there is a display: it is closed when this is dropped.
+            (!display.is_null()).then(|| Self { xlib, display })
         }
     }
 
-    fn connect(xlib: Xlib) -> Option<(Xlib, *mut Display)> {
-        // SAFETY: XInitThreads has no precondition but to come before all other Xlib calls of the process, and this is
-        // the first; XOpenDisplay takes null for "what $DISPLAY names" and returns null where it cannot connect.
-        let display = unsafe {
-            (xlib.XInitThreads)();
-            (xlib.XOpenDisplay)(ptr::null())
-        };
-        (!display.is_null()).then_some((xlib, display))
+    impl Drop for Connection {
+        fn drop(&mut self) {
+            // SAFETY: `open` opened the display, this is its only closing, and nothing uses it after.
+            unsafe { (self.xlib.XCloseDisplay)(self.display) };
+        }
     }
 }
 
@@ -104,11 +108,11 @@ mod x11 {
 )))]
 mod x11 {
     /// No X here.
-    pub(super) struct Probe;
+    pub(in crate::display) struct Probe;
 
     impl Probe {
         /// Nothing to refuse.
-        pub(super) fn new() -> Result<Self, String> {
+        pub(in crate::display) fn new() -> Result<Self, String> {
             Ok(Self)
         }
     }

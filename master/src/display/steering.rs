@@ -19,6 +19,7 @@ pub(super) enum Wish {
     Resume(Vec<u64>),
     Drain(u64),
     Kick(u64),
+    BringBack,
 }
 
 impl Steering {
@@ -37,6 +38,7 @@ impl Steering {
         }
         wishes.extend(self.selected.filter(|_| keys.let_go).map(Wish::Drain));
         wishes.extend(self.selected.filter(|_| keys.kick).map(Wish::Kick));
+        wishes.extend(keys.bring_back.then_some(Wish::BringBack));
         wishes
     }
 
@@ -82,6 +84,7 @@ impl Wish {
             Self::Resume(ids) => each(ids, FarmControl::resume),
             Self::Drain(id) => each(&[*id], FarmControl::drain),
             Self::Kick(id) => each(&[*id], |farm, id| farm.kick(id, KICKED)),
+            Self::BringBack => farm.bring_back(),
         }
     }
 }
@@ -94,6 +97,7 @@ mod tests {
         let worker = |(index, &state): (usize, &WorkerState)| WorkerStatus {
             id: index as u64 + 1,
             name: "w".into(),
+            local: false,
             address: ([127, 0, 0, 1], 9).into(),
             threads: 1,
             segments_done: 0,
@@ -134,6 +138,14 @@ mod tests {
         assert_eq!(steering.step(&away, &status), [Wish::Drain(2), Wish::Kick(2)]);
         steering.step(&keys(|keys| keys.toggle_accounts = true), &status);
         assert_eq!(steering.step(&away, &status), []);
+    }
+
+    #[test]
+    fn workers_are_brought_back_though_none_is_there_or_in_sight() {
+        let mut steering = Steering::default();
+        let back = keys(|keys| keys.bring_back = true);
+        assert!(back.steers());
+        assert_eq!(steering.step(&back, &status(&[])), [Wish::BringBack]);
     }
 
     #[test]

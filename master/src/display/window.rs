@@ -12,17 +12,26 @@ use tokio_util::sync::CancellationToken;
 use super::canvas::{Canvas, Picture};
 use super::feed::{Arrival, NewsDesk};
 use super::input::{Controls, Happened};
-use super::overlay::{self, Figures, accounts, legend};
+use super::overlay::accounts::AccountPanel;
+use super::overlay::{self, Figures, Overlay};
+use super::requests::WindowState;
 use super::screen;
 use super::steering::{self, Steering};
 use super::tint::Coloring;
+use super::watch::Watch;
 use crate::camera_control::CameraControl;
 use crate::farm::{FarmControl, FarmStatus, FinishedFrame};
 use crate::wanted::WantedPicture;
 
-/// A window whose picture has not changed is drawn again this often: another window may have covered it, and the
-/// figures want to be new.
-const REDRAW_EVERY: Duration = Duration::from_millis(200);
+/// This often the figures are looked at, and drawn if they have changed.
+const FIGURES_EVERY: Duration = Duration::from_millis(200);
+/// The input is looked at this many times a second while something happens, while nothing does, and while the window
+/// is hidden.
+const UPDATES: usize = 120;
+const RESTING_UPDATES: usize = 30;
+const HIDDEN_UPDATES: usize = 10;
+/// After the last input, something is expected to happen for this long.
+const ALERT: Duration = Duration::from_secs(1);
 const TITLE_EVERY: Duration = Duration::from_millis(500);
 /// A frame that takes longer than this is told how far it is.
 const PATIENCE: Duration = Duration::from_millis(700);
@@ -44,11 +53,16 @@ pub(crate) struct About {
 
 /// A window on the screen that shows nothing yet.
 pub(crate) struct Display {
+    /// Dropped before the window that it watches.
+    watch: Watch,
     window: Window,
     controls: Controls,
     about: About,
     canvas: Canvas,
     picture: Option<FinishedFrame>,
+    /// What is written over it on the screen.
+    shown: Overlay,
+    title: String,
     /// What the dial says of it.
     dial: Vec<String>,
     /// When the picture was asked for, until it is on the screen.
@@ -62,7 +76,7 @@ pub(crate) struct Display {
 /// The two ways between the window and the farm.
 pub(crate) struct Link {
     /// Where the newest view goes.
-    pub(crate) wanted: watch::Sender<WantedPicture>,
+    pub(crate) wanted: watch::Sender<WindowState>,
     /// Where the newest picture comes from.
     pub(crate) desk: NewsDesk,
     /// Where commands to workers go.
@@ -79,14 +93,18 @@ impl Display {
     /// # Errors
     /// Why there is no display.
     pub(crate) fn open(about: About, width: u32, height: u32) -> Result<Self, String> {
-        let mut window = screen::open(&format!("rayfarm - {}", about.name), width, height)?;
+        let title = format!("rayfarm - {}", about.name);
+        let mut window = screen::open(&title, width, height)?;
         let controls = Controls::of(&mut window);
         Ok(Self {
+            watch: Watch::of(&window),
             window,
             controls,
             about,
             canvas: Canvas::default(),
             picture: None,
+            shown: Overlay::default(),
+            title,
             dial: Vec::new(),
             asked_at: None,
             show_help: false,
@@ -108,11 +126,16 @@ impl Display {
     ) -> Result<(), String> {
         // Whatever ends the window ends the farm: who waits for it waits in vain otherwise.
         let _ended = link.stop.clone().drop_guard();
-        let (mut last_step, mut last_draw, mut last_title) = (Instant::now(), None, Instant::now());
+        let (mut last_step, mut last_look, mut last_title) = (Instant::now(), None, Instant::now());
+        let mut last_input = Instant::now();
         while self.window.is_open() && !link.stop.is_cancelled() {
             let happened = self.controls.look(&mut self.window);
+            self.watch.look();
             if happened.end {
                 break;
+            }
+            if happened.any {
+                last_input = Instant::now();
             }
             camera.step(&happened.camera, last_step.elapsed().as_secs_f64());
             last_step = Instant::now();
@@ -120,14 +143,18 @@ impl Display {
             self.ask_for(WantedPicture { view, ..wanted }, link);
 
             let fresh = self.take_news(&happened, link) | self.steer(&happened, link);
-            if fresh || last_draw.is_none_or(|then: Instant| then.elapsed() > REDRAW_EVERY) {
-                self.draw(link)?;
-                last_draw = Some(Instant::now());
-            } else {
+            let fresh = fresh | (self.window.get_size() != (self.canvas.width(), self.canvas.height()));
+            let stale = last_look.is_none_or(|then: Instant| then.elapsed() > FIGURES_EVERY);
+            if stale || fresh {
+                last_look = Some(Instant::now());
+            }
+            self.set_pace(last_input.elapsed() < ALERT, link);
+            let exposed = self.watch.take_exposed();
+            if self.watch.is_hidden() || !self.draw_if(fresh || exposed, stale, link)? {
                 self.window.update();
             }
             if last_title.elapsed() > TITLE_EVERY {
-                self.window.set_title(&self.title(link));
+                self.set_title(link);
                 last_title = Instant::now();
             }
         }
@@ -140,7 +167,18 @@ impl Display {
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(MAX_SIDE).clamp(1, MAX_SIDE);
         let view = FrameView { width: side(width), height: side(height), ..picture.view };
         let picture = WantedPicture { view, ..picture };
-        link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, picture) != picture);
+        let state = WindowState { picture, hidden: self.watch.is_hidden() };
+        link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, state) != state);
+    }
+
+    /// Looks often where something happens, and seldom where nothing does: looking costs as well.
+    fn set_pace(&mut self, alert: bool, link: &Link) {
+        let updates = match (self.watch.is_hidden(), alert || link.desk.resting().is_none()) {
+            (true, _) => HIDDEN_UPDATES,
+            (false, true) => UPDATES,
+            (false, false) => RESTING_UPDATES,
+        };
+        self.window.set_target_fps(updates);
     }
 
     /// Whether there is something new to see.
@@ -150,7 +188,9 @@ impl Display {
         (0..happened.next_coloring).for_each(|_| self.coloring = self.coloring.next());
         let mut fresh = happened.toggle_help || happened.toggle_figures || happened.next_coloring > 0;
         if let Some(Arrival { frame, asked_at, dial }) = link.desk.take_picture() {
-            (self.picture, self.asked_at, self.dial) = (Some(frame), Some(asked_at), dial);
+            // What comes while the window is hidden is shown at some other time: that is no latency.
+            let asked_at = (!self.watch.is_hidden()).then_some(asked_at);
+            (self.picture, self.asked_at, self.dial) = (Some(frame), asked_at, dial);
             fresh = true;
         }
         fresh
@@ -167,7 +207,16 @@ impl Display {
         self.steering != before
     }
 
-    fn draw(&mut self, link: &Link) -> Result<(), String> {
+    /// Draws the window if it must be, or if it is time to look whether what is written on it has changed. Whether it was.
+    fn draw_if(&mut self, must: bool, look: bool, link: &Link) -> Result<bool, String> {
+        let overlay = (must || look).then(|| self.overlay(self.window.get_size(), link));
+        match overlay.filter(|overlay| must || *overlay != self.shown) {
+            Some(overlay) => self.draw(overlay, link).map(|()| true),
+            None => Ok(false),
+        }
+    }
+
+    fn draw(&mut self, overlay: Overlay, link: &Link) -> Result<(), String> {
         let (width, height) = self.window.get_size();
         self.canvas.resize(width, height);
         match &self.picture {
@@ -181,74 +230,84 @@ impl Display {
                 self.canvas.tint(&self.coloring.tints(&frame.account, frame.view.height));
             }
         }
-        self.draw_overlay(link);
+        overlay.draw(&mut self.canvas);
+        self.shown = overlay;
         self.window
             .update_with_buffer(self.canvas.pixels(), width, height)
             .map_err(|error| format!("the window takes no more pictures: {error}"))?;
+        self.watch.drawn();
         if let Some(asked_at) = self.asked_at.take() {
             link.desk.shown(asked_at.elapsed());
         }
         Ok(())
     }
 
-    fn draw_overlay(&mut self, link: &Link) {
+    /// What is to be written over the picture in a window of `size`.
+    fn overlay(&self, size: (usize, usize), link: &Link) -> Overlay {
         let status = link.desk.status();
-        let room_for_both = self.canvas.width() >= 640 && self.canvas.height() >= 480;
-        if self.show_figures && self.picture.is_some() && (room_for_both || !self.show_help) {
-            let figures = self.figures(&status, link);
-            overlay::draw_figures(&mut self.canvas, &figures);
+        let room_for_both = size.0 >= 640 && size.1 >= 480;
+        let figures = self.show_figures && self.picture.is_some() && (room_for_both || !self.show_help);
+        let selected = self.steering.selected;
+        Overlay {
+            figures: figures.then(|| self.figures(&status, link)),
+            legend: self.picture.as_ref().and_then(|frame| self.coloring.legend(&frame.account)),
+            accounts: self
+                .steering
+                .shown
+                .then(|| AccountPanel::new(size, &status, &link.desk.accounts(), selected)),
+            help: self.show_help,
+            message: self.message(&status, link),
         }
-        if let Some((title, entries)) =
-            self.picture.as_ref().and_then(|frame| self.coloring.legend(&frame.account))
-        {
-            legend::draw_legend(&mut self.canvas, title, &entries);
-        }
-        if self.steering.shown {
-            let selected = self.steering.selected;
-            accounts::draw_accounts(&mut self.canvas, &status, &link.desk.accounts(), selected);
-        }
-        if self.show_help {
-            overlay::draw_help(&mut self.canvas);
-        } else if status.workers.is_empty() {
+    }
+
+    /// What the window waits for, if it does.
+    fn message(&self, status: &FarmStatus, link: &Link) -> Option<Vec<String>> {
+        if status.workers.is_empty() {
             let trouble = link.desk.trouble();
-            let message =
-                overlay::waiting_for_workers(link.address, self.about.local_workers, trouble.as_deref());
-            overlay::draw_message(&mut self.canvas, &message);
-        } else if steering::all_paused(&status) {
-            overlay::draw_message(&mut self.canvas, &overlay::all_paused());
-        } else if self.picture.is_none() {
-            overlay::draw_message(&mut self.canvas, &first_picture(&status));
+            let local = self.about.local_workers;
+            return Some(overlay::waiting_for_workers(
+                link.address,
+                local,
+                trouble.as_deref(),
+                &status.kicked,
+            ));
         }
+        if steering::all_paused(status) {
+            return Some(overlay::all_paused());
+        }
+        self.picture.is_none().then(|| first_picture(status))
     }
 
     fn figures(&self, status: &FarmStatus, link: &Link) -> Figures {
         let (fps, frame_time) = link.desk.rate();
-        let wanted = *link.wanted.borrow();
+        let resting = link.desk.resting();
+        let wanted = link.wanted.borrow().picture;
         let view = wanted.view;
         let shown = self.picture.as_ref().map_or(wanted, |frame| wanted.shown_by(&frame.view));
         let slow = frame_time.max(link.desk.since_last_frame()) > PATIENCE && !status.workers.is_empty();
         Figures {
-            fps,
+            fps: resting.is_none().then_some(fps),
             frame_time,
             latency: link.desk.latency(),
             size: (view.width, view.height),
             samples: shown.view.samples,
-            dial: self.dial.clone(),
+            dial: resting.clone().unwrap_or_else(|| self.dial.clone()),
             reductions: shown.reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),
             triangles: self.about.triangles,
-            progress: slow.then(|| progress(status)),
+            progress: (slow && resting.is_none()).then(|| progress(status)),
         }
     }
 
-    fn title(&self, link: &Link) -> String {
-        let status = link.desk.status();
-        match &self.picture {
-            Some(_) => {
-                format!("rayfarm - {} - {}", self.about.name, self.figures(&status, link).speed())
-            }
-            None => format!("rayfarm - {}", self.about.name),
+    fn set_title(&mut self, link: &Link) {
+        let mut title = format!("rayfarm - {}", self.about.name);
+        if self.picture.is_some() {
+            title += &format!(" - {}", self.figures(&link.desk.status(), link).speed());
+        }
+        if self.title != title {
+            self.window.set_title(&title);
+            self.title = title;
         }
     }
 }

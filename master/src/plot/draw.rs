@@ -35,6 +35,8 @@ const LABEL_HEIGHT: i32 = 20;
 /// Pixels of a letter in the legend and of a label, of a line of the legend, and before its text.
 const LETTER: usize = 11;
 const LEGEND_LINE: i32 = 28;
+/// Pixels to the right of a plot without a legend: half of the last number stands there.
+const RIGHT: u32 = 24;
 const LEGEND_MARK: i32 = 44;
 /// With more points than this, marks would hide the line.
 const MAX_MARKS: usize = 80;
@@ -58,7 +60,10 @@ pub(super) fn draw<B: DrawingBackend>(chart: &Chart, backend: B) -> Result<(), P
         root.titled(&chart.title, (FontFamily::SansSerif, TITLE)).map_err(failed)?
     };
     let (width, _) = root.dim_in_pixel();
-    let (area, beside) = root.split_horizontally(width.saturating_sub(legend_width(chart)));
+    // One series without a name needs nothing that says which it is.
+    let has_legend = chart.series.iter().any(|series| !series.name.is_empty());
+    let beside = if has_legend { legend_width(chart) } else { RIGHT };
+    let (area, beside) = root.split_horizontally(width.saturating_sub(beside));
     let mut builder = ChartBuilder::on(&area);
     builder.margin(14).x_label_area_size(66).y_label_area_size(96);
     let mut context = builder.build_cartesian_2d(x.clone(), y.clone()).map_err(failed)?;
@@ -77,7 +82,9 @@ pub(super) fn draw<B: DrawingBackend>(chart: &Chart, backend: B) -> Result<(), P
         pen(index).draw(series)?;
     }
     pen(0).draw_labels(&chart.series)?;
-    legend(chart, &beside)?;
+    if has_legend {
+        legend(chart, &beside)?;
+    }
     root.present().map_err(failed)
 }
 

@@ -12,9 +12,9 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use plotters::backend::SVGBackend;
+use rayfarm_tracer::files::write_whole;
 use rayfarm_tracer::image;
 
-use crate::whole_file::write_whole;
 use canvas::Canvas;
 
 pub(crate) use table::{Columns, read_series};

@@ -1,9 +1,12 @@
 //! Series from CSV files with a first line of names.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
+use rayfarm_text::printable_within;
+use rayfarm_tracer::files::read_within;
 
 use super::{Line, PlotError, Point, Series};
 
@@ -11,6 +14,11 @@ use super::{Line, PlotError, Point, Series};
 const MAX_SERIES: usize = 24;
 /// Far more than a picture has pixels to show.
 const MAX_POINTS: usize = 1_000_000;
+/// Bytes of one table.
+const MAX_BYTES: u64 = 256 << 20;
+/// Columns that a message lists, and bytes that it quotes of a field.
+const MAX_LISTED: usize = 40;
+const MAX_QUOTED_BYTES: usize = 60;
 
 /// Which columns say what.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -79,8 +87,9 @@ impl Places {
     fn find(columns: &Columns, header: &StringRecord) -> Result<Self, String> {
         let place = |name: &String| {
             header.iter().position(|column| column == name).ok_or_else(|| {
-                let known: Vec<&str> = header.iter().collect();
-                format!("has no column \"{name}\", but {}", known.join(", "))
+                let known: Vec<_> = header.iter().take(MAX_LISTED).map(quoted).collect();
+                let more = if header.len() > MAX_LISTED { ", ..." } else { "" };
+                format!("has no column \"{name}\", but {}{more}", known.join(", "))
             })
         };
         let only = columns.only.iter().map(|(name, text)| Ok((place(name)?, text.clone())));
@@ -95,7 +104,9 @@ impl Places {
 }
 
 fn read_table(path: &Path, columns: &Columns, rows: &mut Vec<Row>) -> Result<(), String> {
-    let mut reader = csv::Reader::from_path(path).map_err(|error| error.to_string())?;
+    let text = read_within(path, MAX_BYTES).map_err(|error| error.to_string())?;
+    let text = text.ok_or_else(|| format!("has more than {MAX_BYTES} bytes, the limit"))?;
+    let mut reader = csv::Reader::from_reader(&text[..]);
     let places = Places::find(columns, reader.headers().map_err(|error| error.to_string())?)?;
     for record in reader.records() {
         let record = record.map_err(|error| error.to_string())?;
@@ -117,6 +128,11 @@ fn read_table(path: &Path, columns: &Columns, rows: &mut Vec<Row>) -> Result<(),
     Ok(())
 }
 
+/// Text of a table as messages show it.
+fn quoted(text: &str) -> Cow<'_, str> {
+    printable_within(text, MAX_QUOTED_BYTES)
+}
+
 /// A finite number, or nothing where there is no text.
 fn number(record: &StringRecord, place: usize, column: &str) -> Result<Option<f64>, String> {
     let text = record.get(place).unwrap_or_default().trim();
@@ -127,7 +143,7 @@ fn number(record: &StringRecord, place: usize, column: &str) -> Result<Option<f6
         Ok(number) if number.is_finite() => Ok(Some(number)),
         _ => {
             let line = record.position().map_or(0, csv::Position::line);
-            Err(format!("line {line}: \"{text}\" in column {column} is no number"))
+            Err(format!("line {line}: \"{}\" in column {column} is no number", quoted(text)))
         }
     }
 }

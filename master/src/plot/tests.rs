@@ -58,6 +58,27 @@ fn line_through(points: &[(f64, f64)]) -> Series {
 }
 
 #[test]
+fn a_single_series_without_a_name_has_no_legend_and_more_room() {
+    let named = chart(vec![line_through(&[(1.0, 10.0), (4.0, 20.0)])]);
+    let mut nameless = named.clone();
+    nameless.series[0].name.clear();
+    let widths = [&named, &nameless].map(|chart| {
+        let picture = chart.to_picture().unwrap();
+        let blue = [0, 114, 178];
+        let columns =
+            (0..picture.width).filter(|&x| (0..picture.height).any(|y| picture.pixel(x, y) == Some(blue)));
+        columns.collect::<Vec<_>>()
+    });
+    let [with_legend, without] = widths.map(|columns| *columns.last().unwrap());
+    // With a legend, its mark is the last of the colour, far to the right of the last point.
+    assert!(without > 1100, "the curve itself goes up to {without} of 1200 pixels");
+    let svgs = [&named, &nameless].map(|chart| chart.to_svg().unwrap());
+    assert!(svgs[0].contains("a series") && !svgs[1].contains("a series"));
+    let marks = |svg: &str| svg.matches("<circle").count();
+    assert_eq!(marks(&svgs[0]), marks(&svgs[1]) + 1, "no mark without a name; {with_legend}");
+}
+
+#[test]
 fn repeats_become_a_median_with_its_spread_and_rows_without_x_a_level() {
     let series = read(TABLE, &columns()).unwrap();
     assert_eq!(

@@ -62,6 +62,8 @@ const ADAPTIVE: Knob = Knob { name: "adaptive", matters: always, turn: |p| p.vie
 const HALF: Knob = Knob { name: "scale-1-2", matters: always, turn: |p| p.scale = RenderScale::Half };
 const THREE_QUARTERS: Knob =
     Knob { name: "scale-3-4", matters: always, turn: |p| p.scale = RenderScale::ThreeQuarters };
+const THIRD: Knob = Knob { name: "scale-1-3", matters: always, turn: |p| p.scale = RenderScale::Third };
+const QUARTER: Knob = Knob { name: "scale-1-4", matters: always, turn: |p| p.scale = RenderScale::Quarter };
 const NO_SHADOWS: Knob =
     Knob { name: "no-shadows", matters: |asked| asked.shadows, turn: |p| p.view.quality.shadows = false };
 const DIFFUSE: Knob = Knob {
@@ -99,6 +101,15 @@ const SETTINGS: &[Setting] = &[
     Setting { knobs: &[HALF, NO_SHADOWS] },
     Setting { knobs: &[HALF, DIFFUSE] },
     Setting { knobs: &[HALF, DIFFUSE, NO_SHADOWS] },
+    Setting { knobs: &[THIRD] },
+    Setting { knobs: &[THIRD, DIFFUSE] },
+    Setting { knobs: &[THIRD, NO_SHADOWS] },
+    Setting { knobs: &[QUARTER] },
+    Setting { knobs: &[QUARTER, DIFFUSE] },
+    Setting { knobs: &[QUARTER, NO_SHADOWS] },
+    Setting { knobs: &[THREE_QUARTERS, REDUCED] },
+    Setting { knobs: &[HALF, REDUCED] },
+    Setting { knobs: &[QUARTER, REDUCED] },
     Setting { knobs: &[HALF, SAMPLES_4] },
     Setting { knobs: &[THREE_QUARTERS, SAMPLES_4] },
     Setting { knobs: &[SAMPLES_4] },
@@ -139,9 +150,10 @@ impl Setting {
         names.join("+")
     }
 
-    /// The picture of that view under this setting. Whatever knobs were turned before are not.
+    /// The picture of that view under this setting. Whatever knobs were turned before are not; dither takes nothing away.
     pub(crate) fn applied_to(&self, view: &FrameView) -> WantedPicture {
-        let view = FrameView { samples: 1, quality: Quality::default(), ..*view };
+        let quality = Quality { dither: view.quality.dither, ..Quality::default() };
+        let view = FrameView { samples: 1, quality, ..*view };
         let mut picture = WantedPicture { view, scale: RenderScale::Full };
         for knob in self.knobs {
             (knob.turn)(&mut picture);

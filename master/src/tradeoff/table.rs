@@ -4,11 +4,11 @@
 //! any order, and columns that are not known are left alone; those of [`COLUMNS`] keep their names and their meaning.
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
+use rayfarm_text::printable_within;
+use rayfarm_tracer::files::read_within;
 use rayfarm_tracer::image::{Difference, MAX_SIDE};
 use serde::Serialize;
 
@@ -143,14 +143,10 @@ impl Table {
     /// or machines.
     pub(crate) fn read(path: &Path) -> Result<Self, TableError> {
         let refuse = |problem: String| TableError { path: path.to_owned(), problem };
-        let mut text = Vec::new();
-        let file = File::open(path).map_err(|error| refuse(error.to_string()))?;
-        file.take(MAX_BYTES + 1).read_to_end(&mut text).map_err(|error| refuse(error.to_string()))?;
-        if text.len() as u64 > MAX_BYTES {
-            return Err(refuse(format!(
-                "has more than {MAX_BYTES} bytes: no table of tradeoff is that long"
-            )));
-        }
+        let text =
+            read_within(path, MAX_BYTES).map_err(|error| refuse(error.to_string()))?.ok_or_else(|| {
+                refuse(format!("has more than {MAX_BYTES} bytes: no table of tradeoff is that long"))
+            })?;
         Self::parse(&text).map_err(refuse)
     }
 
@@ -166,7 +162,10 @@ impl Table {
             let one = fields.table().map_err(|problem| format!("line {line}: {problem}"))?;
             let row = &one.rows[0];
             if !names.insert(row.setting.clone()) {
-                return Err(format!("line {line}: setting \"{}\" is there twice", row.setting));
+                return Err(format!(
+                    "line {line}: setting \"{}\" is there twice",
+                    printable_within(&row.setting, MAX_NAME)
+                ));
             }
             match &mut table {
                 None => table = Some(one),
@@ -253,7 +252,10 @@ impl Fields<'_> {
             let (least, most) = (range.start(), range.end());
             let least =
                 if *least == f64::MIN_POSITIVE { "above 0".to_owned() } else { format!("from {least}") };
-            format!("column {column}: expected a number {least} to {most}, but found \"{text}\"")
+            format!(
+                "column {column}: expected a number {least} to {most}, but found \"{}\"",
+                printable_within(text, MAX_NAME)
+            )
         })
     }
 

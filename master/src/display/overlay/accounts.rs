@@ -1,9 +1,9 @@
 //! The panel of workers: what each does with its time, and which one is selected.
 
-use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, grouped};
+use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, grouped, kicked};
 use crate::accounting::{Fading, PART_COUNT, Smoothed};
 use crate::display::canvas::Canvas;
-use crate::farm::{FarmStatus, Verification, WorkerState, WorkerStatus};
+use crate::farm::{FarmStatus, Verification, WorkerState};
 
 /// What the parts are called where there is room for words, and where there is not.
 const WORDS: [&str; PART_COUNT] = ["trace", "wait", "encode", "send", "decode", "tail", "scene"];
@@ -43,12 +43,12 @@ impl Layout {
         Self { name: (NAMES.start() + spare).min(*NAMES.end()), ..layout }
     }
 
-    /// The largest text that leaves room for speeds and bytes, and what fits beside it.
-    fn fit(canvas: &Canvas) -> (Self, usize) {
-        let columns = |scale: usize| (canvas.width() / (GLYPH * scale)).saturating_sub(2);
+    /// The largest text that leaves room for speeds and bytes in a window of this size, and what fits beside it.
+    fn fit((width, height): (usize, usize)) -> (Self, usize) {
+        let columns = |scale: usize| (width / (GLYPH * scale)).saturating_sub(2);
         let [_, medium, _] = LAYOUTS;
         let roomy = |scale: &usize| columns(*scale) >= medium.columns();
-        let scale = (1..=Panel::suited_to(canvas)).rev().find(roomy).unwrap_or(1);
+        let scale = (1..=Panel::suited_to(height)).rev().find(roomy).unwrap_or(1);
         (Self::of(columns(scale)), scale)
     }
 
@@ -64,15 +64,23 @@ impl Layout {
         format!("  {:name$}{words}{}", "worker", figures.unwrap_or_default(), name = self.name)
     }
 
-    /// A worker's line; dashes where its time is nobody's loss.
-    fn line(&self, mark: char, name: &str, account: Option<Smoothed>, speed: f64) -> String {
+    /// A worker's line. `state`: what keeps it from working, in place of its shares; dashes where nothing is known.
+    fn line(
+        &self,
+        mark: char,
+        name: &str,
+        account: Option<Smoothed>,
+        state: Option<WorkerState>,
+        speed: f64,
+    ) -> String {
         let Self { part: width, digits, .. } = *self;
         let name: String = name.chars().take(self.name).collect();
-        let parts: String = match account {
-            Some(Smoothed { percent, .. }) => {
+        let parts: String = match (account, state) {
+            (_, Some(state)) => format!("  {:<rest$}", state.to_string(), rest = width * PART_COUNT - 2),
+            (Some(Smoothed { percent, .. }), None) => {
                 percent.iter().map(|part| format!("{part:>width$.digits$}")).collect()
             }
-            None => format!("{:>width$}", "-").repeat(PART_COUNT),
+            (None, None) => format!("{:>width$}", "-").repeat(PART_COUNT),
         };
         let bytes = account.map_or(0.0, |account| account.bytes);
         let rounded = |value: f64| grouped(value.round() as u64);
@@ -95,70 +103,81 @@ fn lines(
 ) -> Vec<(String, u32)> {
     let workers = &status.workers;
     let mut lines = vec![(layout.header(), SOFT)];
-    let below = if status.verification.is_some() { 5 } else { 4 };
+    let below = 4 + usize::from(status.verification.is_some()) + usize::from(!status.kicked.is_empty());
     let visible = room.saturating_sub(below).clamp(1, workers.len().max(1));
     let place = workers.iter().position(|worker| Some(worker.id) == selected).unwrap_or(0);
     let first = place.saturating_sub(visible - 1);
     for worker in workers.iter().skip(first).take(visible) {
         let mark = if Some(worker.id) == selected { '>' } else { ' ' };
-        let (account, color) = match worker.state {
-            WorkerState::Working => (accounts.of(worker.id), WHITE),
-            WorkerState::Paused => (None, SOFT),
-            WorkerState::Draining | WorkerState::Resting | WorkerState::Silent => {
-                (accounts.of(worker.id), SOFT)
-            }
+        let (state, color) = match worker.state {
+            WorkerState::Working => (None, WHITE),
+            state => (Some(state), SOFT),
         };
-        lines.push((layout.line(mark, &label(worker), account, worker.speed), color));
+        let name = format!("{} {}", worker.id, worker.name);
+        let account = accounts.of(worker.id).filter(|_| worker.state != WorkerState::Paused);
+        lines.push((layout.line(mark, &name, account, state, worker.speed), color));
     }
     if workers.len() > visible {
         lines.push((format!("  ... {} more", workers.len() - visible), SOFT));
     }
     if workers.len() > 1 {
         let speed = workers.iter().map(|worker| worker.speed).sum();
-        lines.push((layout.line(' ', "all", accounts.sum(), speed), WHITE));
+        lines.push((layout.line(' ', "all", accounts.sum(), None, speed), WHITE));
     }
     if let Some(Verification { verified, mismatches, .. }) = status.verification {
         let text = format!("  verified {}, wrong {}", grouped(verified), grouped(mismatches));
         lines.push((text, if mismatches > 0 { WHITE } else { SOFT }));
     }
+    if !status.kicked.is_empty() {
+        let text = format!("  {} (B: bring back)", kicked::told(&status.kicked));
+        lines.push((text.chars().take(layout.columns()).collect(), SOFT));
+    }
     lines.push((layout.hint.to_owned(), SOFT));
     lines
 }
 
-/// A worker's name, and what keeps it from working.
-fn label(worker: &WorkerStatus) -> String {
-    match worker.state {
-        WorkerState::Working => format!("{} {}", worker.id, worker.name),
-        state => format!("{} {state}: {}", worker.id, worker.name),
-    }
+/// The panel as it is shown in a window of a certain size.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::display) struct AccountPanel {
+    /// Each line with its colour.
+    lines: Vec<(String, u32)>,
+    scale: usize,
 }
 
-/// Draws the panel in the lower left corner.
-pub(in crate::display) fn draw_accounts(
-    canvas: &mut Canvas,
-    status: &FarmStatus,
-    accounts: &Fading,
-    selected: Option<u64>,
-) {
-    let (layout, scale) = Layout::fit(canvas);
-    let room = canvas.height() / 2 / (LINE * scale);
-    let (lines, colors): (Vec<String>, Vec<u32>) =
-        lines(&layout, status, accounts, selected, room).into_iter().unzip();
-    let panel = Panel { lines, scale };
-    let top = canvas.height().saturating_sub(panel.height() + MARGIN * scale);
-    panel.draw_in(canvas, MARGIN * scale, top, |index| colors.get(index).copied().unwrap_or(SOFT));
+impl AccountPanel {
+    /// For a window of `size`, pixels per row and rows.
+    pub(in crate::display) fn new(
+        size: (usize, usize),
+        status: &FarmStatus,
+        accounts: &Fading,
+        selected: Option<u64>,
+    ) -> Self {
+        let (layout, scale) = Layout::fit(size);
+        let room = size.1 / 2 / (LINE * scale);
+        Self { lines: lines(&layout, status, accounts, selected, room), scale }
+    }
+
+    /// Draws it in the lower left corner.
+    pub(super) fn draw(&self, canvas: &mut Canvas) {
+        let (lines, colors): (Vec<String>, Vec<u32>) = self.lines.iter().cloned().unzip();
+        let panel = Panel { lines, scale: self.scale };
+        let top = canvas.height().saturating_sub(panel.height() + MARGIN * panel.scale);
+        panel.draw_in(canvas, MARGIN * panel.scale, top, |index| colors.get(index).copied().unwrap_or(SOFT));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::accounting::{FrameAccount, Parts, WorkerAccount};
+    use crate::farm::WorkerStatus;
     use std::time::Duration;
 
     fn status(count: u64) -> FarmStatus {
         let worker = |id| WorkerStatus {
             id,
             name: format!("machine-{id}"),
+            local: false,
             address: ([127, 0, 0, 1], 9).into(),
             threads: 2,
             segments_done: 7,
@@ -188,7 +207,7 @@ mod tests {
         let words = |index: usize| texts[index].split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(words(0), "worker trace wait encode send decode tail scene rows/s KB/fr");
         assert_eq!(words(1), "1 machine-1 90.0 7.5 0.0 2.5 0.0 0.0 0.0 12,346 250");
-        assert_eq!(words(2), "> 2 paused: machine-2 - - - - - - - 12,346 0");
+        assert_eq!(words(2), "> 2 machine-2 paused 12,346 0");
         assert_eq!(words(3), "all 90.0 7.5 0.0 2.5 0.0 0.0 0.0 24,691 250");
     }
 
@@ -211,11 +230,35 @@ mod tests {
     }
 
     #[test]
+    fn a_worker_that_does_not_work_keeps_its_name_however_narrow_the_window_is() {
+        let states = [WorkerState::Paused, WorkerState::Draining, WorkerState::Resting, WorkerState::Silent];
+        for (columns, state) in
+            [38, 61, 120].into_iter().flat_map(|columns| states.map(|state| (columns, state)))
+        {
+            let mut status = status(1);
+            (status.workers[0].name, status.workers[0].state) = ("mill-7".to_owned(), state);
+            let lines = lines(&Layout::of(columns), &status, &accounts(), None, 20);
+            let (line, color) = &lines[1];
+            assert!(line.contains("1 mill-7") && line.contains(&state.to_string()), "{columns}: {line}");
+            assert_eq!((line.len(), *color), (lines[0].0.len(), SOFT), "{columns}: {line}");
+        }
+    }
+
+    #[test]
+    fn workers_that_were_kicked_are_named_with_the_key_that_brings_them_back() {
+        let kicked = ["mill", "barn"]
+            .map(|name| crate::farm::KickedWorker { id: 1, name: name.to_owned(), address: None })
+            .to_vec();
+        let status = FarmStatus { kicked, ..status(1) };
+        let lines = lines(&Layout::of(120), &status, &accounts(), None, 20);
+        let told = "  Kicked and kept out: mill, barn (B: bring back)";
+        assert!(lines.iter().any(|(text, _)| text == told), "{lines:#?}");
+    }
+
+    #[test]
     fn the_usual_window_has_large_text_with_speeds() {
         let layout = |width, height| {
-            let mut canvas = Canvas::default();
-            canvas.resize(width, height);
-            let (layout, scale) = Layout::fit(&canvas);
+            let (layout, scale) = Layout::fit((width, height));
             (layout.figures.is_some(), scale)
         };
         assert_eq!(

@@ -16,7 +16,7 @@ pub(in crate::display) struct Entry {
 }
 
 /// Draws the legend in the upper right corner.
-pub(in crate::display) fn draw_legend(canvas: &mut Canvas, title: &str, entries: &[Entry]) {
+pub(super) fn draw_legend(canvas: &mut Canvas, title: &str, entries: &[Entry]) {
     let mut lines = vec![title.to_owned()];
     let cut = |label: &str| label.chars().take(MAX_LABEL).collect::<String>();
     lines.extend(entries.iter().take(MAX_ENTRIES).map(|entry| format!("   {}", cut(&entry.label))));

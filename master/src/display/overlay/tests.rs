@@ -9,7 +9,7 @@ fn canvas(width: usize, height: usize) -> Canvas {
 
 fn figures() -> Figures {
     Figures {
-        fps: 31.25,
+        fps: Some(31.25),
         frame_time: Duration::from_micros(32_100),
         latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
@@ -67,15 +67,101 @@ fn the_dial_and_every_knob_that_is_not_at_full_have_a_line() {
 }
 
 #[test]
+fn at_rest_there_is_no_rate_but_what_the_last_frame_took() {
+    assert_eq!(Figures { fps: None, ..figures() }.speed(), "at rest  32.1 ms");
+    assert_eq!(figures().speed(), "31.2 FPS  32.1 ms");
+}
+
+#[test]
+fn a_worker_that_was_kicked_is_no_dead_end() {
+    let kicked = [kicked("local-1")];
+    let address = SocketAddr::from(([127, 0, 0, 1], 7117));
+    let message = waiting_for_workers(address, 1, Some("local worker 1 has left in order"), &kicked);
+    let expected = [
+        "Waiting for a worker: local worker 1 has left in order.",
+        "Kicked and kept out: local-1",
+        "",
+        "B: bring back",
+        "",
+        "To start one on this machine:",
+        "rayfarm-worker --master 127.0.0.1:7117",
+    ];
+    assert_eq!(message, expected);
+    assert!(KEYS.iter().any(|(key, _)| *key == "B"));
+}
+
+/// Contrast of two colours (WCAG 2.1): from 1 to 21.
+fn contrast(a: u32, b: u32) -> f64 {
+    let luminance = |color: u32| {
+        let channels = [16, 8, 0].map(|shift| rayfarm_tracer::srgb::decode((color >> shift) as u8));
+        0.2126 * channels[0] + 0.7152 * channels[1] + 0.0722 * channels[2]
+    };
+    let (a, b) = (luminance(a), luminance(b));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+/// Colours of letters, and those behind them, wherever a panel is: a letter's dots are those that differ from what the
+/// same panel shows without text.
+#[test]
+fn text_can_be_read_on_any_picture_also_where_the_window_waits() {
+    use crate::accounting::Fading;
+    use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
+    let worker = |id, state| WorkerStatus {
+        id,
+        name: format!("mill-{id}"),
+        address: ([127, 0, 0, 1], 9).into(),
+        threads: 2,
+        segments_done: 7,
+        speed: 12_345.6,
+        state,
+        local: false,
+        trouble: None,
+    };
+    let workers = vec![worker(1, WorkerState::Paused), worker(2, WorkerState::Working)];
+    let status = FarmStatus { workers, kicked: vec![kicked("barn")], ..FarmStatus::default() };
+    let accounts = AccountPanel::new((1024, 768), &status, &Fading::default(), Some(1));
+    for message in [None, Some(all_paused())] {
+        let overlay = Overlay {
+            figures: Some(figures()),
+            accounts: Some(accounts.clone()),
+            message,
+            ..Overlay::default()
+        };
+        for picture in [0x00ff_ffff, 0x0080_8080, 0, 0x00ff_ff00] {
+            let mut canvas = canvas(1024, 768);
+            canvas.fill(picture);
+            overlay.draw(&mut canvas);
+            // Panels darken to a quarter, once or twice; anything else that is there is a letter.
+            let quarter = |color: u32| color >> 2 & 0x003f_3f3f;
+            let grounds = [picture, quarter(picture), quarter(quarter(picture))];
+            let letters: std::collections::BTreeSet<u32> =
+                canvas.pixels().iter().copied().filter(|color| !grounds.contains(color)).collect();
+            let expected: Vec<u32> = [SOFT, WHITE].into_iter().filter(|c| !grounds.contains(c)).collect();
+            assert_eq!(letters.iter().copied().collect::<Vec<_>>(), expected, "on {picture:06x}");
+            for letter in letters {
+                for ground in &grounds[1..] {
+                    let contrast = contrast(letter, *ground);
+                    assert!(contrast >= 4.5, "{letter:06x} on {ground:06x}: {contrast:.1}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn every_window_size_can_be_drawn_on() {
-    let message =
-        waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 1, Some("it ended, 5 times in a row"));
+    let message = waiting_for_workers(
+        SocketAddr::from(([127, 0, 0, 1], 7117)),
+        1,
+        Some("it ended, 5 times in a row"),
+        &[],
+    );
     for width in [0, 1, 2, 7, 16, 40, 100, 333, 1024, 5000] {
         for height in [0, 1, 2, 9, 30, 90, 240, 2200] {
             let mut canvas = canvas(width, height);
             draw_figures(&mut canvas, &figures());
             draw_help(&mut canvas);
-            draw_message(&mut canvas, &message);
+            Overlay { message: Some(message.clone()), ..Overlay::default() }.draw(&mut canvas);
             assert_eq!(canvas.pixels().len(), width * height);
         }
     }
@@ -118,7 +204,7 @@ fn long_lines_are_broken_at_spaces_and_long_words_are_cut() {
 
 #[test]
 fn the_waiting_message_says_how_to_start_a_worker() {
-    let local = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 0, None);
+    let local = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 0, None, &[]);
     assert_eq!(
         local,
         [
@@ -128,22 +214,17 @@ fn the_waiting_message_says_how_to_start_a_worker() {
             "rayfarm-worker --master 127.0.0.1:7117"
         ]
     );
-    let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2, None);
+    let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2, None, &[]);
     assert_eq!(elsewhere[2], "To start one on any machine:");
     assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
-}
-
-#[test]
-fn nobody_is_told_to_connect_to_the_unspecified_address() {
-    for listening in ["0.0.0.0:7117", "[::]:7117"] {
-        let command = worker_command(listening.parse().unwrap());
-        let address: SocketAddr = command.rsplit(' ').next().unwrap().parse().unwrap();
-        assert!(!address.ip().is_unspecified() && address.port() == 7117, "{command}");
-    }
 }
 
 #[test]
 fn numbers_are_short() {
     assert_eq!([grouped(0), grouped(999), grouped(1000), grouped(99_938)], ["0", "999", "1,000", "99,938"]);
     assert_eq!([three_digits(0.254), three_digits(31.25), three_digits(240.4)], ["0.25", "31.2", "240"]);
+}
+
+fn kicked(name: &str) -> crate::farm::KickedWorker {
+    crate::farm::KickedWorker { id: 1, name: name.to_owned(), address: None }
 }
