@@ -13,10 +13,11 @@ use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcom
 
 use crate::control::Place;
 pub(crate) use values::Size;
-use values::{frame_count, ray_count, sample_count, size, thread_count, worker_count};
+use values::{frame_count, frame_index, ray_count, sample_count, size, thread_count, worker_count};
 
 mod dial;
 mod farm;
+mod models;
 mod picture;
 mod plot;
 mod simulate;
@@ -25,6 +26,7 @@ mod values;
 
 pub(crate) use dial::{DialArgs, ErrorArgs};
 pub(crate) use farm::FarmArgs;
+pub(crate) use models::ModelArgs;
 pub(crate) use picture::{PictureArgs, QualityArgs};
 pub(crate) use plot::PlotArgs;
 pub(crate) use simulate::{Profile, SimulateArgs};
@@ -118,14 +120,20 @@ pub(crate) struct ViewArgs {
     /// A scene (.toml), or a model (.obj or compiled); without it, the room that comes with rayfarm.
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
+    pub(crate) models: ModelArgs,
+    #[command(flatten)]
     pub(crate) farm: FarmArgs,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) dial: DialArgs,
-    /// End after N frames; without it, the window stays until Esc.
+    /// End after N frames; without it, the window stays until Esc. Frames are rendered although nothing changes.
     #[arg(long, value_name = "N", value_parser = frame_count)]
     pub(crate) frames: Option<u32>,
+    /// Render frame after frame although nothing changes or the window is hidden, to measure rates. Without it, a picture
+    /// at rest is rendered once.
+    #[arg(long)]
+    pub(crate) continuous: bool,
     /// Write a CSV line per frame.
     #[arg(long, value_name = "FILE")]
     pub(crate) fps_log: Option<PathBuf>,
@@ -142,14 +150,25 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
+    pub(crate) models: ModelArgs,
+    #[command(flatten)]
     pub(crate) farm: FarmArgs,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) error: ErrorArgs,
-    /// Frames to render.
+    /// Frames of the whole camera path.
     #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
     pub(crate) frames: u32,
+    /// Begin at frame N of them, counted from 0; each frame is the same picture as in a run of all.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = frame_index)]
+    pub(crate) first_frame: u32,
+    /// Render the frames whose files are missing, damaged or cut short: go on with a run that was interrupted.
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Render the frames whose files do not exist; look into none of those that do.
+    #[arg(long, conflicts_with = "resume")]
+    pub(crate) skip_existing: bool,
     /// Begin when N workers are connected, and not before; without it, when the local ones are.
     #[arg(long, value_name = "N", value_parser = worker_count)]
     pub(crate) wait_for_workers: Option<u32>,
@@ -174,6 +193,8 @@ pub(crate) struct CompileArgs {
     /// How much time the hierarchy may take. The picture does not depend on it.
     #[arg(long, value_enum, value_name = "QUALITY", default_value_t)]
     pub(crate) quality: Quality,
+    #[command(flatten)]
+    pub(crate) models: ModelArgs,
 }
 
 /// How well a hierarchy is built.
@@ -193,6 +214,8 @@ pub(crate) enum Quality {
 pub(crate) struct BenchArgs {
     /// A scene (.toml), or a model (.obj or compiled).
     pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) models: ModelArgs,
     /// Render threads; without it, all cores.
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(crate) threads: Option<usize>,
@@ -211,6 +234,8 @@ pub(crate) struct BenchArgs {
 pub(crate) struct ExplainArgs {
     /// A scene (.toml), or a model (.obj or compiled).
     pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) models: ModelArgs,
     /// Picture size in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<Size>,
@@ -229,9 +254,15 @@ pub(crate) struct ExplainArgs {
 pub(crate) struct CheckNumericsArgs {
     /// A scene (.toml), or a model (.obj or compiled); without it, built-in scenes of a plane, spheres and tori.
     pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) models: ModelArgs,
     /// Rays to aim at edges and vertices of the models [default: 200000].
     #[arg(long, value_name = "N", value_parser = ray_count)]
     pub(crate) rays: Option<u64>,
+    /// Shoot only this ray of the check for leaks, and tell all that is known of it: the number that a failure names. It is the same
+    /// ray whatever --rays says.
+    #[arg(long, value_name = "N", conflicts_with = "json")]
+    pub(crate) ray: Option<u64>,
     /// Pixels of each picture that the slow tracer in double precision is asked for: 27648 are all of a picture of 4 to 3
     /// [default: as many as some seconds allow].
     #[arg(long, value_name = "N", value_parser = frame_count)]
@@ -247,8 +278,8 @@ pub(crate) struct OversightArgs {
     /// Write what every worker did when, for ui.perfetto.dev or chrome://tracing.
     #[arg(long, value_name = "FILE")]
     pub(crate) trace: Option<PathBuf>,
-    /// Take commands, one a line: from standard input (-), a port of this machine (127.0.0.1:PORT) or a Unix
-    /// socket (a path with a slash in it). The command help lists them.
+    /// Take commands, one a line: from standard input (-), a port of this machine (127.0.0.1:PORT; its log names the
+    /// token) or a Unix socket (a path with a slash in it). The command help lists them.
     #[arg(long, value_name = "PLACE", value_parser = Place::parse, allow_hyphen_values = true)]
     pub(crate) control: Option<Place>,
 }

@@ -5,12 +5,14 @@
 //! processes) sees to it that each one completes.
 
 mod accounting;
+mod addresses;
 mod assets;
 mod camera_control;
 mod chains;
 mod cli;
 mod commands;
 mod control;
+mod delivered;
 mod dial;
 mod display;
 mod driver;
@@ -18,6 +20,7 @@ mod error;
 pub mod farm;
 mod farm_control;
 mod framebuffer;
+mod identity;
 mod in_process;
 mod judge;
 mod lease_book;
@@ -25,6 +28,8 @@ mod local_workers;
 mod logging;
 mod orbit;
 mod output;
+mod pace;
+mod plan;
 mod plot;
 mod progress;
 mod report;
@@ -34,8 +39,8 @@ mod seals;
 mod server;
 pub mod simulator;
 mod tradeoff;
+mod transfers;
 mod wanted;
-mod whole_file;
 
 #[cfg(test)]
 mod fake_worker;

@@ -202,6 +202,11 @@ impl FrameWriter {
         result
     }
 
+    /// Whether frames go to files at all.
+    pub(crate) fn has_files(&self) -> bool {
+        self.pattern != OutputPattern::None
+    }
+
     /// Frames that are on the disk, whole.
     pub(crate) fn written(&self) -> u64 {
         self.written

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::display::overlay::worker_command;
+use crate::addresses::Reachable;
 use crate::farm::FarmStatus;
+use crate::pace::spoken;
 
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -25,11 +26,11 @@ pub(crate) struct Progress {
     frames: u64,
     done: u64,
     fps: f64,
+    left: Option<Duration>,
     address: SocketAddr,
     local_workers: u32,
     alone_since: Option<Instant>,
     next_reminder: Duration,
-    started: Instant,
     last_line: Instant,
     quiet: bool,
 }
@@ -50,11 +51,11 @@ impl Progress {
             frames,
             done: 0,
             fps: 0.0,
+            left: None,
             address,
             local_workers,
             alone_since: None,
             next_reminder: patience(local_workers),
-            started: now,
             last_line: now,
             quiet,
         }
@@ -68,7 +69,9 @@ impl Progress {
 
     /// Shows what the farm is doing; several times a second.
     pub(crate) fn look(&mut self, status: &FarmStatus) {
-        self.bar.set_message(message(status, self.fps));
+        self.left = status.totals.left;
+        let left = self.left.map_or(String::new(), |left| format!("{} left, ", spoken(left)));
+        self.bar.set_message(format!("{left}{}", message(status, self.fps)));
         self.remind_of_workers(status.workers.is_empty());
         if self.bar.is_hidden() && !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
             self.last_line = Instant::now();
@@ -76,12 +79,11 @@ impl Progress {
         }
     }
 
-    /// The run is over, and `written` frames are on the disk.
-    pub(crate) fn finish(&mut self, written: u64) {
+    /// The run is over.
+    pub(crate) fn finish(&mut self, summary: &str) {
         self.bar.finish_and_clear();
         nothing_below_the_log();
-        let seconds = self.started.elapsed().as_secs_f64();
-        tracing::info!("{written} of {} frames written in {seconds:.1} s", self.frames);
+        tracing::info!("{summary}");
     }
 
     fn remind_of_workers(&mut self, alone: bool) {
@@ -94,15 +96,12 @@ impl Progress {
         if since.elapsed() >= self.next_reminder {
             self.next_reminder += REMIND_EVERY;
             let whose = if self.local_workers == 0 { "a worker" } else { "this machine's worker" };
-            tracing::warn!("waiting for {whose}; to start one: {}", worker_command(self.address));
+            tracing::warn!("waiting for {whose}; {}", Reachable::of(self.address).for_log());
         }
     }
 
     fn line(&self, status: &FarmStatus) -> String {
-        let left = match self.fps > 0.0 {
-            true => format!(", {:.0} s left", (self.frames - self.done) as f64 / self.fps),
-            false => String::new(),
-        };
+        let left = self.left.map_or(String::new(), |left| format!(", {} left", spoken(left)));
         format!("{} of {} frames{left}; {}", self.done, self.frames, message(status, self.fps))
     }
 }
@@ -112,7 +111,7 @@ fn patience(local_workers: u32) -> Duration {
 }
 
 fn style() -> ProgressStyle {
-    ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left, {msg}")
+    ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
@@ -121,6 +120,10 @@ fn message(status: &FarmStatus, fps: f64) -> String {
         0 => "waiting for a worker".to_owned(),
         1 => "1 worker".to_owned(),
         n => format!("{n} workers"),
+    };
+    let workers = match status.transfers.words() {
+        Some(transfers) => format!("{workers}, {transfers}"),
+        None => workers,
     };
     if fps >= 1.0 {
         return format!("{fps:.1} FPS, {workers}");

@@ -17,6 +17,10 @@ use crate::wanted::Knobs;
 pub(crate) struct RenderReport {
     /// Frames rendered.
     pub(crate) frames: u32,
+    /// Frames that were on the disk already.
+    pub(crate) skipped: u64,
+    /// Frames rendered a second, from the first request to the last row.
+    pub(crate) fps: f64,
     /// Pixels per row.
     pub(crate) width: u32,
     /// Rows.
@@ -51,7 +55,7 @@ pub(crate) struct RenderReport {
 }
 
 /// Segments that were rendered twice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct VerificationReport {
     /// The share that was asked for.
     pub(crate) percent: u8,
@@ -61,11 +65,16 @@ pub(crate) struct VerificationReport {
     pub(crate) verified: u64,
     /// Those of which somebody had sent wrong pixels.
     pub(crate) mismatches: u64,
+    /// Frames, by the numbers of their files, with rows of workers that sent wrong pixels.
+    pub(crate) wrong_frames: Vec<u64>,
+    /// Frames that had such rows and were rendered again.
+    pub(crate) rendered_again: Vec<u64>,
 }
 
 impl VerificationReport {
-    pub(crate) fn of(Verification { percent, picked, verified, mismatches, .. }: Verification) -> Self {
-        Self { percent, picked, verified, mismatches }
+    pub(crate) fn of(counts: Verification, wrong_frames: Vec<u64>, rendered_again: Vec<u64>) -> Self {
+        let Verification { percent, picked, verified, mismatches, .. } = counts;
+        Self { percent, picked, verified, mismatches, wrong_frames, rendered_again }
     }
 }
 
@@ -164,15 +173,15 @@ pub(crate) struct BytesPerFrame {
 impl BytesPerFrame {
     /// Adds another frame's.
     pub(crate) fn add(&mut self, other: Self) {
-        self.sent += other.sent;
-        self.received += other.received;
+        self.sent = self.sent.saturating_add(other.sent);
+        self.received = self.received.saturating_add(other.received);
     }
 }
 
 /// `total / count`, rounded to the nearest.
 pub(crate) fn mean(total: u64, count: u32) -> u64 {
     let count = u64::from(count.max(1));
-    (total + count / 2) / count
+    total / count + u64::from(total % count >= count.div_ceil(2))
 }
 
 /// The value that `share` (0..=1) of `sorted` lie below, interpolated between neighbours; zero for an empty slice.

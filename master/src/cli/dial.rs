@@ -25,8 +25,8 @@ pub(crate) struct ErrorArgs {
     /// that a moving picture may lose.
     #[arg(long, value_name = "E", value_parser = error_limit)]
     pub(crate) max_error: Option<f64>,
-    /// What settings cost and lose, as tradeoff has measured it on this scene: its tradeoff.csv. Without it, as they do on
-    /// other scenes.
+    /// What settings cost and lose, as tradeoff has measured it on this scene: its tradeoff.csv. Without it, the table that
+    /// lies with the scene (SCENE.tradeoff.csv beside it, or SCENE.csv in a folder tradeoff), or else as on other scenes.
     #[arg(long, value_name = "CSV")]
     pub(crate) front: Option<PathBuf>,
 }

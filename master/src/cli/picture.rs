@@ -48,8 +48,12 @@ pub(crate) struct QualityArgs {
     #[arg(long, value_name = "exact|reduced", value_parser = one_of(&ColorDepth::WORDS))]
     colors: Option<ColorDepth>,
     /// The part of width and height that is rendered, to be enlarged by the master.
-    #[arg(long, value_name = "1|3/4|1/2", value_parser = one_of(&SCALES))]
+    #[arg(long, value_name = "1|3/4|1/2|1/3|1/4", value_parser = one_of(&SCALES))]
     scale: Option<RenderScale>,
+    /// Dither pixels where light becomes bytes: a fine pattern in place of bands in slow gradients.
+    #[arg(long, value_name = "on|off", num_args = 0..=1, require_equals = true, default_missing_value = "on",
+        value_parser = one_of(&SWITCH))]
+    dither: Option<bool>,
 }
 
 impl QualityArgs {
@@ -62,6 +66,7 @@ impl QualityArgs {
             filter: self.filter.or(scene.filter),
             exponent: self.exponent.unwrap_or(scene.exponent),
             colors: self.colors.unwrap_or(scene.colors),
+            dither: self.dither.unwrap_or(scene.dither),
         }
     }
 
@@ -79,16 +84,19 @@ impl QualityArgs {
 const SWITCH: [(&str, bool); 2] = [("on", true), ("off", false)];
 
 /// The decimals are how scene files write them.
-const SCALES: [(&str, RenderScale); 5] = [
+const SCALES: [(&str, RenderScale); 8] = [
     ("1", RenderScale::Full),
     ("3/4", RenderScale::ThreeQuarters),
     ("0.75", RenderScale::ThreeQuarters),
     ("1/2", RenderScale::Half),
     ("0.5", RenderScale::Half),
+    ("1/3", RenderScale::Third),
+    ("1/4", RenderScale::Quarter),
+    ("0.25", RenderScale::Quarter),
 ];
 
 /// One of a few words, and what it means.
-fn one_of<T: Copy + Send + Sync + 'static>(
+pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
     words: &'static [(&'static str, T)],
 ) -> impl TypedValueParser<Value = T> {
     let known = PossibleValuesParser::new(words.iter().map(|(word, _)| *word));

@@ -1,5 +1,7 @@
 use std::net::SocketAddr;
 
+use rayfarm_tracer::scene::Up;
+
 use super::*;
 use crate::farm::SegmentPolicy;
 
@@ -75,6 +77,43 @@ fn every_common_option_is_read() {
 }
 
 #[test]
+fn every_command_that_reads_a_scene_takes_how_its_models_are_read() {
+    let options = "--up z --crease-angle 25.5 --allow-parent-textures";
+    let all = [
+        view(&format!("rayfarm-master {options} a.obj")).models,
+        render(&format!("rayfarm-master render {options} a.obj -o b.png")).models,
+        match command(&format!("rayfarm-master compile {options} a.obj -o b.rfm")) {
+            Command::Compile(args) => args.models,
+            other => panic!("{other:?}"),
+        },
+        match command(&format!("rayfarm-master bench {options} a.obj")) {
+            Command::Bench(args) => args.models,
+            other => panic!("{other:?}"),
+        },
+        match command(&format!("rayfarm-master explain {options} a.obj")) {
+            Command::Explain(args) => args.models,
+            other => panic!("{other:?}"),
+        },
+        match command(&format!("rayfarm-master check-numerics {options} a.obj")) {
+            Command::CheckNumerics(args) => args.models,
+            other => panic!("{other:?}"),
+        },
+        match command(&format!("rayfarm-master tradeoff {options} a.obj")) {
+            Command::Tradeoff(args) => args.models,
+            other => panic!("{other:?}"),
+        },
+    ];
+    for models in all {
+        let options = models.load_options(Some(Size { width: 3, height: 4 }));
+        assert_eq!((options.up, options.crease_angle, options.size), (Some(Up::Z), Some(25.5), Some((3, 4))));
+        assert!(options.allow_parent_textures);
+    }
+    assert!(!view("rayfarm-master a.obj").models.load_options(None).allow_parent_textures);
+    assert!(refused("rayfarm-master --up x a.obj").contains("possible values: y, z"));
+    assert!(refused("rayfarm-master --crease-angle 181 a.obj").contains("from 0 to 180 degrees"));
+}
+
+#[test]
 fn the_other_commands_are_read() {
     match command("rayfarm-master compile bust.obj -o bust.rfm") {
         Command::Compile(args) => {
@@ -102,7 +141,7 @@ fn the_other_commands_are_read() {
     ] {
         match command(line) {
             Command::CheckNumerics(args) => {
-                assert_eq!((args.scene, args.rays, args.json), (scene, rays, false));
+                assert_eq!((args.scene, args.rays, args.ray, args.json), (scene, rays, None, false));
             }
             other => panic!("{other:?}"),
         }
@@ -159,6 +198,8 @@ fn wrong_use_is_status_2_and_says_what_was_expected() {
         ("rayfarm-master bench", "<SCENE>"),
         ("rayfarm-master explain", "<SCENE>"),
         ("rayfarm-master check-numerics --rays 0", "from 1"),
+        ("rayfarm-master check-numerics --ray=-1", "--ray"),
+        ("rayfarm-master check-numerics --ray 1 --json", "cannot be used with"),
         ("rayfarm-master view --json", "--json"),
         ("rayfarm-master -v -q", "cannot be used with"),
         ("rayfarm-master --size 5x5 render a.toml -o b.png", "--size <WxH> stands before render"),
@@ -206,7 +247,7 @@ fn a_run_is_watched_and_steered() {
 fn knobs_are_read_and_win_over_the_scene() {
     use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
 
-    let all = "--adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4";
+    let all = "--adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4 --dither";
     let full = Quality::default();
     let reduced = Quality {
         adaptive: true,
@@ -215,12 +256,13 @@ fn knobs_are_read_and_win_over_the_scene() {
         filter: Some(Filter::Nearest),
         exponent: ExponentPrecision::Fast,
         colors: ColorDepth::Reduced,
+        dither: true,
     };
     let args = render(&format!("rayfarm-master render a.toml -o b.png {all}")).picture.quality;
     assert_eq!((args.over(full), args.scale_over(RenderScale::Half)), (reduced, RenderScale::ThreeQuarters));
     let none = view("rayfarm-master a.toml").picture.quality;
     assert_eq!((none.over(reduced), none.scale_over(RenderScale::Half)), (reduced, RenderScale::Half));
-    let back = "--adaptive=off --shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1";
+    let back = "--adaptive=off --shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1 --dither=off";
     let back = view(&format!("rayfarm-master {back} a.toml")).picture.quality;
     assert_eq!(back.over(reduced), Quality { filter: Some(Filter::Bilinear), ..full });
     assert_eq!(back.scale_over(RenderScale::Half), RenderScale::Full);

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::ModelArgs;
 use super::values::{Size, repeat_count, size, thread_count};
 
 /// `tradeoff`.
@@ -13,8 +14,10 @@ pub(crate) struct TradeoffArgs {
     #[arg(required_unless_present = "saved")]
     pub(crate) scene: Option<PathBuf>,
     /// Measure nothing: tell what is worth having by a tradeoff.csv that was written before.
-    #[arg(long, value_name = "CSV", conflicts_with_all = ["scene", "output", "size", "repeats", "threads"])]
+    #[arg(long, value_name = "CSV", conflicts_with_all = ["scene", "output", "size", "repeats", "threads", "up", "crease_angle"])]
     pub(crate) saved: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) models: ModelArgs,
     /// The folder to write into; made where it is not there.
     #[arg(short, long, value_name = "FOLDER", default_value = "tradeoff")]
     pub(crate) output: PathBuf,

@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 
+use rayfarm_protocol::address;
 use rayfarm_tracer::image::MAX_SIDE;
 use rayfarm_tracer::scene::MAX_SAMPLES;
 
@@ -46,6 +47,11 @@ pub(super) fn frame_count(text: &str) -> Result<u32, String> {
     whole_number(text, 1, MAX_FRAMES)
 }
 
+/// A frame's number, from 0.
+pub(super) fn frame_index(text: &str) -> Result<u32, String> {
+    whole_number(text, 0, MAX_FRAMES)
+}
+
 /// Local workers; zero is none.
 pub(super) fn worker_count(text: &str) -> Result<u32, String> {
     whole_number(text, 0, MAX_LOCAL_WORKERS)
@@ -86,9 +92,16 @@ pub(super) fn degrees(text: &str) -> Result<f64, String> {
     }
 }
 
-/// `0.0.0.0:7117`; names are not looked up, because the address is one of this machine's own.
+/// An angle between two faces.
+pub(super) fn crease_angle(text: &str) -> Result<f64, String> {
+    let in_range = text.parse().ok().filter(|angle| (0.0..=180.0).contains(angle));
+    in_range.ok_or_else(|| "expected an angle from 0 to 180 degrees, such as 40".to_owned())
+}
+
+/// `0.0.0.0:7117` or `[fe80::1%eth0]:7117`; names of hosts are not looked up, because the address is one of this machine's
+/// own.
 pub(super) fn listen_address(text: &str) -> Result<SocketAddr, String> {
-    text.parse().map_err(|_| {
+    address::parse(text)?.ok_or_else(|| {
         "expected ADDR:PORT with an address of this machine in digits: \
          0.0.0.0:7117 lets other machines connect, 127.0.0.1:7117 only this one, [::]:7117 is for IPv6"
             .to_owned()

@@ -22,7 +22,7 @@ use crate::wanted::WantedPicture;
 /// A wrong scene.
 pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
     let started = Instant::now();
-    let source = Source::load(&args.scene)?;
+    let source = Source::load(&args.scene, args.models, args.picture.size)?;
     let wanted = source.wanted(&args.picture)?;
     let view = wanted.rendered();
     let scene = Arc::new(source.compiled()?);

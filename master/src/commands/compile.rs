@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::Instant;
 
+use rayfarm_tracer::files::write_whole;
 use rayfarm_tracer::mesh::{BuildQuality, CompileOptions};
 use rayfarm_tracer::scene;
 
@@ -11,7 +12,6 @@ use crate::cli::{CompileArgs, Quality};
 use crate::display::overlay::counted;
 use crate::error::CommandError;
 use crate::output::check_writable;
-use crate::whole_file::write_whole;
 
 /// Reads a model, builds its tree and writes both; tells what came of it on standard output.
 ///
@@ -24,7 +24,8 @@ pub(super) fn run(args: &CompileArgs) -> Result<(), CommandError> {
     let started = Instant::now();
     let folder = args.output.parent().unwrap_or(Path::new(""));
     let (mesh, warnings) =
-        scene::compile_model(&args.model, folder, options).map_err(CommandError::wrong_input)?;
+        scene::compile_model_with(&args.model, folder, options, args.models.load_options(None))
+            .map_err(CommandError::wrong_input)?;
     let seconds = started.elapsed().as_secs_f64();
     for warning in warnings {
         tracing::warn!("{warning}");
@@ -67,6 +68,7 @@ mod tests {
     use std::fs;
 
     use super::*;
+    use crate::cli::ModelArgs;
 
     #[test]
     fn a_model_is_not_overwritten_by_its_own_compiled_form() {
@@ -74,7 +76,12 @@ mod tests {
         let model = folder.path().join("a.obj");
         fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
         let output = folder.path().join(".").join("a.obj");
-        let args = CompileArgs { model: model.clone(), output, quality: Quality::Default };
+        let args = CompileArgs {
+            model: model.clone(),
+            output,
+            quality: Quality::Default,
+            models: ModelArgs::default(),
+        };
         let message = run(&args).unwrap_err().to_string();
         assert!(message.contains("the model itself") && message.contains("a.rfm"), "{message}");
         assert!(fs::read_to_string(&model).unwrap().starts_with("v 0 0 0"));

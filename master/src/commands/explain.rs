@@ -64,7 +64,9 @@ struct Things {
 /// One mesh, whatever the number of its instances.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct MeshFacts {
-    /// The first eight digits of its name.
+    /// The file that it comes from, as the scene names it.
+    file: String,
+    /// The first eight digits of its hash.
     id: String,
     instances: usize,
     triangles: usize,
@@ -73,6 +75,7 @@ struct MeshFacts {
     triangle_bytes: usize,
     normal_bytes: usize,
     uv_bytes: usize,
+    color_bytes: usize,
     rest_bytes: usize,
     bytes: usize,
 }
@@ -84,6 +87,8 @@ struct TextureFacts {
     id: String,
     width: u32,
     height: u32,
+    /// It has alpha, because some of it is transparent.
+    alpha: bool,
     bytes: usize,
 }
 
@@ -123,7 +128,7 @@ struct Rays {
 /// # Errors
 /// A wrong scene.
 pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
-    let source = Source::load(&args.scene)?;
+    let source = Source::load(&args.scene, args.models, args.size)?;
     let wanted = source.wanted_still(args.size, args.samples, &args.quality)?;
     let explanation = explain(&source, &wanted)?;
     if args.json {
@@ -176,9 +181,11 @@ fn things(source: &Source) -> Things {
 }
 
 fn mesh_facts(source: &Source) -> Vec<MeshFacts> {
-    let facts = |mesh: &std::sync::Arc<rayfarm_tracer::mesh::CompiledMesh>| {
+    type Mesh = std::sync::Arc<rayfarm_tracer::mesh::CompiledMesh>;
+    let facts = |(mesh, file): (&Mesh, &std::path::PathBuf)| {
         let memory = mesh.memory();
         MeshFacts {
+            file: file.display().to_string(),
             id: short(&mesh.id()),
             instances: source.scene.models.iter().filter(|model| model.mesh == mesh.id()).count(),
             triangles: mesh.triangle_count(),
@@ -187,11 +194,12 @@ fn mesh_facts(source: &Source) -> Vec<MeshFacts> {
             triangle_bytes: memory.triangle_bytes,
             normal_bytes: memory.normal_bytes,
             uv_bytes: memory.uv_bytes,
+            color_bytes: memory.color_bytes,
             rest_bytes: memory.rest_bytes,
             bytes: memory.total_bytes(),
         }
     };
-    source.meshes.iter().map(facts).collect()
+    source.meshes.iter().zip(&source.mesh_files).map(facts).collect()
 }
 
 fn texture_facts(source: &Source) -> Vec<TextureFacts> {
@@ -199,6 +207,7 @@ fn texture_facts(source: &Source) -> Vec<TextureFacts> {
         id: short(&texture.id()),
         width: texture.width(),
         height: texture.height(),
+        alpha: texture.has_alpha(),
         bytes: texture.bytes().len(),
     };
     source.textures.iter().map(facts).collect()

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use rayfarm_tracer::files::read_within;
 use serde::Serialize;
 
 use crate::cli::{Profile, SimulateArgs};
@@ -10,6 +11,9 @@ use crate::error::CommandError;
 use crate::simulator::{
     CostProfile, Measured, Passed, PassingSetup, Schedule, Setup, Survivor, measure, pass, survive,
 };
+
+/// Bytes of a file of costs.
+const MAX_COSTS_BYTES: u64 = 16 << 20;
 
 /// A line of JSON: what was simulated, and what came of it.
 #[derive(Serialize)]
@@ -97,7 +101,10 @@ fn measure_all(args: &SimulateArgs) -> Result<(), CommandError> {
 
 fn read_costs(path: &Path) -> Result<CostProfile, CommandError> {
     let told = |what: String| CommandError::WrongInput(format!("{}: {what}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| told(error.to_string()))?;
+    let bytes = read_within(path, MAX_COSTS_BYTES).map_err(|error| told(error.to_string()))?;
+    let bytes = bytes.ok_or_else(|| told(format!("has more than {MAX_COSTS_BYTES} bytes, the limit")))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| told("not UTF-8 text: numbers are expected".to_owned()))?;
     CostProfile::from_text(&text).map_err(told)
 }
 

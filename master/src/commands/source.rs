@@ -8,7 +8,7 @@ use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene};
 use rayfarm_tracer::texture::Texture;
 
-use crate::cli::{PictureArgs, QualityArgs, Size};
+use crate::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
 use crate::orbit::Animation;
 use crate::wanted::WantedPicture;
@@ -22,27 +22,31 @@ const MODELS_VARIABLE: &str = "RAYFARM_MODELS";
 pub(super) struct Source {
     /// The file's name, for titles and messages.
     pub(super) name: String,
+    /// Where it was read.
+    pub(super) path: PathBuf,
     /// The scene as data.
     pub(super) scene: Scene,
     /// Its models.
     pub(super) meshes: Vec<Arc<CompiledMesh>>,
+    /// The files that they come from, as the scene names them.
+    pub(super) mesh_files: Vec<PathBuf>,
     /// Its textures.
     pub(super) textures: Vec<Arc<Texture>>,
 }
 
 impl Source {
-    /// Reads a scene file or a bare model; its warnings go to the log.
+    /// Reads a scene file or a bare model, to be shown in `size` if that is given; its warnings go to the log.
     ///
     /// # Errors
     /// What is wrong with the file, with its line where there is one.
-    pub(super) fn load(path: &Path) -> Result<Self, CommandError> {
-        let LoadedScene { scene, meshes, textures, warnings } =
-            scene::load(path).map_err(CommandError::wrong_input)?;
+    pub(super) fn load(path: &Path, models: ModelArgs, size: Option<Size>) -> Result<Self, CommandError> {
+        let LoadedScene { scene, meshes, mesh_files, textures, warnings } =
+            scene::load_with(path, models.load_options(size)).map_err(CommandError::wrong_input)?;
         for warning in warnings {
             tracing::warn!("{warning}");
         }
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, scene, meshes, textures })
+        Ok(Self { name, path: path.to_owned(), scene, meshes, mesh_files, textures })
     }
 
     /// What its first frame shows: the scene's own settings, or what the command line says instead.

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use rayfarm_tracer::files::write_whole;
 use rayfarm_tracer::image::{self, RgbImage};
 use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::FrameView;
@@ -25,7 +26,6 @@ use crate::tradeoff::report::{Report, chart, difference_name, markdown, picture_
 use crate::tradeoff::setting::{Asked, Setting};
 use crate::tradeoff::steps::Steps;
 use crate::tradeoff::table::{Row, Table};
-use crate::whole_file::write_whole;
 
 /// What is written last, when all is measured.
 const TABLE: &str = "tradeoff.csv";
@@ -54,7 +54,7 @@ fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
 }
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
-    let source = Source::load(scene)?;
+    let source = Source::load(scene, args.models, args.size)?;
     let view = source.wanted_still(args.size, None, &QualityArgs::default())?.view;
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;

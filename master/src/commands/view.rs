@@ -10,12 +10,13 @@ use super::oversight::Oversight;
 use super::source::{Source, animation, default_scene};
 use crate::camera_control::CameraControl;
 use crate::cli::ViewArgs;
+use crate::delivered::as_text;
 use crate::display::feed::{self, NewsDesk, Orders};
+use crate::display::requests::{Pace, WindowState};
 use crate::display::window::{About, Display, Link};
 use crate::error::CommandError;
 use crate::farm::{Farm, FarmScene};
 use crate::report::FpsLog;
-use crate::wanted::WantedPicture;
 
 /// `--orbit` without `--frames` goes round over this many frames, and on.
 const FRAMES_PER_ORBIT: u32 = 360;
@@ -26,7 +27,7 @@ const FRAMES_PER_ORBIT: u32 = 360;
 /// A wrong scene; no display; a farm that cannot listen or go on.
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
-    let source = Source::load(&path)?;
+    let source = Source::load(&path, args.models, args.picture.size)?;
     let asked = source.wanted(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
     let (picture, dial) = turned(&args.dial, &source, asked, animation.is_moving())?;
@@ -49,8 +50,11 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     })?;
 
     let runtime = super::runtime()?;
-    let (wanted, wishes) = watch::channel(picture);
-    let orders = Orders { wanted: wishes, animation, limit: args.frames.map(u64::from), log, dial };
+    let (wanted, wishes) = watch::channel(WindowState { picture, hidden: false });
+    let limit = args.frames.map(u64::from);
+    // A number of frames is for measuring: they are rendered although nothing changes.
+    let pace = Pace { animation, limit, continuous: args.continuous || limit.is_some() };
+    let orders = Orders { wanted: wishes, pace, log, dial };
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
     let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, &oversight, stop))?;
@@ -63,13 +67,16 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
 async fn start(
     args: &ViewArgs,
     source: Source,
-    wanted: watch::Sender<WantedPicture>,
+    wanted: watch::Sender<WindowState>,
     orders: Orders,
     oversight: &Oversight,
     stop: CancellationToken,
 ) -> Result<(Link, JoinHandle<Result<(), CommandError>>), CommandError> {
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let farm = Farm::start(args.farm.options(), scene).await.map_err(CommandError::failed)?;
+    if let Some(frames) = args.frames {
+        farm.expect_frames(frames.into());
+    }
     oversight.begin(&farm, &stop)?;
     let link = Link { wanted, desk: NewsDesk::new(), control: farm.control(), address: farm.address(), stop };
     let task = tokio::spawn(feed::run(farm, orders, link.desk.clone(), link.stop.clone()));
@@ -78,6 +85,14 @@ async fn start(
 
 /// Who closes the window has seen enough; a signal may come before all frames that were asked for.
 fn all_shown(args: &ViewArgs, link: &Link, interrupted: &CancellationToken) -> Result<(), CommandError> {
+    let wrong = link.control.wrong_frames();
+    if wrong.count() > 0 {
+        return Err(CommandError::Failed(format!(
+            "{} of the frames that were shown have rows of workers that sent wrong pixels: {}",
+            wrong.count(),
+            as_text(wrong.runs())
+        )));
+    }
     match args.frames.map(u64::from) {
         Some(frames) if interrupted.is_cancelled() && link.desk.completed() < frames => {
             Err(CommandError::Interrupted(format!("{} of {frames} frames were shown", link.desk.completed())))

@@ -33,10 +33,25 @@ fn means_round_to_the_nearest() {
 }
 
 #[test]
+fn claims_of_any_size_sum_up_and_have_a_mean() {
+    let claim = RaysPerFrame { primary: u64::MAX, shadow: u64::MAX - 1, secondary: 3 };
+    let mut sum = claim;
+    sum.add(claim);
+    assert_eq!(sum, RaysPerFrame { primary: u64::MAX, shadow: u64::MAX, secondary: 6 });
+    assert_eq!(sum.mean(2).primary, u64::MAX / 2 + 1);
+    assert_eq!((sum.mean(1).shadow, sum.mean(u32::MAX).secondary, sum.total()), (u64::MAX, 0, u64::MAX));
+    let mut bytes = BytesPerFrame { sent: u64::MAX, received: 1 };
+    bytes.add(bytes);
+    assert_eq!(bytes, BytesPerFrame { sent: u64::MAX, received: 2 });
+}
+
+#[test]
 fn the_json_line_has_the_documented_shape() {
     let full = WantedPicture { view: test_scene::view(), scale: RenderScale::Full };
     let report = RenderReport {
         frames: 2,
+        skipped: 1,
+        fps: 12.5,
         width: 64,
         height: 48,
         samples: 4,
@@ -56,8 +71,8 @@ fn the_json_line_has_the_documented_shape() {
     assert_eq!(
         serde_json::to_string(&report).unwrap(),
         concat!(
-            r#"{"frames":2,"width":64,"height":48,"samples":4,"quality":"#,
-            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false},"#,
+            r#"{"frames":2,"skipped":1,"fps":12.5,"width":64,"height":48,"samples":4,"quality":"#,
+            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false,"dither":false},"#,
             r#""workers":1,"threads":2,"triangles":12,"#,
             r#""rays_per_frame":{"primary":12288,"shadow":7,"secondary":0},"#,
             r#""ms_per_frame":{"min":1.5,"median":2.0,"p95":2.45,"max":2.5},"#,

@@ -2,7 +2,7 @@
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::MeshMemory;
-use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Shading};
+use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Material, Shading};
 use serde::Serialize;
 
 use super::super::source::Source;
@@ -27,7 +27,7 @@ pub(super) struct FeatureFacts {
     /// Who asks for it, or what would.
     pub(super) why: String,
     /// What it added to the time of a frame where it was measured, in per cent.
-    pub(super) measured_percent: f64,
+    pub(super) measured_percent: Option<f64>,
     /// Bytes that it takes in memory and once on the wire; where it is left out, those that are saved.
     pub(super) bytes: usize,
 }
@@ -39,6 +39,10 @@ pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameVi
         specular(source, compiled, view),
         smooth(source, compiled),
         textures(source, compiled, view),
+        vertex_colors(source, compiled),
+        of_materials(source, "emission", compiled.features().emissive, Material::is_emissive),
+        of_materials(source, "unlit materials", compiled.features().unlit, |material| material.unlit),
+        of_materials(source, "cut-outs", compiled.features().cut_out, |material| material.cutout.is_some()),
         samples(view),
     ]
 }
@@ -54,7 +58,7 @@ fn shadows(source: &Source, view: &FrameView) -> FeatureFacts {
             counted(lights.len() as u64, "light"),
             turned_off(!view.quality.shadows)
         ),
-        measured_percent: SHADOWS,
+        measured_percent: Some(SHADOWS),
         bytes: 0,
     }
 }
@@ -75,7 +79,7 @@ fn specular(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
             counted(materials.len() as u64, "material"),
             turned_off(view.quality.shading == Shading::Diffuse)
         ),
-        measured_percent: SPECULAR,
+        measured_percent: Some(SPECULAR),
         bytes: 0,
     }
 }
@@ -89,7 +93,7 @@ fn smooth(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
         name: "smooth normals",
         asked_for,
         why: format!("{smooth} of {} have them", counted(models.len() as u64, "model")),
-        measured_percent: SMOOTH,
+        measured_percent: Some(SMOOTH),
         bytes: taken_or_saved(
             source,
             asked_for,
@@ -115,8 +119,39 @@ fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
             format!("{nearest} of {} nearest, the others bilinear", counted(maps.len() as u64, "texture"))
         },
         // Most pixels, perhaps, have the dearer one.
-        measured_percent: if asked_for && nearest == maps.len() { NEAREST } else { BILINEAR },
+        measured_percent: Some(if asked_for && nearest == maps.len() { NEAREST } else { BILINEAR }),
         bytes: pictures + uvs,
+    }
+}
+
+fn vertex_colors(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
+    let colored = source.meshes.iter().filter(|mesh| mesh.has_colors()).count();
+    let asked_for = compiled.features().vertex_colors;
+    let saved = MeshMemory::full_color_bytes;
+    FeatureFacts {
+        name: "colours of vertices",
+        asked_for,
+        why: format!("{colored} of {} have them", counted(source.meshes.len() as u64, "mesh")),
+        measured_percent: None,
+        bytes: taken_or_saved(source, asked_for, |memory| memory.color_bytes, saved),
+    }
+}
+
+/// A feature that materials ask for, and that takes no memory.
+fn of_materials(
+    source: &Source,
+    name: &'static str,
+    asked_for: bool,
+    asks: impl Fn(&Material) -> bool,
+) -> FeatureFacts {
+    let materials = &source.scene.materials;
+    let asking = materials.iter().filter(|material| asks(material)).count();
+    FeatureFacts {
+        name,
+        asked_for,
+        why: format!("{asking} of {} ask for it", counted(materials.len() as u64, "material")),
+        measured_percent: None,
+        bytes: 0,
     }
 }
 
@@ -127,7 +162,7 @@ fn samples(view: &FrameView) -> FeatureFacts {
         name: "several samples a pixel",
         asked_for: view.samples > 1,
         why: format!("{rays} {pixels}; measured with 4 a pixel"),
-        measured_percent: FOUR_SAMPLES,
+        measured_percent: Some(FOUR_SAMPLES),
         bytes: 0,
     }
 }
@@ -169,6 +204,9 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
     kernels.push(format!("normals: {normals}"));
     if features.textured {
         kernels.push("texels: once a point, whatever the number of lights".to_owned());
+    }
+    if features.cut_out {
+        kernels.push("cut-outs: the alpha of each hit that may be one, in double precision".to_owned());
     }
     let terms = if features.specular {
         "diffuse and specular"

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::cli::ModelArgs;
 
 fn explained(scene: &str) -> Explanation {
     let folder = tempfile::tempdir().unwrap();
@@ -11,7 +12,7 @@ fn explained(scene: &str) -> Explanation {
 }
 
 fn of_file(path: &Path) -> Explanation {
-    let source = Source::load(path).unwrap();
+    let source = Source::load(path, ModelArgs::default(), None).unwrap();
     let scene = &source.scene;
     explain(&source, &WantedPicture { view: FrameView::of(scene), scale: scene.render.scale }).unwrap()
 }
@@ -37,6 +38,8 @@ fn a_bare_scene_asks_for_nothing_and_what_that_saves_is_told() {
     assert_eq!(asked_for(&bare), Vec::<&str>::new());
     assert_eq!((bare.things.models, bare.meshes.len(), bare.meshes[0].instances), (2, 1, 2));
     assert_eq!((bare.triangles, bare.meshes[0].triangles), (4, 2));
+    assert_eq!(bare.meshes[0].file, "quad.obj");
+    assert!(text::text(&bare).contains("\nquad.obj "), "{}", text::text(&bare));
     assert_eq!(bare.rays_per_frame_at_most, Rays { primary: 64 * 48, shadow: 0, secondary: 0 });
     let saved: usize = bare.features.iter().map(|feature| feature.bytes).sum();
     assert!(saved > 0 && bare.meshes[0].normal_bytes == 0, "{bare:?}");
@@ -55,6 +58,27 @@ fn each_key_that_asks_for_more_is_told() {
         let explanation = explained(&BARE.replace(key, more));
         assert_eq!(asked_for(&explanation), [name], "{more}");
     }
+}
+
+#[test]
+fn what_surfaces_show_beside_reflected_light_is_told() {
+    let lamp = explained(&BARE.replace("specular = [0, 0, 0]", "emission = [1, 1, 0]"));
+    assert_eq!(asked_for(&lamp), ["emission"]);
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+    let text = "mtllib m.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvt 0 0\nvt 1 1\nusemtl photo\nf 1/1 2/2 3/1\n";
+    write("m.obj", text.as_bytes());
+    write("m.mtl", b"newmtl photo\nillum 0\nmap_Kd photo.ppm\nmap_d holes.ppm\n");
+    write("photo.ppm", b"P6\n2 1\n255\nabcdef");
+    write("holes.ppm", b"P6\n2 1\n255\n\0\0\0\xff\xff\xff");
+    let photo = of_file(&folder.path().join("m.obj"));
+    for name in ["textures", "colours of vertices", "unlit materials", "cut-outs"] {
+        assert!(asked_for(&photo).contains(&name), "{name}: {:?}", asked_for(&photo));
+    }
+    assert_eq!(photo.textures.iter().filter(|texture| texture.alpha).count(), 1);
+    assert!(photo.meshes[0].color_bytes > 0);
+    assert!(text::text(&photo).contains("with alpha"));
+    assert!(photo.kernels.iter().any(|kernel| kernel.starts_with("cut-outs")));
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Resu
                 (bytes, true) => format!(", {}", size(bytes)),
                 (bytes, false) => format!(", saves {}", size(bytes)),
             };
-            let percent = format!("+{} %", feature.measured_percent);
+            let percent = feature.measured_percent.map_or("-".to_owned(), |percent| format!("+{percent} %"));
             writeln!(out, "  {:<24} {percent:>7}  {}{memory}", feature.name, feature.why)?;
         }
         if !any {
@@ -82,15 +82,27 @@ fn write_meshes(out: &mut String, meshes: &[MeshFacts]) -> std::fmt::Result {
     }
     writeln!(
         out,
-        "\n{:<9} {:>9} {:>10} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}",
-        "mesh", "instances", "triangles", "nodes", "tree", "corners", "normals", "uvs", "the rest", "all"
+        "\n{:<24} {:<9} {:>9} {:>10} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}",
+        "mesh",
+        "hash",
+        "instances",
+        "triangles",
+        "nodes",
+        "tree",
+        "corners",
+        "normals",
+        "uvs",
+        "colours",
+        "the rest",
+        "all"
     )?;
     let mut largest: Vec<&MeshFacts> = meshes.iter().collect();
     largest.sort_by_key(|mesh| std::cmp::Reverse(mesh.bytes));
     for mesh in largest.iter().take(LISTED) {
         writeln!(
             out,
-            "{:<9} {:>9} {:>10} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}",
+            "{:<24} {:<9} {:>9} {:>10} {:>8} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10}",
+            shortened(&mesh.file),
             mesh.id,
             mesh.instances,
             grouped(mesh.triangles as u64),
@@ -99,11 +111,20 @@ fn write_meshes(out: &mut String, meshes: &[MeshFacts]) -> std::fmt::Result {
             size(mesh.triangle_bytes),
             size(mesh.normal_bytes),
             size(mesh.uv_bytes),
+            size(mesh.color_bytes),
             size(mesh.rest_bytes),
             size(mesh.bytes)
         )?;
     }
     write_more(out, meshes.len())
+}
+
+/// A file's name as far as its column goes: the end says more than the beginning.
+fn shortened(file: &str) -> String {
+    let (all, most) = (file.chars().count(), 24);
+    // Names are the scene file's own: what would move the cursor is not shown as it is.
+    let plain = file.chars().map(|c| if c.is_control() { '?' } else { c });
+    if all <= most { plain.collect() } else { "...".chars().chain(plain.skip(all - most + 3)).collect() }
 }
 
 fn write_textures(out: &mut String, textures: &[TextureFacts]) -> std::fmt::Result {
@@ -113,7 +134,8 @@ fn write_textures(out: &mut String, textures: &[TextureFacts]) -> std::fmt::Resu
     writeln!(out, "\n{:<9} {:>14} {:>10}", "texture", "texels", "all")?;
     for texture in textures.iter().take(LISTED) {
         let texels = format!("{} x {}", texture.width, texture.height);
-        writeln!(out, "{:<9} {texels:>14} {:>10}", texture.id, size(texture.bytes))?;
+        let alpha = if texture.alpha { "  with alpha" } else { "" };
+        writeln!(out, "{:<9} {texels:>14} {:>10}{alpha}", texture.id, size(texture.bytes))?;
     }
     write_more(out, textures.len())
 }
