@@ -18,7 +18,9 @@ forbid() {
 }
 
 forbid tracer/src 'rayfarm_(protocol|master|worker)|\b(tokio|minifb)::|std::net' \
-    'tracer: no sockets, no async, no window, no other crate of the farm'
+    'tracer: no sockets, no async, no window, no other crate of the farm but text'
+forbid protocol/text/src 'rayfarm_' \
+    'text: knows no other crate of the farm'
 forbid protocol/src 'rayfarm_(tracer|master|worker)|\b(image|glam)::' \
     'protocol: carries scenes and pixels as bytes and interprets neither'
 forbid worker/src 'rayfarm_master|minifb::' \

@@ -15,20 +15,23 @@ Runs a rayfarm-worker on each machine that the file HOSTS names, one a line:
     [user@]host [threads [port]]      # what follows a # is a comment
 
 threads is a number, or - for all cores; port is the one that ssh asks. A machine that is named twice gets two workers.
+The file may have Windows line ends; an IPv6 address is written with or without brackets (fe80::1%eth0).
 The machines need sh and a log-in over ssh that asks nothing (a key); not root, and nothing installed. What is put there
-lies in ~/.rayfarm: the program, and for each worker NAME.pid and NAME.log. The program is copied where it is absent or
-another one. Workers stay when this script and the connection end; they end with their master, or by stop.
+is in ~/.rayfarm: the program, and for each worker NAME.pid and NAME.log. The program is copied where it is absent or
+another one: without its symbols (where strip is at hand), and compressed (where gzip is, here and there). A copy that was
+interrupted goes on where it ended. Workers stay when this script, the connection and their master end: they wait for the
+next master at that address. They end by stop, or with their master where "-- --once" is added.
 
   --master HOST:PORT  start: where the master listens, as the machines see it (it needs --listen 0.0.0.0:PORT)
   --worker FILE       start: the program to run there (default: target/release/rayfarm-worker of this folder)
   --jobs N            so many machines at a time (default 16)
-  --timeout SECONDS   how long one machine may take (default 60)
+  --timeout SECONDS   how long one machine may be silent, or a copy make no progress (default 60)
   --ssh COMMAND       what is run in place of "ssh -o BatchMode=yes -o ConnectTimeout=10"; its words are split at
                       spaces, and [-p PORT] HOST and one command line follow
   --dry-run           print what would be done, and touch no machine
   --help              this text
 
-A line per worker is printed. Exit status: 0 all well (status: all run); 1 not with each; 2 wrong use.
+A line per worker is printed, and the progress of copies that take their time. Exit status: 0 all well (status: all run); 1 not with each; 2 wrong use.
 Needs bash 4.4 or later.
 TEXT
 }
@@ -83,13 +86,21 @@ if [ ! -r "$hosts_file" ] || [ -d "$hosts_file" ]; then fail "$hosts_file: canno
 
 hosts=() threads=() ports=() names=()
 
+# shown WORD: in quotes, and nothing in it that a terminal would obey.
+shown() {
+    local word=${1//[[:cntrl:]]/?}
+    printf '"%s"' "${word:0:80}"
+}
+
 # add_host LINE-NUMBER HOST THREADS PORT: checks one line, and gives the worker a name of its own.
 add_host() {
     local where="$hosts_file, line $1" host=$2 name count=1
+    # An IPv6 address in brackets, which ssh does not know there.
+    [[ $host =~ ^(.*@)?\[([0-9A-Fa-f:]+(%[A-Za-z0-9_.-]+)?)\]$ ]] && host=${BASH_REMATCH[1]}${BASH_REMATCH[2]}
     # Nothing that a shell or ssh would take for something else.
-    [[ $host =~ ^[A-Za-z0-9_][A-Za-z0-9_.@:%-]*$ ]] || fail "$where: \"$host\" is no [user@]host" 2
-    [[ $3 =~ ^(-|[1-9][0-9]{0,3})$ ]] || fail "$where: \"$3\" is no number of threads (or - for all cores)" 2
-    [[ $4 =~ ^(|[1-9][0-9]{0,4})$ ]] || fail "$where: \"$4\" is no port" 2
+    [[ $host =~ ^[A-Za-z0-9_:][A-Za-z0-9_.@:%-]*$ ]] || fail "$where: $(shown "$host") is no [user@]host" 2
+    [[ $3 =~ ^(-|[1-9][0-9]{0,3})$ ]] || fail "$where: $(shown "$3") is no number of threads (or - for all cores)" 2
+    [[ $4 =~ ^(|[1-9][0-9]{0,4})$ ]] || fail "$where: $(shown "$4") is no port" 2
     name=$host
     while [[ " ${names[*]} " = *" $name "* ]]; do
         count=$((count + 1))
@@ -98,15 +109,28 @@ add_host() {
     hosts+=("$host") threads+=("$3") ports+=("$4") names+=("$name")
 }
 
+# The text of the file, without what Windows adds: a byte order mark, carriage returns.
+hosts_text() {
+    local text
+    case $(od -An -tx1 -N2 "$hosts_file" | tr -d ' \n') in
+        fffe | feff) fail "$hosts_file: is UTF-16 text; save it as UTF-8" 2 ;;
+    esac
+    text=$(tr -d '\000' <"$hosts_file")
+    text=${text#$'\xef\xbb\xbf'}
+    text=${text//$'\r\n'/$'\n'}
+    printf '%s\n' "${text//$'\r'/$'\n'}"
+}
+
 read_hosts() {
-    local line number=0 words
+    local text line number=0 words
+    text=$(hosts_text) || exit
     while IFS= read -r line || [ -n "$line" ]; do
         number=$((number + 1))
         read -ra words <<<"${line%%#*}"
         [ ${#words[@]} -gt 0 ] || continue
         [ ${#words[@]} -le 3 ] || fail "$hosts_file, line $number: [user@]host [threads [port]] is expected" 2
         add_host "$number" "${words[0]}" "${words[1]:--}" "${words[2]:-}"
-    done <"$hosts_file"
+    done <<<"$text"
     [ ${#hosts[@]} -gt 0 ] || fail "$hosts_file: names no host" 2
 }
 
@@ -119,13 +143,47 @@ hash_here() {
     if command -v sha256sum >/dev/null; then sha256sum; else shasum -a 256; fi | cut -d ' ' -f 1
 }
 
-hash=""
+size_here() { wc -c <"$1" | tr -d ' '; }
+
+# kind_of FILE: the kind of machine that an ELF program is for, as uname names it; nothing where that is not known.
+kind_of() {
+    local head
+    head=$(od -An -tx1 -N20 "$1" | tr -d ' \n')
+    case ${head:0:8}${head:36:4} in
+        7f454c463e00) echo x86_64 ;;
+        7f454c46b700) echo aarch64 ;;
+        7f454c46f300) echo riscv64 ;;
+        7f454c462800) echo arm ;;
+    esac
+}
+
+# Programs to copy, and what comes of each machine; gone when this script ends.
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# prepare: sets program (without symbols where strip knows its kind), hash, plain_size, packed, packed_size and machine.
+hash="" plain_size=0 packed="" packed_size=0 machine=""
+prepare() {
+    program=$work/rayfarm-worker
+    if ! { command -v strip && strip -o "$program" "$worker"; } >/dev/null 2>&1 || [ ! -s "$program" ]; then
+        program=$worker
+    fi
+    hash=$(hash_here <"$program")
+    plain_size=$(size_here "$program")
+    machine=$(kind_of "$program")
+    # Without a name and a time in it: what is sent on two days fits together.
+    if command -v gzip >/dev/null && gzip -n -6 <"$program" >"$work/packed"; then
+        packed=$work/packed
+        packed_size=$(size_here "$packed")
+    fi
+}
+
 if [ "$action" = start ]; then
     worker=${worker:-${CARGO_TARGET_DIR:-$root/target}/release/rayfarm-worker}
     if [ -f "$worker" ] && [ -x "$worker" ]; then
-        hash=$(hash_here <"$worker")
+        prepare
     else
-        fail "$worker: is no program; build it with cargo build --release -p rayfarm-worker, or name it with --worker" 2
+        fail "$worker: is no program; build it with cargo build --release, or name it with --worker" 2
     fi
 fi
 
@@ -148,47 +206,126 @@ options_of() {
 # script_for INDEX: what sh shall read there. Everything that varies comes first, in quotes.
 script_for() {
     printf 'action=%s name=%s hash=%s\n' "$action" "$(quote "${names[$1]}")" "$(quote "$hash")"
+    printf 'machine=%s plain_size=%s packed_size=%s\n' "$(quote "$machine")" "$plain_size" "$packed_size"
     printf 'set -- %s\n' "$(options_of "$1")"
     cat "$root/scripts/workers/remote.sh"
 }
 
-# on INDEX COMMAND-LINE: runs that there.
-on() {
-    local command=("${ssh_words[@]}")
+# ssh_to INDEX: sets command to what runs a command line there.
+ssh_to() {
+    command=("${ssh_words[@]}")
     [ -z "${ports[$1]}" ] || command+=(-p "${ports[$1]}")
-    command+=("${hosts[$1]}" "$2")
+    command+=("${hosts[$1]}")
+}
+
+# ask INDEX: has remote.sh do the action there; sets said and status.
+ask() {
+    local command
+    ssh_to "$1"
     if command -v timeout >/dev/null; then command=(timeout "$patience" "${command[@]}"); fi
-    "${command[@]}"
+    status=0
+    said=$(script_for "$1" | "${command[@]}" "sh -s" 2>"$work/errors.$1" 3>&-) || status=$?
+    # What ssh or a shell adds (a banner, a new host key) counts only where something went wrong.
+    [ "$status" = 0 ] || said="$said $(cat "$work/errors.$1")"
 }
 
-# The copy has a name of its own until it is whole, and replaces the program at once: one that runs is not disturbed.
+# Bytes between two looks at how far a copy is.
+CHUNK=131072
+
+# feed FILE FROM SIZE MARK: the file from some byte on; how far it is goes to the file MARK.
+feed() {
+    local at=$2 next
+    while [ "$at" -lt "$3" ]; do
+        next=$(((at / CHUNK + 1) * CHUNK))
+        [ "$next" -le "$3" ] || next=$3
+        if [ $((at % CHUNK)) -eq 0 ]; then
+            dd if="$1" bs="$CHUNK" skip=$((at / CHUNK)) count=1 2>/dev/null || return
+        else
+            tail -c "+$((at + 1))" "$1" | head -c $((next - at)) || return
+        fi
+        at=$next
+        echo "$at" >"$4"
+    done
+}
+
+megabytes() { printf '%d.%d MB' $(($1 / 1000000)) $(($1 / 100000 % 10)); }
+
+# copy_to INDEX HOW FROM: sends the rest of the program; sets said and status. Ended when nothing moves for too long.
 copy_to() {
-    local new=".rayfarm/rayfarm-worker.${names[$1]}.new"
-    on "$1" "umask 077; mkdir -p .rayfarm && cat > $new && chmod 755 $new && mv -f $new .rayfarm/rayfarm-worker" <"$worker"
+    local command file=$program size=$plain_size mark=$work/mark.$1 at=$3 seen pid quiet_since=$SECONDS reported=$SECONDS
+    [ "$2" = plain ] || { file=$packed size=$packed_size; }
+    ssh_to "$1"
+    echo "$at" >"$mark"
+    feed "$file" "$at" "$size" "$mark" 2>/dev/null |
+        "${command[@]}" "umask 077; cat >>.rayfarm/rayfarm-worker.$hash.$2.${names[$1]}.part" \
+            >"$work/said.$1" 2>"$work/errors.$1" 3>&- &
+    pid=$!
+    while kill -0 "$pid" 2>/dev/null; do
+        sleep 0.2
+        seen=$(cat "$mark")
+        if [ "$seen" != "$at" ]; then at=${seen:-$at} quiet_since=$SECONDS; fi
+        if [ $((SECONDS - quiet_since)) -gt "$patience" ]; then
+            kill "$pid" 2>/dev/null || true
+            wait "$pid" 2>/dev/null || true
+            status=124 said="the copy stopped at $((100 * at / size)) % of $(megabytes "$size")"
+            return
+        fi
+        if [ $((SECONDS - reported)) -ge "$REPORT_EVERY" ]; then
+            reported=$SECONDS
+            say "${names[$1]}: copying, $((100 * at / size)) % of $(megabytes "$size")" 2>&3
+        fi
+    done
+    status=0
+    wait "$pid" || status=$?
+    said=$(cat "$work/said.$1" "$work/errors.$1")
+    copied="copied $(megabytes "$size"); "
 }
+REPORT_EVERY=2
 
-# What remote.sh says when the program is absent or another one.
+# What remote.sh exits with when the program, or a part of it, is to be copied first.
 COPY_FIRST=9
 
-# attempt INDEX: does what is asked for there; prints what came of it.
+# attempt INDEX: does what is wanted there; sets said and status. A copy that breaks off goes on as long as it gets on.
 attempt() {
-    local status=0
-    script_for "$1" | on "$1" "sh -s" || status=$?
-    [ "$status" = "$COPY_FIRST" ] || return "$status"
-    copy_to "$1" || return
-    printf 'copied; '
-    script_for "$1" | on "$1" "sh -s"
+    local how from before=-1 problem="" problem_status=1
+    ask "$1"
+    while [ "$status" = "$COPY_FIRST" ]; do
+        if ! [[ $said =~ rayfarm-copy\ (gzip|plain)\ ([0-9]+) ]]; then
+            said="an answer that is not understood: $said" status=1
+            return
+        fi
+        how=${BASH_REMATCH[1]} from=${BASH_REMATCH[2]}
+        if [ "$from" -le "$before" ]; then
+            said=${problem:-the copy does not arrive whole} status=$problem_status
+            return
+        fi
+        before=$from
+        copy_to "$1" "$how" "$from"
+        # ssh's own failures and silence may pass; what a program there says does not.
+        case $status in
+            0 | 124 | 255) problem=$said problem_status=$status ;;
+            *) said="the program cannot be copied: ${said:-exit status $status}"; return ;;
+        esac
+        [ "$status" != 0 ] || problem="" problem_status=1
+        ask "$1"
+    done
 }
 
 # visit INDEX: prints a line about the machine. Its status is that of the attempt.
 visit() {
-    local said="" status=0
-    said=$(attempt "$1" 2>&1) || status=$?
-    said=$(printf '%s' "$said" | tr '\r\n\t' '   ' | tr -d '[:cntrl:]')
+    local said="" status=0 copied=""
+    attempt "$1"
+    said=$(printf '%s' "$said" | tr '\r\n\t' '   ' | tr -d '[:cntrl:]' | tr -s ' ')
+    said=${said# } said=${said% }
     case $status in
-        0) printf '%-24s ok      %s\n' "${names[$1]}" "$said"; return 0 ;;
+        0) printf '%-24s ok      %s\n' "${names[$1]}" "$copied$said"; return 0 ;;
         124) said="no answer within $patience s${said:+: $said}" ;;
-        255) said="cannot be reached: ${said:-ssh says nothing}" ;;
+        255)
+            case $said in
+                *"Permission denied"*) said="ssh may not log in there: $said" ;;
+                *) said="cannot be reached: ${said:-ssh says nothing}" ;;
+            esac
+            ;;
     esac
     printf '%-24s FAILED  %s\n' "${names[$1]}" "${said:-exit status $status}"
     return 1
@@ -198,7 +335,8 @@ tell() {
     printf '%s: %s' "${names[$1]}" "$action"
     if [ "$action" = start ]; then
         printf ' rayfarm-worker %s\n' "$(options_of "$1")"
-        printf '    after a copy of %s to ~/.rayfarm/rayfarm-worker, unless its SHA-256 is %s' "$worker" "$hash"
+        printf '    after a copy of %s (%s) to ~/.rayfarm/rayfarm-worker, unless its SHA-256 is %s' \
+            "$worker" "$(megabytes "$([ -n "$packed" ] && echo "$packed_size" || echo "$plain_size")")" "$hash"
     fi
     printf '\n    by: %s\n' "${ssh_words[*]}${ports[$1]:+ -p ${ports[$1]}} ${hosts[$1]} \"sh -s\""
 }
@@ -210,10 +348,12 @@ if [ "$dry_run" = yes ]; then
     exit 0
 fi
 
-outcomes=$(mktemp -d)
-trap 'rm -rf "$outcomes"' EXIT
+outcomes=$work/outcomes
+mkdir "$outcomes"
+# Progress is told while the rest is kept for the machine's line.
+exec 3>&2
 # Jobs in the background do not hear Ctrl-C themselves.
-trap 'kill $(jobs -p) 2>/dev/null; say "interrupted: what was begun there goes on"; exit 130' INT TERM
+trap 'kill $(jobs -p) 2>/dev/null; say "interrupted: what was begun there goes on, and a copy the next time"; exit 130' INT TERM
 
 for index in "${!hosts[@]}"; do
     [ "$index" -lt "$jobs" ] || wait -n || true
