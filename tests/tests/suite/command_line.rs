@@ -88,7 +88,8 @@ fn a_sequence_moves_and_begins_with_the_still_picture() {
 fn the_bench_traces_what_the_farm_traces() {
     let scenes = Scenes::new();
     let alone = json(&scenes, "bench small.toml --frames 2 --threads 2 --json");
-    let farm = json(&scenes, "render small.toml -o a.png --json");
+    // In one piece: where a cut divides tiles, rays that lie in a surface may be counted on either side.
+    let farm = json(&scenes, "render small.toml -o a.png --json --segment static:120");
     for field in ["blake3", "rays_per_frame", "triangles"] {
         assert_eq!(alone[field], farm[field], "{field}");
     }
@@ -122,4 +123,36 @@ fn a_folder_that_cannot_be_written_is_found_before_the_scene_is_read() {
         run(&scenes, "render nowhere.toml -o /proc/a.png").expect_failure(2, &["/proc"]);
     }
     run(&scenes, "render nowhere.toml -o missing/a.png").expect_failure(2, &["there is no folder missing"]);
+}
+
+#[test]
+fn a_master_that_listens_everywhere_names_addresses_that_others_reach() {
+    let scenes = Scenes::new();
+    let outcome = run(&scenes, "render small.toml -o a.png --size 16x12 --listen 0.0.0.0:0").expect_success();
+    let line = outcome.stderr.lines().find(|line| line.contains("workers connect to ")).unwrap();
+    assert!(!line.contains("0.0.0.0"), "{line}");
+    let is_alone = line.contains("no address that others can reach");
+    assert_eq!(line.contains("127.0.0.1"), is_alone, "{line}");
+    let outcome = run(&scenes, "render small.toml -o a.png --listen [fe80::1%nothere0]:7117");
+    outcome.expect_failure(2, &["no interface", "nothere0"]);
+    let outcome = run(&scenes, "render small.toml -o a.png --control [fe80::1%nothere0]:7117");
+    outcome.expect_failure(2, &["no interface", "nothere0"]);
+}
+
+/// One `cargo build` at the root makes both programs, and `cargo run` there still means the master.
+#[test]
+fn the_root_builds_both_programs_and_runs_the_master() {
+    let mut command = std::process::Command::new(env!("CARGO"));
+    command.args(["metadata", "--no-deps", "--format-version", "1", "--offline"]);
+    let outcome =
+        Running::start(command.current_dir(rayfarm_tests::project_root())).finish().expect_success();
+    let metadata: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    let built: Vec<_> = metadata["workspace_default_members"].as_array().unwrap().iter().collect();
+    let built = packages.iter().filter(|package| built.contains(&&package["id"]));
+    let mut names: Vec<_> = built.clone().map(|package| package["name"].as_str().unwrap()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["rayfarm-master", "rayfarm-worker"]);
+    let runs: Vec<_> = built.filter_map(|package| package["default_run"].as_str()).collect();
+    assert_eq!(runs, ["rayfarm-master"]);
 }

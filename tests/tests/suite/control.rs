@@ -12,6 +12,7 @@ fn endless(scenes: &Scenes, more: &[&str]) -> std::process::Command {
     let mut command = master();
     command.arg("render").arg(scenes.path("small.toml")).arg("-o").arg(scenes.path("f-%07d.ppm"));
     command.args(["--frames", "1000000", "--size", "32x24"]).args(more);
+    command.env("XDG_RUNTIME_DIR", scenes.path(""));
     command
 }
 
@@ -26,13 +27,15 @@ struct Line {
 }
 
 impl Line {
-    fn to(port: u16) -> Self {
-        let mut stream = None;
-        wait_until("commands are taken", || {
-            stream = TcpStream::connect(("127.0.0.1", port)).ok();
-            stream.is_some()
-        });
-        Self { stream: BufReader::new(stream.unwrap()) }
+    /// Shows the token of a run whose `XDG_RUNTIME_DIR` is the folder of these scenes.
+    fn to(port: u16, scenes: &Scenes) -> Self {
+        let token = scenes.path(&format!("rayfarm/control-127.0.0.1-{port}"));
+        wait_until("commands are taken", || token.exists());
+        let stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
+        let mut line = Self { stream: BufReader::new(stream) };
+        let token = std::fs::read_to_string(token).unwrap();
+        assert_eq!(line.ask(token.trim())["ok"], true);
+        line
     }
 
     fn ask(&mut self, command: &str) -> Value {
@@ -91,9 +94,21 @@ fn workers_are_paused_sent_home_and_kept_out_over_a_port() {
     let (listen, place) = (format!("127.0.0.1:{port}"), format!("127.0.0.1:{control}"));
     let mut command = endless(&scenes, &["--no-local-workers", "--listen", &listen, "--control", &place]);
     let run = Running::start(&mut command);
-    let mut line = Line::to(control);
+    let mut line = Line::to(control, &scenes);
     let [_mill, barn, shed] = ["mill", "barn", "shed"].map(|name| worker_called(name, port));
     line.wait_for(&["barn working", "mill working", "shed working"]);
+    let mut status = Value::Null;
+    wait_until("some frames are done and the pace is known", || {
+        status = line.ask("status");
+        status["frames_done"].as_u64().unwrap() > 3 && status["seconds_left"].is_number()
+    });
+    let number = |name: &str| status[name].as_f64().unwrap();
+    assert_eq!((number("frames"), number("workers"), number("threads")), (1e6, 3.0, 3.0));
+    assert!(number("fps") > 0.0 && number("elapsed_seconds") > 0.0, "{status}");
+    let left = (number("frames") - number("frames_done")) / number("fps");
+    assert!((number("seconds_left") / left - 1.0).abs() < 0.01, "{status}");
+    assert!(number("received_bytes") >= number("frames_done") * 32.0 * 24.0 * 3.0, "{status}");
+    assert!(number("sent_bytes") > number("scene_bytes") && number("scene_bytes") > 0.0, "{status}");
 
     assert_eq!(line.ask("pause mill")["ok"], true);
     line.wait_for(&["barn working", "mill paused", "shed working"]);
@@ -116,7 +131,12 @@ fn workers_are_paused_sent_home_and_kept_out_over_a_port() {
     });
     wait_until("the one that is left goes on", || frame().is_some_and(|now| now > then.unwrap() + 3));
     assert_eq!(line.ask("quit")["ok"], true);
-    run.finish().expect_failure(1, &["frames are written"]);
+    let outcome = run.finish().expect_failure(1, &["frames are written", "--resume"]);
+    let drained: Vec<_> = outcome.stderr.lines().filter(|line| line.contains("barn")).collect();
+    assert!(drained.iter().any(|line| line.contains("leaves")), "{outcome:?}");
+    assert!(!drained.iter().any(|line| line.contains("WARN")), "a wanted drain is no warning: {drained:?}");
+    let is_time = |line: &&str| matches!(line.split_once("Z "), Some((time, _)) if time.len() == 8 && time.split(':').count() == 3);
+    assert!(outcome.stderr.lines().filter(is_time).count() > 3, "{outcome:?}");
 }
 
 #[test]
@@ -143,8 +163,9 @@ fn keys_pause_all_workers_and_the_one_selected() {
         "2",
     ]);
     command.args(["--control", &format!("127.0.0.1:{control}")]).current_dir(scenes.path(""));
+    command.env("XDG_RUNTIME_DIR", scenes.path(""));
     let window = Running::start(screen.show(&mut command));
-    let mut line = Line::to(control);
+    let mut line = Line::to(control, &scenes);
     let mut paused = || {
         let states = line.states();
         (states.len() == 2).then(|| states.iter().filter(|state| state.ends_with("paused")).count())
@@ -176,5 +197,45 @@ fn keys_pause_all_workers_and_the_one_selected() {
         screen.xdotool(&["key", "Escape"]);
         screen.xdotool(&["search", "--onlyvisible", "--name", "rayfarm"]).is_none_or(|found| found.is_empty())
     });
+    window.finish().expect_success();
+}
+
+#[test]
+fn a_key_brings_the_only_worker_back_that_was_kicked() {
+    let Some(screen) = Screen::start() else { return };
+    let scenes = Scenes::new();
+    let control = free_port();
+    let mut command = master();
+    command.args("view small.toml --size 640x480 --listen 127.0.0.1:0".split(' '));
+    command.args(["--control", &format!("127.0.0.1:{control}")]).current_dir(scenes.path(""));
+    command.env("XDG_RUNTIME_DIR", scenes.path(""));
+    let window = Running::start(screen.show(&mut command));
+    let mut line = Line::to(control, &scenes);
+    wait_until("the worker is there", || line.states().len() == 1);
+    let mut id = String::new();
+    wait_until("the window is there", || {
+        let found = screen.xdotool(&["search", "--onlyvisible", "--name", "rayfarm"]).unwrap_or_default();
+        id = found.lines().next().unwrap_or_default().to_owned();
+        !id.is_empty()
+    });
+    screen.xdotool(&["mousemove", "--window", &id, "30", "30"]).unwrap();
+    // Pressed again until it is heard: a window that has just appeared may not have the keyboard yet.
+    wait_until("the worker is sent away", || {
+        screen.xdotool(&["key", "Tab", "k"]).unwrap();
+        (0..20).any(|_| {
+            std::thread::sleep(Duration::from_millis(100));
+            line.states().is_empty()
+        })
+    });
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(line.states().is_empty(), "it is kept out");
+    wait_until("the worker is back", || {
+        screen.xdotool(&["key", "b"]).unwrap();
+        (0..20).any(|_| {
+            std::thread::sleep(Duration::from_millis(100));
+            line.states().len() == 1
+        })
+    });
+    screen.xdotool(&["key", "Escape"]).unwrap();
     window.finish().expect_success();
 }

@@ -118,10 +118,32 @@ fn when_the_last_worker_dies_the_next_one_goes_on() {
 #[test]
 fn a_worker_waits_for_a_master_that_comes_later_and_is_sent_home_at_the_end() {
     let port = free_port();
-    let mut early = start_worker(port, "early");
-    early.wait_for("again");
+    let mut command = worker();
+    command.args(["--master", &format!("127.0.0.1:{port}"), "--threads", "1", "--once"]);
+    let mut early = Running::start(&mut command);
+    early.wait_for("waiting for it");
     assert_eq!(Run::start_on(port, 3, 1).finish().len(), 3);
     early.finish().expect_success();
+}
+
+#[test]
+fn a_worker_serves_one_master_after_the_other_until_it_is_interrupted() {
+    let port = free_port();
+    let mut worker = start_worker(port, "stays");
+    worker.wait_for("waiting for it");
+    let first = Run::start_on(port, 3, 1).finish();
+    worker.wait_for("waiting for the next one");
+    // One that is killed says nothing: it is waited for likewise.
+    let killed = Run::start_on(port, 10_000, 1);
+    killed.wait_for_frame(1);
+    killed.master.signal("KILL");
+    drop(killed);
+    worker.wait_for("lost the master");
+    assert!(Run::start_on(port, 3, 1).finish() == first);
+    worker.signal("INT");
+    let outcome = worker.finish().expect_success();
+    assert_eq!(outcome.stderr.matches("connected to the master").count(), 3, "{outcome:?}");
+    assert!(outcome.stderr.lines().count() <= 10, "{outcome:?}");
 }
 
 #[test]

@@ -6,15 +6,33 @@ use std::process::Command;
 
 use rayfarm_tests::{Outcome, Running, Scenes, free_port, master, project_root, wait_until, worker};
 
-/// Takes what ssh takes. A machine that has no folder cannot be reached.
+/// Takes what ssh takes. A machine that has no folder cannot be reached. What comes of copies is in $COPY; programs in the
+/// machine's folder `bin` come first.
 const NOT_SSH: &str = r#"#!/bin/sh
 while [ "$1" = -p ]; do shift 2; done
-HOME=$MACHINES/$1
-cd "$HOME" || exit 255
+HOME=$MACHINES/$1 PATH=$MACHINES/$1/bin:$PATH
+cd "$HOME" 2>/dev/null || { echo "ssh: connect to host $1: No route to host" >&2; exit 255; }
 shift
-export HOME
-exec sh -c "$*"
+export HOME PATH
+case $*$COPY in
+*"cat >>"*slow) (while :; do dd bs=65536 count=1 2>dd; grep -q '^0+0' dd && break; sleep 1; done) | sh -c "$*" ;;
+*"cat >>"*cut) head -c 200000 | sh -c "$*"; echo "client_loop: Broken pipe" >&2; exit 255 ;;
+*"cat >>"*silent) exec sleep 100 ;;
+*no-gzip) mkdir -p tools; ln -sf /bin/* /usr/bin/* tools 2>ln; rm tools/gzip; PATH=$HOME/tools; exec sh -c "$*" ;;
+*) exec sh -c "$*" ;;
+esac
 "#;
+
+/// A program that stays, and does not become smaller: it ends with half a megabyte of noise.
+fn big_program() -> Vec<u8> {
+    let script = "#!/bin/sh\n[ \"$1\" = --version ] && exit\necho connected to the master\nwhile :; do sleep 0.1; done\n";
+    let mut state = 1u64;
+    let noise = std::iter::repeat_with(move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as u8
+    });
+    script.bytes().chain(noise.take(500_000)).collect()
+}
 
 /// Some machines, whose workers end with the test.
 struct Room {
@@ -45,9 +63,14 @@ impl Room {
 
     /// `workers.sh ACTION hosts ARGUMENT ...`
     fn workers(&self, action: &str, arguments: &[&str]) -> Outcome {
+        self.workers_with("", action, arguments)
+    }
+
+    /// Likewise, with something the matter with copies.
+    fn workers_with(&self, copy: &str, action: &str, arguments: &[&str]) -> Outcome {
         let mut command = Command::new(project_root().join("scripts/workers.sh"));
         command.arg(action).arg(self.path("hosts")).arg("--ssh").arg(self.path("not-ssh"));
-        command.args(arguments).env("MACHINES", self.path("")).env_remove("RUST_LOG");
+        command.args(arguments).env("MACHINES", self.path("")).env("COPY", copy).env_remove("RUST_LOG");
         Running::start(&mut command).finish()
     }
 
@@ -57,7 +80,24 @@ impl Room {
         self.workers("start", &[&["--master", &master, "--worker", &program], more].concat())
     }
 
-    /// A master that begins to render when so many workers are there.
+    /// Starts the big program on the machine `there`.
+    fn start_big(&self, copy: &str, more: &[&str]) -> Outcome {
+        let program = self.scenes.write("big", big_program());
+        std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
+        let arguments = ["--master", "127.0.0.1:1", "--worker", program.to_str().unwrap()];
+        self.workers_with(copy, "start", &[&arguments, more].concat())
+    }
+
+    /// The files that were put on the machine `there`.
+    fn files_there(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.path("there/.rayfarm")).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// A master that begins to render when that number of workers is there.
     fn master(&self, workers: &str) -> Running {
         let mut command = master();
         command
@@ -110,15 +150,143 @@ fn workers_are_started_listed_and_stopped() {
 }
 
 #[test]
-fn launched_workers_render() {
+fn launched_workers_render_for_one_master_after_the_other() {
     let room = Room::new(&["a", "b"], "a 1\nb 1\n");
-    let master = room.master("2");
+    let mut master = room.master("2");
     room.start(&["--jobs", "1"]).expect_success();
-    let report: serde_json::Value = serde_json::from_str(&master.finish().expect_success().stdout).unwrap();
-    assert_eq!((&report["workers"], &report["threads"]), (&2.into(), &2.into()));
+    for _ in 0..2 {
+        let report = master.finish().expect_success().stdout;
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        assert_eq!((&report["workers"], &report["threads"]), (&2.into(), &2.into()));
+        wait_until("the workers wait for the next master", || {
+            room.workers("status", &[]).stdout.matches("waiting for the next one").count() == 2
+        });
+        master = room.master("2");
+    }
+    master.finish().expect_success();
+    room.workers("stop", &[]).expect_success();
+    room.start(&["--", "--once"]).expect_success();
+    room.master("2").finish().expect_success();
     wait_until("the workers have ended with their master", || {
         room.workers("status", &[]).stdout.matches("does not run").count() == 2
     });
+}
+
+#[test]
+fn a_copy_leaves_nothing_but_the_program() {
+    let room = Room::new(&["there"], "there\n");
+    std::fs::create_dir(room.path("there/.rayfarm")).unwrap();
+    for left in [
+        "rayfarm-worker.there.new",
+        "rayfarm-worker.0123.gzip.there.part",
+        "rayfarm-worker.0123.plain.x.part",
+    ] {
+        room.scenes.write(&format!("there/.rayfarm/{left}"), "half of an older program");
+    }
+    let outcome = room.start_big("", &[]).expect_success();
+    assert!(line(&outcome, "there").contains("copied 0.5 MB"), "{outcome:#?}");
+    assert_eq!(room.files_there(), ["rayfarm-worker", "there.log", "there.pid"]);
+    assert!(room.scenes.read("there/.rayfarm/rayfarm-worker") == big_program());
+    let outcome = room.start_big("", &[]).expect_success();
+    assert!(!line(&outcome, "there").contains("copied"), "{outcome:#?}");
+}
+
+#[test]
+fn a_copy_that_breaks_off_goes_on_where_it_ended() {
+    let room = Room::new(&["there"], "there\n");
+    let outcome = room.start_big("cut", &[]).expect_success();
+    assert!(room.scenes.read("there/.rayfarm/rayfarm-worker") == big_program(), "{outcome:#?}");
+    assert_eq!(room.files_there(), ["rayfarm-worker", "there.log", "there.pid"]);
+}
+
+#[test]
+fn a_slow_copy_tells_its_progress_and_is_not_given_up() {
+    let room = Room::new(&["there"], "there\n");
+    // It takes eight seconds in all, and moves every second.
+    let outcome = room.start_big("slow", &["--timeout", "4"]).expect_success();
+    assert!(
+        outcome.stderr.contains("there: copying, ") && outcome.stderr.contains(" % of 0.5 MB"),
+        "{outcome:#?}"
+    );
+    assert!(room.scenes.read("there/.rayfarm/rayfarm-worker") == big_program());
+}
+
+#[test]
+fn a_copy_that_does_not_move_is_given_up_and_says_so() {
+    let room = Room::new(&["there"], "there\n");
+    let outcome = room.start_big("silent", &["--timeout", "2"]);
+    assert_eq!(outcome.code, Some(1), "{outcome:#?}");
+    let line = line(&outcome, "there");
+    assert!(line.contains("no answer within 2 s: the copy stopped at "), "{line}");
+}
+
+#[test]
+fn a_failure_is_told_in_the_words_of_what_failed() {
+    let room = Room::new(&["there"], "there\n");
+    std::fs::create_dir(room.path("there/bin")).unwrap();
+    let told = |program: &str, text: &str, words: &[&str]| {
+        let path = room.program(&format!("there/bin/{program}"), text);
+        let outcome = room.start_big("", &[]);
+        assert_eq!(outcome.code, Some(1), "{outcome:#?}");
+        for word in words {
+            assert!(line(&outcome, "there").contains(word), "{word}: {outcome:#?}");
+        }
+        std::fs::remove_file(path).unwrap();
+    };
+    let full = "#!/bin/sh\necho 'cat: write error: No space left on device' >&2; exit 1\n";
+    told("cat", full, &["cannot be copied: cat: write error: No space left on device"]);
+    // What gzip writes when the rest of the disk does not hold the program.
+    let full = "#!/bin/sh\necho 'gzip: stdout: No space left on device' >&2; exit 1\n";
+    told("gzip", full, &["cannot write", "gzip: stdout: No space left on device"]);
+    std::fs::remove_dir_all(room.path("there/.rayfarm")).unwrap();
+    room.scenes.write("there/.rayfarm", "a file");
+    told("unused", "", &["cannot make", ".rayfarm", "File exists"]);
+}
+
+#[test]
+fn a_machine_without_gzip_gets_the_program_as_it_is() {
+    let room = Room::new(&["there"], "there\n");
+    let outcome = room.start_big("no-gzip", &[]).expect_success();
+    assert!(line(&outcome, "there").contains("copied 0.5 MB"), "{outcome:#?}");
+    assert!(room.scenes.read("there/.rayfarm/rayfarm-worker") == big_program());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_program_for_another_kind_of_machine_is_not_copied() {
+    let room = Room::new(&["there"], "there\n");
+    std::fs::create_dir(room.path("there/bin")).unwrap();
+    room.program("there/bin/uname", "#!/bin/sh\n[ \"$1\" = -m ] && echo m68k || echo Linux\n");
+    let outcome = room.start(&[]);
+    assert_eq!(outcome.code, Some(1), "{outcome:#?}");
+    let line = line(&outcome, "there");
+    assert!(line.contains("another kind (Linux m68k)") && line.contains("--worker"), "{line}");
+    assert_eq!(room.files_there(), Vec::<String>::new());
+}
+
+#[test]
+fn files_of_hosts_may_come_from_windows() {
+    for text in [
+        "\u{feff}# the room\r\nthere 8 7120\r\nme@[fe80::1%eth0] 2\r\n",
+        "there 8 7120\rme@[fe80::1%eth0] 2\r",
+        "there 8 7120\nme@fe80::1%eth0 2",
+    ] {
+        let room = Room::new(&[], text);
+        let outcome = room.start(&["--dry-run"]).expect_success();
+        for word in
+            ["there: start", "'--threads' '8'", "-p 7120 there ", "me@fe80::1%eth0: start", "'--threads' '2'"]
+        {
+            assert!(outcome.stdout.contains(word), "no `{word}`: {outcome:#?}");
+        }
+        assert!(!outcome.stdout.contains('\r'), "{outcome:#?}");
+    }
+    let room = Room::new(&[], "");
+    room.scenes.write("hosts", b"\xff\xfet\0h\0e\0r\0e\0\n\0");
+    room.start(&[]).expect_failure(2, &["UTF-16", "UTF-8"]);
+    // Whatever is wrong with a line, no control character of it reaches the terminal.
+    room.scenes.write("hosts", "there 8 \u{1b}[2J\n");
+    let outcome = room.start(&[]).expect_failure(2, &["is no port"]);
+    assert!(!outcome.stderr.contains('\u{1b}'), "{outcome:#?}");
 }
 
 #[test]
@@ -127,7 +295,11 @@ fn a_machine_that_fails_is_named_and_the_others_go_on() {
     let _master = room.master("9");
     let outcome = room.start(&[]);
     assert_eq!(outcome.code, Some(1), "{outcome:#?}");
-    assert!(line(&outcome, "gone").contains("FAILED  cannot be reached"), "{outcome:#?}");
+    let gone = line(&outcome, "gone");
+    assert!(
+        gone.contains("FAILED  cannot be reached: ssh: connect to host gone: No route to host"),
+        "{outcome:#?}"
+    );
     assert!(line(&outcome, "there").contains(" ok "), "{outcome:#?}");
     assert!(outcome.stderr.contains("1 of 2"), "{outcome:#?}");
 }

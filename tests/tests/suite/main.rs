@@ -10,6 +10,7 @@ mod control;
 mod faults;
 #[cfg(unix)]
 mod launch;
+mod resume;
 mod same_picture;
 mod tradeoff;
 mod window;

@@ -138,7 +138,8 @@ fn knobs_of_the_file_and_of_the_command_line_are_the_tracers() {
         assert!(rayfarm_tracer::image::load(&scenes.path("a.png")).unwrap() == expected);
         assert_eq!(report["rays_per_frame"]["shadow"], 0);
         let quality = serde_json::json!({
-            "adaptive": false, "shadows": false, "shading": "diffuse", "filter": null, "exponent": "fast", "colors": "exact", "scale": 1.0
+            "adaptive": false, "shadows": false, "shading": "diffuse", "filter": null, "exponent": "fast", "colors": "exact", "scale": 1.0,
+            "dither": false
         });
         assert_eq!(report["quality"], quality);
     }
@@ -233,7 +234,11 @@ fn a_compiled_model_in_another_folder_finds_its_textures() {
     let mut compile = master();
     compile.arg("compile").arg(&source).arg("-o").arg(&compiled);
     Running::start(&mut compile).finish().expect_success();
-    assert!(traced(&source) == traced(&compiled));
+    let pictures = [scenes.path("source.png"), scenes.path("compiled.png")];
+    render(&source, &pictures[0], &[]);
+    render(&compiled, &pictures[1], &["--allow-parent-textures"]);
+    let [of_source, of_compiled] = pictures.map(|picture| rayfarm_tracer::image::load(&picture).unwrap());
+    assert!(of_source == of_compiled && of_source == traced(&source));
 }
 
 #[test]

@@ -1,6 +1,11 @@
 //! Keys, mouse and size of the window, seen through the frame log: a moved camera traces other rays.
 
+use std::cell::Cell;
+use std::thread::sleep;
+use std::time::Duration;
+
 use rayfarm_tests::{Running, Scenes, Screen, master, wait_until};
+use rayfarm_tracer::image::load;
 
 /// One sphere under one light, nothing behind: shadow rays are traced only where the sphere is seen from its lit side.
 const SPHERE: &str = r#"
@@ -27,6 +32,8 @@ struct View<'a> {
     scenes: Scenes,
     running: Running,
     window: String,
+    /// Frames that were there before the last thing was done: at rest, nothing comes later than once.
+    before: Cell<usize>,
 }
 
 /// A frame by its rays.
@@ -38,10 +45,15 @@ struct Frame {
 
 impl<'a> View<'a> {
     fn start(screen: &'a Screen) -> Self {
+        Self::start_with(screen, "")
+    }
+
+    fn start_with(screen: &'a Screen, more: &str) -> Self {
         let scenes = Scenes::new();
         scenes.write("sphere.toml", SPHERE);
         let mut command = master();
         command.args("view sphere.toml --size 320x240 --fps-log log.csv --listen 127.0.0.1:0".split(' '));
+        command.args(more.split_whitespace());
         let running = Running::start(screen.show(command.current_dir(scenes.path(""))));
         let mut window = String::new();
         wait_until("the window is there", || {
@@ -49,13 +61,15 @@ impl<'a> View<'a> {
             window = found.lines().next().unwrap_or_default().to_owned();
             !window.is_empty()
         });
-        let view = Self { screen, scenes, running, window };
+        let view = Self { screen, scenes, running, window, before: Cell::new(0) };
         // Without a window manager the keyboard belongs to the window below the pointer.
         view.point_at(30, 30);
+        view.before.set(0);
         view
     }
 
     fn tool(&self, args: &str) {
+        self.before.set(self.frames().len());
         let args: Vec<&str> = args.split(' ').collect();
         self.screen.xdotool(&args).unwrap();
     }
@@ -65,7 +79,7 @@ impl<'a> View<'a> {
     }
 
     fn frames(&self) -> Vec<Frame> {
-        let log = String::from_utf8(self.scenes.read("log.csv")).unwrap();
+        let Ok(log) = std::fs::read_to_string(self.scenes.path("log.csv")) else { return Vec::new() };
         let whole = log.split_inclusive('\n').skip(1).filter(|line| line.ends_with('\n'));
         whole
             .map(|line| {
@@ -75,9 +89,9 @@ impl<'a> View<'a> {
             .collect()
     }
 
-    /// Waits for a frame from now on, doing something again and again meanwhile.
+    /// Waits for a frame since the last thing was done, doing something again and again meanwhile.
     fn frame_while(&self, what: &str, mut act: impl FnMut(), wanted: impl Fn(&Frame) -> bool) -> Frame {
-        let seen = self.frames().len();
+        let seen = self.before.get();
         let mut found = None;
         wait_until(what, || {
             act();
@@ -126,6 +140,75 @@ fn keys_mouse_and_size_change_what_is_rendered() {
     view.frame("a frame of the window's new size", |frame| frame.primary == 200 * 100);
 
     view.point_at(30, 30);
+    view.tool("key Escape");
+    view.running.finish().expect_success();
+}
+
+/// Far longer than a frame of this scene takes.
+const A_WHILE: Duration = Duration::from_secs(3);
+
+#[test]
+fn at_rest_a_picture_is_rendered_once_and_nothing_while_the_window_is_hidden() {
+    let Some(screen) = Screen::start() else { return };
+    let view = View::start(&screen);
+    let still = view.frame("the first picture", |frame| frame.primary == 320 * 240);
+    sleep(A_WHILE);
+    view.tool("key h key h key o key o key c key f");
+    sleep(A_WHILE);
+    assert_eq!(view.frames(), [still], "one frame, whatever is written over it");
+
+    view.tool("click 4");
+    let nearer = view.frame("a camera nearer, by the wheel", |frame| frame.shadow > still.shadow);
+    sleep(A_WHILE);
+    let count = view.frames().len();
+    assert_eq!(view.frames().last(), Some(&nearer));
+    assert!(count <= 3, "one notch of the wheel is one view, perhaps two: {:?}", view.frames());
+
+    view.tool(&format!("windowunmap --sync {}", view.window));
+    view.tool(&format!("windowsize {} 200 100", view.window));
+    sleep(A_WHILE);
+    assert_eq!(view.frames().len(), count, "it is hidden");
+    view.tool(&format!("windowmap --sync {}", view.window));
+    view.frame("a frame of the size that it has now", |frame| frame.primary == 200 * 100);
+    wait_until("the window shows its picture", || {
+        let file = view.scenes.path("shot.png");
+        screen.shoot(&file);
+        let shot = load(&file).unwrap();
+        let reds = shot.pixels.chunks_exact(3).filter(|rgb| rgb[0] > 100 && rgb[0] / 2 > rgb[1]);
+        reds.count() > 100
+    });
+    view.point_at(30, 30);
+    view.tool("key Escape");
+    view.running.finish().expect_success();
+}
+
+#[test]
+fn what_moves_by_itself_stops_while_the_window_is_hidden() {
+    let Some(screen) = Screen::start() else { return };
+    let view = View::start_with(&screen, "--spin 1");
+    let count = || view.frames().len();
+    wait_until("it moves", || count() > 20);
+    view.tool(&format!("windowunmap --sync {}", view.window));
+    let mut last = 0;
+    wait_until("it stops", || {
+        let before = std::mem::replace(&mut last, count());
+        sleep(Duration::from_millis(500));
+        count() == last && before == last
+    });
+    sleep(A_WHILE);
+    assert_eq!(count(), last, "it is hidden");
+    view.tool(&format!("windowmap --sync {}", view.window));
+    wait_until("it goes on", || count() > last + 20);
+    view.point_at(30, 30);
+    view.tool("key Escape");
+    view.running.finish().expect_success();
+}
+
+#[test]
+fn a_measurement_renders_a_still_picture_again_and_again() {
+    let Some(screen) = Screen::start() else { return };
+    let view = View::start_with(&screen, "--continuous");
+    wait_until("frames come", || view.frames().len() > 50);
     view.tool("key Escape");
     view.running.finish().expect_success();
 }
