@@ -58,7 +58,7 @@ fn a_bare_model_fills_nine_tenths_of_every_picture() {
         (DVec3::splat(-1e6), DVec3::new(3e6, 1e6, 1e6)),
         (DVec3::ZERO, DVec3::new(1.0, 1000.0, 1.0)),
         (DVec3::ZERO, DVec3::new(5.0, 0.0, 5.0)),
-        (DVec3::ZERO, DVec3::new(0.0, 5.0, 0.001)),
+        (DVec3::ZERO, DVec3::new(0.001, 5.0, 0.0)),
     ] {
         let mesh = box_mesh(lower, upper);
         let scale = libm::exp2(f64::from(mesh.exponent()));
