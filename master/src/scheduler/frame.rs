@@ -174,7 +174,8 @@ impl Frame {
         for segment in self.segments.values_mut().filter(|s| !s.done && within(s.first, s.count)) {
             segment.done = true;
             segment.holders.clear();
-            segment.cost = share(cost, segment.count, lease.row_count);
+            let start = segment.first - rows.start;
+            segment.cost = share(cost, start..start + segment.count, lease.row_count);
             self.rows_done += segment.count;
             fresh.push(segment.first..segment.first + segment.count);
         }
@@ -227,10 +228,12 @@ impl Frame {
     }
 }
 
-/// What `count` of `rows` rows have cost.
-fn share(cost: Cost, count: u32, rows: u32) -> Cost {
+/// The part of a lease's cost that belongs to some of its `rows` rows. Parts of adjoining ranges sum to the whole: a lease may be
+/// answered after its rows were divided.
+fn share(cost: Cost, range: Range<u32>, rows: u32) -> Cost {
+    let up_to = |whole: u64, row: u32| u128::from(whole) * u128::from(row) / u128::from(rows.max(1));
     let part = |whole: u64| {
-        let part = u128::from(whole) * u128::from(count) / u128::from(rows.max(1));
+        let part = up_to(whole, range.end) - up_to(whole, range.start);
         u64::try_from(part).unwrap_or(u64::MAX)
     };
     Cost {

@@ -88,8 +88,7 @@ fn a_sequence_moves_and_begins_with_the_still_picture() {
 fn the_bench_traces_what_the_farm_traces() {
     let scenes = Scenes::new();
     let alone = json(&scenes, "bench small.toml --frames 2 --threads 2 --json");
-    // In one piece: where a cut divides tiles, rays that lie in a surface may be counted on either side.
-    let farm = json(&scenes, "render small.toml -o a.png --json --segment static:120");
+    let farm = json(&scenes, "render small.toml -o a.png --json");
     for field in ["blake3", "rays_per_frame", "triangles"] {
         assert_eq!(alone[field], farm[field], "{field}");
     }

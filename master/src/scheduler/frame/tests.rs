@@ -107,3 +107,13 @@ fn a_single_row_is_not_halved() {
     assert_eq!(frame.queue.len(), 1);
     assert!(frame.queue[0].halved && frame.queue[0].count == 1);
 }
+
+#[test]
+fn costs_of_the_pieces_of_a_lease_sum_to_its_cost() {
+    let cost = Cost { trace_ns: 1_000_003, primary: 19_200, shadow: 22_095, secondary: 7, ..Cost::default() };
+    for cuts in [vec![0, 120], vec![0, 7, 120], vec![0, 1, 2, 64, 65, 119, 120]] {
+        let mut sum = Cost::default();
+        cuts.windows(2).for_each(|piece| sum += share(cost, piece[0]..piece[1], 120));
+        assert_eq!(sum, cost, "{cuts:?}");
+    }
+}
