@@ -28,7 +28,7 @@ const TABLES: [&str; 11] = [
 ];
 
 fn document(name: &str) -> String {
-    std::fs::read_to_string(project_root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    std::fs::read_to_string(project_root().join(name)).expect(name)
 }
 
 fn help(mut program: Command, command: Option<&str>) -> String {
