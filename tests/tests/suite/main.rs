@@ -7,6 +7,7 @@ mod bad_input;
 mod bench_farm;
 mod command_line;
 mod control;
+mod documents;
 mod faults;
 #[cfg(unix)]
 mod launch;

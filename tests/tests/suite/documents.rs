@@ -1,0 +1,147 @@
+//! Documents compared with the programs: commands, options and scene keys.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use rayfarm_tests::{Running, Scenes, master, project_root, worker};
+
+/// Documents that describe the options of both programs.
+const OPTION_DOCUMENTS: [&str; 2] = ["docs/guide.md", "docs/quality.md"];
+const SCENE_DOCUMENT: &str = "docs/scene-format.md";
+
+/// Options in these documents that `--help` does not list: hidden aliases, and options of cargo.
+const NOT_IN_HELP: [&str; 2] = ["trace", "release"];
+
+/// A scene that ends where an unknown key is refused, for each table.
+const TABLES: [&str; 11] = [
+    "",
+    "[render]\n",
+    "[camera]\n",
+    "[background]\n",
+    "[[light]]\n",
+    "[material.a]\n",
+    "[material.a.diffuse]\n",
+    "[[model]]\n",
+    "[[sphere]]\n",
+    "[[plane]]\n",
+    "[[triangle]]\n",
+];
+
+fn document(name: &str) -> String {
+    std::fs::read_to_string(project_root().join(name)).expect(name)
+}
+
+fn help(mut program: Command, command: Option<&str>) -> String {
+    program.args(command).arg("--help");
+    Running::start(&mut program).finish().expect_success().stdout
+}
+
+/// The commands that the master's help lists.
+fn commands() -> Vec<String> {
+    let help = help(master(), None);
+    let listed =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    names
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The help of each command of the master, and of the worker, by name.
+fn all_help() -> Vec<(String, String)> {
+    let of_command = |name: String| (name.clone(), help(master(), Some(&name)));
+    let mut all: Vec<_> = commands().into_iter().map(of_command).collect();
+    all.push(("worker".to_owned(), help(worker(), None)));
+    all
+}
+
+/// The name at the beginning of a text, as options have it.
+fn name(text: &str) -> &str {
+    let end = text.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(text.len());
+    text[..end].trim_end_matches('-')
+}
+
+/// Options that a text names anywhere, without their dashes.
+fn mentioned(text: &str) -> BTreeSet<String> {
+    let names = text.match_indices("--").map(|(at, dashes)| name(&text[at + dashes.len()..]));
+    names.filter(|name| !name.is_empty() && !name.starts_with('-')).map(str::to_owned).collect()
+}
+
+/// Options that a help text defines, one a line.
+fn defined(help: &str) -> BTreeSet<String> {
+    let definitions = help.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
+    let options = definitions.filter_map(|line| Some(name(&line[line.find("--")? + 2..]).to_owned()));
+    options.filter(|name| !name.is_empty()).collect()
+}
+
+/// What is in code spans and code blocks of a document.
+fn code(document: &str) -> String {
+    document.split('`').skip(1).step_by(2).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn options_are_read_from_help_and_documents() {
+    let help =
+        "Options:\n  -o, --output <FILE>  As in --size\n      --adaptive[=<on|off>]\n          - no option\n";
+    let names = |set: BTreeSet<String>| set.into_iter().collect::<Vec<_>>();
+    assert_eq!(names(defined(help)), ["adaptive", "output"]);
+    assert_eq!(names(mentioned("| --- | `--up y` --- and `--no-cache`,--x")), ["no-cache", "up", "x"]);
+}
+
+#[test]
+fn every_command_is_in_the_guide() {
+    let guide = document("docs/guide.md");
+    for command in commands() {
+        let usages =
+            ["{} ", "{}`", "[{}] "].map(|form| format!("`rayfarm-master {}", form.replace("{}", &command)));
+        assert!(usages.iter().any(|usage| guide.contains(usage)), "docs/guide.md has no command {command}");
+    }
+}
+
+#[test]
+fn options_of_documents_and_programs_are_the_same() {
+    let documents = OPTION_DOCUMENTS.map(document).join("\n");
+    let documented = mentioned(&documents);
+    let mut known: BTreeSet<String> = NOT_IN_HELP.map(str::to_owned).into();
+    for (command, help) in all_help() {
+        for option in defined(&help) {
+            assert!(documented.contains(&option), "{OPTION_DOCUMENTS:?} have no --{option} of {command}");
+        }
+        known.extend(mentioned(&help));
+    }
+    let unknown: Vec<&String> = documented.difference(&known).collect();
+    assert!(unknown.is_empty(), "{OPTION_DOCUMENTS:?} name options that no program has: {unknown:?}");
+}
+
+#[test]
+fn every_scene_key_is_documented() {
+    let scenes = Scenes::new();
+    let documented = code(&document(SCENE_DOCUMENT));
+    let words: BTreeSet<&str> = documented.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
+    for table in TABLES {
+        scenes.write("unknown.toml", format!("{table}qqqqqqqqq = 1\n"));
+        let mut explain = master();
+        explain.arg("explain").arg(scenes.path("unknown.toml"));
+        let message = Running::start(&mut explain).finish().expect_failure(2, &["known here: "]).stderr;
+        let (_, known) = message.split_once("known here: ").unwrap();
+        for key in known.split('`').skip(1).step_by(2) {
+            assert!(words.contains(key), "{SCENE_DOCUMENT} has no key {key} of {table}");
+        }
+    }
+}
+
+#[test]
+fn the_example_with_all_scene_keys_loads() {
+    let scenes = Scenes::new();
+    let document = document(SCENE_DOCUMENT);
+    let (_, example) = document.split_once("```toml\n").unwrap();
+    let (example, _) = example.split_once("```").unwrap();
+    scenes.write("example.toml", example);
+    scenes.write("wood.png", b"P6\n1 1\n255\n\xff\xff\xff");
+    scenes.write("table.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+    let mut explain = master();
+    explain.arg("explain").arg(scenes.path("example.toml"));
+    Running::start(&mut explain).finish().expect_success();
+}
