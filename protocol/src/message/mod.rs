@@ -13,7 +13,9 @@ use crate::{AssetId, FrameId, ProtocolError};
 pub use to_master::ToMaster;
 pub use to_worker::ToWorker;
 
+#[cfg(feature = "transport")]
 pub(crate) use body::{decode_control, decode_reason, encode_control, encode_reason};
+#[cfg(feature = "transport")]
 pub(crate) use to_worker::{decode_goodbye, encode_goodbye};
 
 /// A worker says who it is. Texts are at most [`crate::limits::MAX_NAME_BYTES`] each.

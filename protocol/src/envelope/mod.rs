@@ -1,23 +1,25 @@
-//! Eight bytes in front of every message, and how a message is read and written.
+//! The eight bytes in front of every message, and the transfer of a whole message over a byte stream.
 //!
 //! ```text
 //! 0        4      5       6        8
 //! | length | type | flags | stream | body ...
 //! ```
 //!
-//! `length` counts the body, little endian. `flags` and `stream` are zero in this version; they are there so that a
-//! later one can compress or interleave without another header.
+//! `length` is the number of bytes of the body, little endian. `flags` and `stream` are zero in this version. A later
+//! version can use them to compress or interleave without another header.
 
 use std::fmt;
 
-use bytes::{Buf, BufMut, Bytes, BytesMut};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::time::timeout;
+use bytes::{BufMut, Bytes};
 
 use crate::ProtocolError;
-use crate::limits::{
-    MAX_CHUNK_BYTES, MAX_CONTROL_BYTES, MAX_PIXELS_BYTES, MAX_VIEW_BYTES, envelope_deadline,
-};
+use crate::limits::{MAX_CHUNK_BYTES, MAX_CONTROL_BYTES, MAX_PIXELS_BYTES, MAX_VIEW_BYTES};
+
+#[cfg(feature = "transport")]
+mod io;
+
+#[cfg(feature = "transport")]
+pub use io::{read_body, read_header};
 
 /// Bytes of a header.
 pub const HEADER_BYTES: usize = 8;
@@ -196,69 +198,8 @@ impl Envelope {
         self.lead_bytes + self.body.len()
     }
 
-    /// Writes it whole, in one system call where the transport takes several slices, copying no body. Does not flush.
-    ///
-    /// # Errors
-    /// The transport's, and a peer that does not take it in time.
-    pub async fn write(&self, io: &mut (impl AsyncWrite + Unpin)) -> Result<(), ProtocolError> {
-        let lead = self.lead.get(..self.lead_bytes).unwrap_or_default();
-        let mut all = Buf::chain(lead, self.body.clone());
-        within_deadline("taking a message", self.wire_bytes(), async {
-            io.write_all_buf(&mut all).await.map_err(|source| ProtocolError::Io { doing: "sending", source })
-        })
-        .await
-    }
-}
-
-/// Waits, for ever, for the next header. `None` when the peer has closed the connection between two envelopes.
-///
-/// # Errors
-/// The transport's; a header that was begun and not finished; those of [`Header::parse`].
-pub async fn read_header(io: &mut (impl AsyncRead + Unpin)) -> Result<Option<Header>, ProtocolError> {
-    let mut bytes = [0; HEADER_BYTES];
-    let begun = io.read(&mut bytes).await.map_err(receiving)?;
-    if begun == 0 {
-        return Ok(None);
-    }
-    let rest = bytes.get_mut(begun..).unwrap_or_default();
-    within_deadline("sending a header", 0, async {
-        io.read_exact(rest).await.map_err(receiving).map(|_| ())
-    })
-    .await?;
-    Header::parse(bytes).map(Some)
-}
-
-/// Reads the body that a header announces, into one allocation of that size.
-///
-/// # Errors
-/// The transport's; a body that was not finished in time.
-pub async fn read_body(io: &mut (impl AsyncRead + Unpin), header: Header) -> Result<Bytes, ProtocolError> {
-    let mut body = BytesMut::with_capacity(header.body_bytes);
-    within_deadline("sending a message", header.body_bytes, async {
-        while body.len() < header.body_bytes {
-            let missing = header.body_bytes - body.len();
-            if io.read_buf(&mut (&mut body).limit(missing)).await.map_err(receiving)? == 0 {
-                return Err(ProtocolError::Closed { at: "in the middle of a message" });
-            }
-        }
-        Ok(())
-    })
-    .await?;
-    Ok(body.freeze())
-}
-
-async fn within_deadline(
-    what: &'static str,
-    bytes: usize,
-    work: impl Future<Output = Result<(), ProtocolError>>,
-) -> Result<(), ProtocolError> {
-    let limit = envelope_deadline(bytes);
-    timeout(limit, work).await.unwrap_or(Err(ProtocolError::Deadline { what, limit }))
-}
-
-fn receiving(source: std::io::Error) -> ProtocolError {
-    match source.kind() {
-        std::io::ErrorKind::UnexpectedEof => ProtocolError::Closed { at: "in the middle of a header" },
-        _ => ProtocolError::Io { doing: "receiving", source },
+    /// Header and head, and the body that follows them on the wire.
+    pub fn parts(&self) -> (&[u8], &Bytes) {
+        (self.lead.get(..self.lead_bytes).unwrap_or_default(), &self.body)
     }
 }
