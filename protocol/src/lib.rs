@@ -37,7 +37,7 @@ pub mod tcp;
 pub use error::{ProtocolError, Role};
 pub use ids::{AssetId, FrameId, Lease};
 pub use message::{FrameAnnounce, Hello, Reconnect, ToMaster, ToWorker, Welcome};
-pub use pixels::{Cost, Encoding, PixelsHeader};
+pub use pixels::{Cost, Encoding, PixelFormat, PixelsHeader};
 
 /// Version of everything after the preamble. It grows with every change that an older peer would misread.
 pub const PROTOCOL_VERSION: u16 = 4;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
-use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, pixels};
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, PixelFormat};
 
 use crate::wanted::{Claim, Wanted};
 
@@ -143,7 +143,7 @@ impl<F> Frames<F> {
         let Some(rows) = lease.rows().filter(|rows| rows.end <= height) else {
             return Verdict::Refuse(format!("{lease} lies outside a frame of {height} rows"));
         };
-        if pixels::raw_bytes(width, lease.row_count).is_none() {
+        if PixelFormat::SEGMENT.segment_bytes(width, lease.row_count).is_none() {
             return Verdict::Refuse(format!("{lease} has more pixels than fit into one message"));
         }
         match &held.state {

@@ -139,13 +139,13 @@ fn whole(bands: BTreeMap<u32, Pixels>) -> (Encoding, Bytes) {
     let narrow = bands.values().any(|band| band.narrow);
     let blocks: Option<Vec<&[u8]>> = bands.values().map(|band| band.block.as_deref()).collect();
     match blocks.map(|blocks| blocks.concat()).filter(|packed| packed.len() < raw_bytes) {
-        Some(packed) if narrow => (Encoding::NarrowLz4, packed.into()),
+        Some(packed) if narrow => (Encoding::Rgb565Lz4, packed.into()),
         Some(packed) => (Encoding::Lz4, packed.into()),
         None => {
             let mut whole = BytesMut::new();
             // Neighbours in one buffer, unless they are narrow: joining them moves no byte.
             bands.into_values().for_each(|band| whole.unsplit(band.raw));
-            (if narrow { Encoding::Narrow } else { Encoding::Raw }, whole.freeze())
+            (if narrow { Encoding::Rgb565 } else { Encoding::Raw }, whole.freeze())
         }
     }
 }
@@ -303,7 +303,7 @@ mod tests {
             match chosen {
                 Encoding::Lz4 => unpack(&bytes, &mut rows).unwrap(),
                 Encoding::Raw => rows.copy_from_slice(&bytes),
-                Encoding::Narrow | Encoding::NarrowLz4 => panic!("these bands are not narrow"),
+                Encoding::Rgb565 | Encoding::Rgb565Lz4 => panic!("these bands are not narrow"),
             }
             assert_eq!(rows, expected);
         }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use rayfarm_protocol::pixels::{self, Packer};
-use rayfarm_protocol::{Encoding, FrameId, PixelsHeader, ToMaster};
+use rayfarm_protocol::{Encoding, FrameId, PixelFormat, PixelsHeader, ToMaster};
 use tokio::sync::mpsc;
 
 use crate::buffers::Buffers;
@@ -109,7 +109,7 @@ impl<R: Renderer> Shared<R> {
     fn next_band(&self) -> Option<PoolBand<R>> {
         let shape = |ready: &ReadyFrame<R::Frame>| BandShape {
             rows: self.renderer.band_rows(&ready.frame).max(1),
-            row_bytes: ready.width as usize * 3,
+            row_bytes: PixelFormat::SEGMENT.row_bytes(ready.width),
         };
         let mut state = self.state();
         loop {
@@ -146,7 +146,7 @@ impl<R: Renderer> Shared<R> {
         let begun = Instant::now();
         let narrow = job.frame.narrow;
         if narrow {
-            let Some(bytes) = pixels::narrow(&mut raw) else {
+            let Some(bytes) = pixels::to_rgb565(&mut raw) else {
                 return self.fail(&job, "a pixel has none of the reduced colours".to_owned());
             };
             raw.truncate(bytes);

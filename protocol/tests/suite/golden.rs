@@ -96,7 +96,7 @@ async fn to_master() {
     golden(pixels(2, 2), &rows).await;
     let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("pixels are pixels") };
     let codes: [&[u8]; 3] = [&[1, 0, 0, 0, 0, 0, 0, 0], &[2, 0, 0, 0, 0, 0, 0, 0], &[3, 0, 0, 0, 0, 0, 0, 0]];
-    for (encoding, code) in [Encoding::Lz4, Encoding::Narrow, Encoding::NarrowLz4].into_iter().zip(codes) {
+    for (encoding, code) in [Encoding::Lz4, Encoding::Rgb565, Encoding::Rgb565Lz4].into_iter().zip(codes) {
         let mut rows = rows;
         rows[3] = code;
         let (header, bytes) = (PixelsHeader { encoding, ..header }, bytes.clone());

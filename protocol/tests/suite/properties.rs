@@ -75,8 +75,8 @@ fn headers() -> impl Strategy<Value = PixelsHeader> {
     let encodings = prop_oneof![
         Just(Encoding::Raw),
         Just(Encoding::Lz4),
-        Just(Encoding::Narrow),
-        Just(Encoding::NarrowLz4)
+        Just(Encoding::Rgb565),
+        Just(Encoding::Rgb565Lz4)
     ];
     (leases(), encodings, any::<[u64; 7]>()).prop_map(|(lease, encoding, numbers)| {
         let [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary] = numbers;

@@ -176,7 +176,7 @@ impl Link {
                     let expected = stage.expected(spin, header.lease.rows().unwrap());
                     match header.encoding {
                         Encoding::Raw => assert_eq!(bytes, expected),
-                        Encoding::Narrow | Encoding::NarrowLz4 => panic!("nobody asked for fewer colours"),
+                        Encoding::Rgb565 | Encoding::Rgb565Lz4 => panic!("nobody asked for fewer colours"),
                         Encoding::Lz4 => {
                             let mut rows = vec![0; expected.len()];
                             unpack(&bytes, &mut rows).unwrap();
