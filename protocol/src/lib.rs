@@ -11,7 +11,7 @@
 //!    anything is allocated.
 //! 3. [`message`]: [`ToWorker`] and [`ToMaster`]. Small messages are bincode ([`codec`]). Frames, asset chunks and pixels
 //!    have heads of a fixed layout, and their bodies are not copied on the way out.
-//! 4. [`passing`]: assets from worker to worker, over connections of their own.
+//! 4. [`peer`]: transfer of assets between workers, over connections of their own.
 //! 5. [`session`]: one task that writes (control before bulk), one task that reads, bounded queues to the user.
 //!
 //! The feature `transport`, on by default, has everything that reads or writes a connection. Without it the crate has
@@ -27,7 +27,7 @@ pub mod handshake;
 mod ids;
 pub mod limits;
 pub mod message;
-pub mod passing;
+pub mod peer;
 pub mod pixels;
 #[cfg(feature = "transport")]
 pub mod session;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
-use rayfarm_protocol::passing::ShareKey;
+use rayfarm_protocol::peer::ShareKey;
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, Reconnect, ToMaster, ToWorker};
 
 use crate::fetch::{FromPeer, Peer};
@@ -96,7 +96,7 @@ impl<'a, R: Renderer> Desk<'a, R> {
             ToWorker::ShareKey { key } => self.effects.push_back(Effect::Key(key)),
             ToWorker::Ping { nonce } => self.effects.push_back(Effect::Say(ToMaster::Pong { nonce })),
             ToWorker::Drain => self.effects.push_back(Effect::Drain),
-            ToWorker::Goodbye { reason, reconnect } => {
+            ToWorker::Disconnect { reason, reconnect } => {
                 self.effects.push_back(Effect::End { reason, reconnect });
             }
         }

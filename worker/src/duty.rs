@@ -120,7 +120,7 @@ where
     };
     if let Some(reason) = farewell {
         let goodbye = async {
-            if sender.send(ToMaster::Goodbye { reason: reason.to_owned() }).await.is_ok() {
+            if sender.send(ToMaster::Disconnect { reason: reason.to_owned() }).await.is_ok() {
                 sender.closed().await;
             }
         };

@@ -233,10 +233,10 @@ async fn leases_that_make_no_sense_are_refused() {
 #[tokio::test]
 async fn a_goodbye_ends_the_worker_unless_it_may_come_back() {
     let master = Master::meet(keep(1, PLENTY).0, &[]);
-    master.say(ToWorker::Goodbye { reason: "closing time".into(), reconnect: Reconnect::Never }).await;
+    master.say(ToWorker::Disconnect { reason: "closing time".into(), reconnect: Reconnect::Never }).await;
     assert_eq!(master.worker.await.unwrap().0, End::Goodbye("closing time".into()));
     let master = Master::meet(keep(1, PLENTY).0, &[]);
-    master.say(ToWorker::Goodbye { reason: "you were silent".into(), reconnect: Reconnect::Now }).await;
+    master.say(ToWorker::Disconnect { reason: "you were silent".into(), reconnect: Reconnect::Now }).await;
     assert_eq!(master.worker.await.unwrap().0, End::Lost("it ends this session: you were silent".into()));
 }
 
@@ -250,7 +250,7 @@ async fn a_worker_that_is_told_to_stop_says_goodbye_though_it_renders() {
     master.say(ToWorker::Ping { nonce: 0 }).await;
     master.hear().await;
     master.ending.stop();
-    assert!(matches!(master.hear().await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(master.hear().await, Some(ToMaster::Disconnect { .. })));
     assert!(master.hear().await.is_none());
     assert_eq!(master.worker.await.unwrap().0, End::Stopped);
     gate.open();
@@ -269,7 +269,7 @@ async fn a_drained_worker_finishes_what_it_holds() {
         let (lease, bytes) = master.pixels().await;
         assert_eq!(bytes, expected(&body, b"v", lease.rows().unwrap()));
     }
-    assert!(matches!(master.hear().await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(master.hear().await, Some(ToMaster::Disconnect { .. })));
     assert_eq!(master.worker.await.unwrap().0, End::Drained);
 }
 
@@ -327,7 +327,7 @@ async fn a_worker_that_is_to_leave_finishes_what_it_holds_and_does_not_come_back
     for rows in [0..8, 8..16] {
         assert_eq!(master.pixels().await, (lease(0, rows.clone()), expected(&body, b"wait", rows).into()));
     }
-    master.say(ToWorker::Goodbye { reason: "all done".into(), reconnect: Reconnect::Now }).await;
+    master.say(ToWorker::Disconnect { reason: "all done".into(), reconnect: Reconnect::Now }).await;
     assert_eq!(master.worker.await.unwrap().0, End::Goodbye("all done".into()));
 }
 

@@ -5,8 +5,8 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 use rayfarm_protocol::AssetId;
-use rayfarm_protocol::limits::{MAX_PULSES, PEER_CONNECT};
-use rayfarm_protocol::passing::{Fetch, Passed, Token, ask, next};
+use rayfarm_protocol::limits::{MAX_PEER_KEEPALIVES, PEER_CONNECT_TIMEOUT};
+use rayfarm_protocol::peer::{Fetch, Passed, Token, ask, next};
 use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio::net::TcpStream;
 use tokio::sync::mpsc;
@@ -29,11 +29,11 @@ pub(crate) enum FromPeer {
 
 /// Fetches an asset of that size and hands it on, chunk by chunk, as fast as they are taken.
 pub(crate) async fn fetch(id: AssetId, size: u64, peer: Peer, out: mpsc::Sender<FromPeer>) {
-    let connecting = tokio::time::timeout(PEER_CONNECT, TcpStream::connect(peer.address));
+    let connecting = tokio::time::timeout(PEER_CONNECT_TIMEOUT, TcpStream::connect(peer.address));
     let failed = match connecting.await {
         Ok(Ok(stream)) => fetch_over(stream, id, size, peer, &out).await.err(),
         Ok(Err(error)) => Some(error.to_string()),
-        Err(_) => Some(format!("no answer for {} s", PEER_CONNECT.as_secs())),
+        Err(_) => Some(format!("no answer for {} s", PEER_CONNECT_TIMEOUT.as_secs())),
     };
     if let Some(why) = failed {
         let why = format!("{} does not pass it on: {why}", peer.address);
@@ -60,7 +60,7 @@ async fn fetch_over(
                 return Err(format!("it announces {announced} bytes, not {size}"));
             }
             Passed::Unknown => return Err("it does not have it any more".to_owned()),
-            Passed::Waits if pulses < MAX_PULSES => pulses += 1,
+            Passed::Waits if pulses < MAX_PEER_KEEPALIVES => pulses += 1,
             Passed::Waits => return Err("it has waited for too long itself".to_owned()),
             Passed::Chunk { offset: at, bytes } => {
                 let end = at.saturating_add(bytes.len() as u64);

@@ -4,8 +4,8 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, MAX_FOLLOWERS, MAX_PULSES, PEER_PULSE};
-use rayfarm_protocol::passing::{Fetch, Passed, hear, pass};
+use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, MAX_PEER_CLIENTS, MAX_PEER_KEEPALIVES, PEER_KEEPALIVE_INTERVAL};
+use rayfarm_protocol::peer::{Fetch, Passed, hear, pass};
 use rayfarm_protocol::{AssetId, ProtocolError};
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
@@ -20,7 +20,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Serves whoever connects, until it is dropped.
 pub(crate) async fn share(listener: TcpListener, shelf: Arc<Shelf>) {
-    let places = Arc::new(Semaphore::new(MAX_FOLLOWERS));
+    let places = Arc::new(Semaphore::new(MAX_PEER_CLIENTS));
     let mut followers = JoinSet::new();
     loop {
         let place = Arc::clone(&places).acquire_owned().await;
@@ -71,14 +71,14 @@ async fn wait_for(
     fetch: &Fetch,
     shelf: &Shelf,
 ) -> Result<Option<Arc<Growing>>, ProtocolError> {
-    for _ in 0..MAX_PULSES {
+    for _ in 0..MAX_PEER_KEEPALIVES {
         let filled = shelf.filled();
         match shelf.open(fetch) {
             Opened::Here(bytes) => return Ok(Some(bytes)),
             Opened::Closed => return Ok(None),
             Opened::Expected => {}
         }
-        if tokio::time::timeout(PEER_PULSE, filled).await.is_err() {
+        if tokio::time::timeout(PEER_KEEPALIVE_INTERVAL, filled).await.is_err() {
             pass(stream, fetch.id, Passed::Waits).await?;
         }
     }
@@ -109,7 +109,7 @@ async fn pass_on(
             offset = next;
             continue;
         }
-        match tokio::time::timeout(PEER_PULSE, progress.changed()).await {
+        match tokio::time::timeout(PEER_KEEPALIVE_INTERVAL, progress.changed()).await {
             Ok(Ok(())) => {}
             Ok(Err(_)) => return Ok(()),
             Err(_) => pass(stream, id, Passed::Waits).await?,

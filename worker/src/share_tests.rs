@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
-use rayfarm_protocol::passing::{Fetch, Passed, ShareKey, ask, next, token};
+use rayfarm_protocol::peer::{Fetch, Passed, ShareKey, ask, next, token};
 use rayfarm_protocol::{AssetId, ToMaster, ToWorker};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinHandle;

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use rayfarm_protocol::AssetId;
-use rayfarm_protocol::limits::{MAX_SHELF_BYTES, SHELF_TIME};
-use rayfarm_protocol::passing::{Fetch, ShareKey, token};
+use rayfarm_protocol::limits::{MAX_PEER_CACHE_BYTES, PEER_CACHE_TIME};
+use rayfarm_protocol::peer::{Fetch, ShareKey, token};
 use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 
@@ -102,9 +102,9 @@ impl Shelf {
                 shelved.wanted_at = now;
                 return Arc::strong_count(&shelved.bytes) > 1;
             }
-            now.saturating_duration_since(shelved.wanted_at) < SHELF_TIME
+            now.saturating_duration_since(shelved.wanted_at) < PEER_CACHE_TIME
         });
-        while inner.bytes() > MAX_SHELF_BYTES {
+        while inner.bytes() > MAX_PEER_CACHE_BYTES {
             let whole = inner.assets.iter().filter(|(_, shelved)| shelved.bytes.is_whole());
             let Some(oldest) = whole.min_by_key(|(_, s)| s.wanted_at).map(|(id, _)| *id) else { return };
             inner.assets.remove(&oldest);
@@ -172,9 +172,9 @@ mod tests {
         let coming = Growing::new(5).unwrap();
         shelf.put(AssetId([2; 32]), Arc::clone(&coming));
         let now = Instant::now();
-        shelf.tidy(now + SHELF_TIME / 2);
+        shelf.tidy(now + PEER_CACHE_TIME / 2);
         assert!(opens(&shelf, &KEY, a));
-        shelf.tidy(now + SHELF_TIME * 2);
+        shelf.tidy(now + PEER_CACHE_TIME * 2);
         assert!(!opens(&shelf, &KEY, a) && opens(&shelf, &KEY, AssetId([2; 32])));
         coming.abandon();
         drop(coming);

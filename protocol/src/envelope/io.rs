@@ -17,7 +17,7 @@ impl Envelope {
     pub async fn write(&self, io: &mut (impl AsyncWrite + Unpin)) -> Result<(), ProtocolError> {
         let (lead, body) = self.parts();
         let mut all = Buf::chain(lead, body.clone());
-        within_deadline("taking a message", self.wire_bytes(), async {
+        within_deadline("receiving a message", self.wire_bytes(), async {
             io.write_all_buf(&mut all).await.map_err(|source| ProtocolError::Io { doing: "sending", source })
         })
         .await

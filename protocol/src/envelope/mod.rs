@@ -21,62 +21,62 @@ mod io;
 #[cfg(feature = "transport")]
 pub use io::{read_body, read_header};
 
-/// Bytes of a header.
+/// Number of bytes of a header.
 pub const HEADER_BYTES: usize = 8;
 
-/// Bytes of the longest hand-laid head between a header and the bulk bytes of a message.
+/// Number of bytes of the longest fixed-layout head between a header and the bulk bytes of a message.
 pub(crate) const MAX_HEAD_BYTES: usize = 88;
 
-/// The types of envelopes. Their numbers are the wire's.
+/// Type of an envelope. The numbers are those of the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Kind {
-    /// A worker says who it is.
+    /// A worker introduces itself.
     Hello = 0x01,
-    /// A master takes a worker.
+    /// A master accepts a worker.
     Welcome = 0x02,
-    /// A handshake ends here; the body is the reason as plain UTF-8, whatever the version.
+    /// A handshake is refused. The body is the reason as plain UTF-8, in every version.
     Refused = 0x03,
-    /// A frame that leases may follow for.
+    /// Announcement of a frame whose leases may follow.
     Frame = 0x10,
     /// A lease.
     Segment = 0x11,
-    /// Frames before this one are stale.
+    /// Cancellation of all frames before a given one.
     Cancel = 0x12,
-    /// An asset follows in chunks.
+    /// Announcement of an asset that follows in chunks.
     AssetBegin = 0x13,
     /// A part of an asset.
     AssetChunk = 0x14,
-    /// The master does not have that asset.
+    /// The sender does not have a requested asset.
     AssetUnknown = 0x15,
-    /// Another worker passes an asset on.
+    /// Address of a worker that serves a requested asset.
     AssetFrom = 0x16,
-    /// What a worker shares with its master alone.
+    /// The key of the tokens that open assets at this worker.
     ShareKey = 0x17,
-    /// A worker lacks an asset.
+    /// Request for an asset.
     NeedAsset = 0x20,
     /// The rows of a lease.
     Pixels = 0x21,
     /// A worker cannot render a frame.
     Failed = 0x22,
-    /// A worker passes assets on.
+    /// A worker serves assets to other workers.
     Sharing = 0x23,
-    /// A worker has all of an asset.
+    /// A worker has received all of an asset.
     HaveAsset = 0x24,
-    /// Asks for a pong.
+    /// Request for a pong; between workers a keepalive.
     Ping = 0x30,
-    /// Answers a ping.
+    /// Reply to a ping.
     Pong = 0x31,
-    /// No more leases for this worker.
+    /// Announcement that no more leases follow, or a request for none.
     Drain = 0x32,
     /// The last message of a session.
-    Goodbye = 0x33,
-    /// A worker asks another one for an asset.
-    Fetch = 0x40,
+    Disconnect = 0x33,
+    /// Request of a worker for an asset of another worker.
+    PeerRequest = 0x40,
 }
 
 impl Kind {
-    /// Every type there is.
+    /// All types.
     pub const ALL: [Kind; 21] = [
         Self::Hello,
         Self::Welcome,
@@ -97,11 +97,11 @@ impl Kind {
         Self::Ping,
         Self::Pong,
         Self::Drain,
-        Self::Goodbye,
-        Self::Fetch,
+        Self::Disconnect,
+        Self::PeerRequest,
     ];
 
-    /// The longest body that this type may have.
+    /// Largest body of this type, in bytes.
     pub fn limit_bytes(self) -> usize {
         match self {
             Self::Frame => MAX_HEAD_BYTES + MAX_VIEW_BYTES,
@@ -111,7 +111,7 @@ impl Kind {
             Self::Segment | Self::Cancel | Self::AssetBegin | Self::AssetUnknown => MAX_CONTROL_BYTES,
             Self::AssetFrom | Self::ShareKey | Self::Sharing | Self::HaveAsset => MAX_CONTROL_BYTES,
             Self::NeedAsset | Self::Failed | Self::Ping | Self::Pong => MAX_CONTROL_BYTES,
-            Self::Drain | Self::Goodbye | Self::Fetch => MAX_CONTROL_BYTES,
+            Self::Drain | Self::Disconnect | Self::PeerRequest => MAX_CONTROL_BYTES,
         }
     }
 
@@ -126,20 +126,20 @@ impl fmt::Display for Kind {
     }
 }
 
-/// A checked header: its type is known and its length is within the type's bound.
+/// A validated header: its type is known, and its length is within the type's bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// The type.
+    /// Type of the envelope.
     pub kind: Kind,
-    /// Bytes of the body.
+    /// Number of bytes of the body.
     pub body_bytes: usize,
 }
 
 impl Header {
-    /// Reads and checks the eight bytes.
+    /// Reads and validates the eight bytes.
     ///
     /// # Errors
-    /// Unknown type, flags or stream that this version does not use, more bytes than the type may have.
+    /// An unknown type; nonzero flags or stream; more bytes than the type may have.
     pub fn parse(bytes: [u8; HEADER_BYTES]) -> Result<Self, ProtocolError> {
         let [l0, l1, l2, l3, kind, flags, s0, s1] = bytes;
         let kind = Kind::from_byte(kind).ok_or(ProtocolError::UnknownKind { kind })?;
@@ -159,7 +159,7 @@ fn within_limit(kind: Kind, announced: u64) -> Result<usize, ProtocolError> {
     }
 }
 
-/// A message on its way out: header and hand-laid head in one small array, the body shared with whoever else sends it.
+/// An outgoing message: header and fixed-layout head in one small array, and a body that other envelopes may share.
 #[derive(Clone, Debug)]
 pub struct Envelope {
     kind: Kind,
@@ -169,17 +169,17 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Puts `head` and `body` behind a header.
+    /// Joins a header, `head` and `body`.
     ///
     /// # Errors
-    /// When together they are longer than the type may be.
+    /// More bytes than the type may have.
     pub(crate) fn new(kind: Kind, head: &[u8], body: Bytes) -> Result<Self, ProtocolError> {
         let announced = head.len() as u64 + body.len() as u64;
         let length = within_limit(kind, announced)? as u32;
         let mut lead = [0; HEADER_BYTES + MAX_HEAD_BYTES];
         let mut rest = lead.as_mut_slice();
         if head.len() > MAX_HEAD_BYTES {
-            return Err(ProtocolError::malformed(kind, "its head is longer than any head"));
+            return Err(ProtocolError::malformed(kind, "its head is longer than the longest head"));
         }
         rest.put_u32_le(length);
         rest.put_u8(kind as u8);
@@ -188,17 +188,17 @@ impl Envelope {
         Ok(Self { kind, lead, lead_bytes: HEADER_BYTES + head.len(), body })
     }
 
-    /// The type.
+    /// Type of the envelope.
     pub fn kind(&self) -> Kind {
         self.kind
     }
 
-    /// Bytes on the wire, the header included.
+    /// Number of bytes on the wire, the header included.
     pub fn wire_bytes(&self) -> usize {
         self.lead_bytes + self.body.len()
     }
 
-    /// Header and head, and the body that follows them on the wire.
+    /// Header and head as one slice, and the body that follows them on the wire.
     pub fn parts(&self) -> (&[u8], &Bytes) {
         (self.lead.get(..self.lead_bytes).unwrap_or_default(), &self.body)
     }

@@ -66,7 +66,7 @@ async fn a_goodbye_is_status_0() {
     assert_eq!(link.hello.name, "cellar");
     link.check_frame(&Stage::new(), 0, 0.0).await;
     link.out
-        .send(ToWorker::Goodbye { reason: "closing time".into(), reconnect: Reconnect::Never })
+        .send(ToWorker::Disconnect { reason: "closing time".into(), reconnect: Reconnect::Never })
         .await
         .unwrap();
     let output = worker.wait_with_output().await.unwrap();
@@ -85,7 +85,7 @@ async fn a_master_that_ends_is_followed_by_the_next_one() {
         let mut link = Link::accept(&listener).await;
         link.check_frame(&stage, 0, number as f64).await;
         assert_eq!(link.asked > 0, number == 0, "what it has it keeps");
-        link.out.send(ToWorker::Goodbye { reason: "lights out".into(), reconnect: goodbye }).await.unwrap();
+        link.out.send(ToWorker::Disconnect { reason: "lights out".into(), reconnect: goodbye }).await.unwrap();
     }
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
@@ -98,7 +98,7 @@ async fn with_once_it_ends_with_its_master() {
     let worker = start(&address, &["--once"]);
     let mut link = Link::accept(&listener).await;
     link.check_frame(&Stage::new(), 0, 0.0).await;
-    let goodbye = ToWorker::Goodbye { reason: "lights out".into(), reconnect: Reconnect::NextMaster };
+    let goodbye = ToWorker::Disconnect { reason: "lights out".into(), reconnect: Reconnect::NextMaster };
     link.out.send(goodbye).await.unwrap();
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
@@ -114,7 +114,7 @@ async fn a_master_that_takes_no_worker_now_is_asked_again() {
     handshake::as_master(&mut stream, full).await.unwrap_err();
     let mut link = Link::accept(&listener).await;
     link.check_frame(&Stage::new(), 0, 0.0).await;
-    link.out.send(ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }).await.unwrap();
+    link.out.send(ToWorker::Disconnect { reason: "kicked".into(), reconnect: Reconnect::Never }).await.unwrap();
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
     assert!(stderr(&output).contains("full house"), "{}", stderr(&output));
@@ -157,7 +157,7 @@ async fn it_ends_with_its_standard_input() {
     // Before its session it would end without a word.
     link.check_frame(&Stage::new(), 0, 0.0).await;
     drop(worker.stdin.take());
-    assert!(matches!(link.hear(&Stage::new()).await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(link.hear(&Stage::new()).await, Some(ToMaster::Disconnect { .. })));
     assert_eq!(worker.wait().await.unwrap().code(), Some(0));
 }
 
@@ -182,7 +182,7 @@ async fn a_signal_drains_it_and_it_ends_with_status_0() {
         // What the master had granted meanwhile is rendered.
         link.check_frame(&stage, 1, 20.0).await;
         link.out
-            .send(ToWorker::Goodbye { reason: "all done".into(), reconnect: Reconnect::Now })
+            .send(ToWorker::Disconnect { reason: "all done".into(), reconnect: Reconnect::Now })
             .await
             .unwrap();
         assert_eq!(worker.wait().await.unwrap().code(), Some(0));
@@ -200,6 +200,6 @@ async fn a_second_signal_ends_it_at_once_with_a_goodbye() {
     signal(&worker, "-TERM").await;
     assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
     signal(&worker, "-INT").await;
-    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Disconnect { .. })));
     assert_eq!(worker.wait().await.unwrap().code(), Some(0));
 }

@@ -32,7 +32,7 @@ async fn a_worker_renders_the_same_pixels_as_this_process() {
         link.check_frame(&stage, frame, spin).await;
     }
     assert_eq!(link.asked, 3);
-    link.out.send(ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never }).await.unwrap();
+    link.out.send(ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never }).await.unwrap();
     worker.await.unwrap().unwrap();
 }
 
@@ -47,7 +47,7 @@ async fn pixels_come_packed_where_that_is_asked_for_and_raw_within_a_machine() {
         link.check_frame(&stage, 0, 3.0).await;
         assert_eq!(link.packed, packed, "{compress:?}");
         link.out
-            .send(ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never })
+            .send(ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never })
             .await
             .unwrap();
         worker.await.unwrap().unwrap();
@@ -67,7 +67,7 @@ async fn a_worker_comes_back_and_has_kept_its_scene() {
     link.check_frame(&stage, 0, 5.0).await;
     assert_eq!(link.asked, 0);
     ending.stop();
-    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Disconnect { .. })));
     worker.await.unwrap().unwrap();
 }
 
