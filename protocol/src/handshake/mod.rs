@@ -128,7 +128,10 @@ where
 fn checked_hello(hello: Hello) -> Result<Hello, String> {
     let texts = [("name", &hello.name), ("SIMD level", &hello.simd), ("software version", &hello.software)];
     if let Some((what, text)) = texts.into_iter().find(|(_, text)| text.len() > MAX_NAME_BYTES) {
-        return Err(format!("the worker's {what} has {} bytes, at most {MAX_NAME_BYTES} are allowed", text.len()));
+        return Err(format!(
+            "the worker's {what} has {} bytes, at most {MAX_NAME_BYTES} are allowed",
+            text.len()
+        ));
     }
     if hello.threads == 0 {
         return Err("a worker needs at least one render thread".to_owned());

@@ -66,7 +66,9 @@ impl Message for ToMaster {
 
     fn carries(kind: Kind) -> bool {
         match kind {
-            Kind::NeedAsset | Kind::Pixels | Kind::Pong | Kind::Failed | Kind::Drain | Kind::Disconnect => true,
+            Kind::NeedAsset | Kind::Pixels | Kind::Pong | Kind::Failed | Kind::Drain | Kind::Disconnect => {
+                true
+            }
             Kind::Sharing | Kind::HaveAsset => true,
             Kind::Hello | Kind::Welcome | Kind::Refused => false,
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping => false,
@@ -126,7 +128,11 @@ fn checked_offset(offset: u64) -> Result<u64, ProtocolError> {
 }
 
 fn checked_port(port: u16) -> Result<u16, ProtocolError> {
-    if port > 0 { Ok(port) } else { Err(ProtocolError::malformed(Kind::Sharing, "port 0 is no port to listen at")) }
+    if port > 0 {
+        Ok(port)
+    } else {
+        Err(ProtocolError::malformed(Kind::Sharing, "port 0 is no port to listen at"))
+    }
 }
 
 fn decode_pixels(mut body: Bytes) -> Result<ToMaster, ProtocolError> {
@@ -139,7 +145,10 @@ fn decode_pixels(mut body: Bytes) -> Result<ToMaster, ProtocolError> {
 fn check_rows(header: &PixelsHeader) -> Result<(), ProtocolError> {
     match header.lease.rows() {
         Some(_) => Ok(()),
-        None => Err(ProtocolError::malformed(Kind::Pixels, format!("{} has no valid range of rows", header.lease))),
+        None => Err(ProtocolError::malformed(
+            Kind::Pixels,
+            format!("{} has no valid range of rows", header.lease),
+        )),
     }
 }
 

@@ -90,9 +90,8 @@ impl PixelsHeader {
         };
         let (code, zero) = (rest.get_u32_le(), rest.get_u32_le());
         let encoding = Encoding::from_code(code).filter(|_| zero == 0);
-        let encoding = encoding.ok_or_else(|| {
-            ProtocolError::malformed(Kind::Pixels, format!("encoding {code} is not known"))
-        })?;
+        let encoding = encoding
+            .ok_or_else(|| ProtocolError::malformed(Kind::Pixels, format!("encoding {code} is not known")))?;
         Ok(Self { lease, encoding, cost: Cost::get(&mut rest) })
     }
 }

@@ -27,7 +27,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::ProtocolError;
 use crate::envelope::Kind;
-use crate::limits::{BULK_QUEUE, CONTROL_QUEUE, INBOX_QUEUE, CLOSE_GRACE};
+use crate::limits::{BULK_QUEUE, CLOSE_GRACE, CONTROL_QUEUE, INBOX_QUEUE};
 use crate::message::Message;
 
 pub use reader::Receiver;
@@ -57,12 +57,8 @@ where
     // Weak, because the inbox must end with the reader while the writer waits for messages.
     let failures = inbox.downgrade();
     let reader_guard = reader_ended.clone().drop_guard();
-    let reader = reader::Reader {
-        io: read_half,
-        inbox,
-        traffic: traffic.clone(),
-        inbox_closed: inbox_closed.clone(),
-    };
+    let reader =
+        reader::Reader { io: read_half, inbox, traffic: traffic.clone(), inbox_closed: inbox_closed.clone() };
     let reader_abort = abort.clone();
     tokio::spawn(async move {
         let _reader_guard = reader_guard;

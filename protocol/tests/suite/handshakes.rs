@@ -195,7 +195,8 @@ async fn invalid_thread_counts_are_refused_and_long_names_are_cut() {
         peer.write_all(&preamble(PROTOCOL_VERSION, 2)).await.unwrap();
         peer.write_all(&[body.len() as u8, 0, 0, 0, 0x01, 0, 0, 0]).await.unwrap();
         peer.write_all(&body).await.unwrap();
-        let error = as_master(&mut master, |_| panic!("an invalid hello reached the decision")).await.unwrap_err();
+        let error =
+            as_master(&mut master, |_| panic!("an invalid hello reached the decision")).await.unwrap_err();
         assert!(error.to_string().contains(part), "{error}");
     }
 

@@ -119,10 +119,7 @@ async fn other_messages_and_other_assets_are_refused() {
     assert!(matches!(error, ProtocolError::Unexpected { .. }), "{error}");
     let mut sent = Vec::new();
     send_request(&mut sent, &request(0)).await.unwrap();
-    assert!(matches!(
-        receive_reply(&mut sent.as_slice(), ID).await,
-        Err(ProtocolError::Unexpected { .. })
-    ));
+    assert!(matches!(receive_reply(&mut sent.as_slice(), ID).await, Err(ProtocolError::Unexpected { .. })));
     assert!(matches!(receive_request(&mut bytes.as_slice()).await, Err(ProtocolError::Unexpected { .. })));
     // A header of eight bytes that announces 4 GiB.
     for kind in [0x13, 0x14, 0x15, 0x30, 0x40] {
@@ -131,9 +128,6 @@ async fn other_messages_and_other_assets_are_refused() {
             receive_reply(&mut header.as_slice(), ID).await,
             Err(ProtocolError::TooLong { .. })
         ));
-        assert!(matches!(
-            receive_request(&mut header.as_slice()).await,
-            Err(ProtocolError::TooLong { .. })
-        ));
+        assert!(matches!(receive_request(&mut header.as_slice()).await, Err(ProtocolError::TooLong { .. })));
     }
 }

@@ -61,7 +61,10 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     assert_eq!(at(&ToWorker::Ping { nonce: 1 }), 0);
     assert!(at(&ToWorker::Cancel { before: FrameId(9) }) < at(&chunk(1000, 20_000)));
     assert!(at(&chunk(1000, 20_000)) < at(&chunk(2000, 20_000)));
-    assert_eq!(order.last(), Some(&ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never }));
+    assert_eq!(
+        order.last(),
+        Some(&ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never })
+    );
     assert_eq!(order.len(), 7);
 }
 
@@ -77,7 +80,10 @@ async fn a_disconnect_is_flushed_and_closes() {
     );
     assert!(master_in.recv().await.is_none());
     // The other direction stays open for `CLOSE_GRACE`, so the master can reply and close.
-    master_out.send(ToWorker::Disconnect { reason: "bye".into(), reconnect: Reconnect::Never }).await.unwrap();
+    master_out
+        .send(ToWorker::Disconnect { reason: "bye".into(), reconnect: Reconnect::Never })
+        .await
+        .unwrap();
     assert_eq!(
         worker_in.recv().await.unwrap().unwrap(),
         ToWorker::Disconnect { reason: "bye".into(), reconnect: Reconnect::Never }
@@ -228,7 +234,9 @@ async fn a_disconnect_is_received_although_the_writer_has_failed() {
     let (ours, mut theirs) = duplex(1 << 16);
     let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
     theirs
-        .write_all(&wire(&ToWorker::Disconnect { reason: "kicked".into(), reconnect: Reconnect::Never }).await)
+        .write_all(
+            &wire(&ToWorker::Disconnect { reason: "kicked".into(), reconnect: Reconnect::Never }).await,
+        )
         .await
         .unwrap();
     drop(theirs);

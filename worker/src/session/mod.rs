@@ -1,0 +1,18 @@
+//! One session with a master: a state machine without I/O, and the runner that performs its effects.
+
+mod frames;
+mod idle_timeout;
+mod runner;
+mod state;
+mod work;
+
+#[cfg(test)]
+mod cancel_tests;
+#[cfg(test)]
+mod disk_tests;
+#[cfg(test)]
+mod peer_tests;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use runner::{PersistentState, SessionConfig, SessionEnd, run_session};
