@@ -33,6 +33,7 @@ pub mod pixels;
 pub mod session;
 #[cfg(feature = "transport")]
 pub mod tcp;
+mod token;
 
 pub use error::{ProtocolError, Role};
 pub use ids::{AssetId, FrameId, Lease};

@@ -24,7 +24,7 @@ mod scenes;
 mod session;
 mod shutdown;
 #[cfg(test)]
-mod testing;
+mod tests;
 mod tracer;
 
 pub use app::{DiskCacheOptions, Share, WorkerOptions, cli, run, run_with};

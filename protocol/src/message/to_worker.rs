@@ -8,7 +8,7 @@ use super::body::{decode_control, decode_reason, encode_control, encode_reason, 
 use super::{FrameAnnounce, Message, Reconnect};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
-use crate::peer::{ShareKey, Token};
+use crate::token::{ShareKey, Token};
 use crate::{AssetId, FrameId, Lease, ProtocolError};
 
 /// Message from a master to a worker.

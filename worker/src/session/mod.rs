@@ -6,13 +6,4 @@ mod runner;
 mod state;
 mod work;
 
-#[cfg(test)]
-mod cancel_tests;
-#[cfg(test)]
-mod disk_tests;
-#[cfg(test)]
-mod peer_tests;
-#[cfg(test)]
-mod tests;
-
 pub(crate) use runner::{PersistentState, SessionConfig, SessionEnd, run_session};

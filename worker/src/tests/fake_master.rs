@@ -13,30 +13,30 @@ use crate::session::{PersistentState, SessionConfig, SessionEnd, run_session};
 use crate::shutdown::ShutdownHandle;
 
 /// A lease of these rows, whose segment has the number of the first row.
-pub(crate) fn lease(frame: u64, rows: Range<u32>) -> Lease {
+pub(super) fn lease(frame: u64, rows: Range<u32>) -> Lease {
     let (first_row, row_count) = (rows.start, rows.end - rows.start);
     Lease { frame: FrameId(frame), segment: first_row, attempt: 0, first_row, row_count }
 }
 
 /// A master for one worker. It sends requested assets by itself; the test sends everything else.
-pub(crate) struct FakeMaster {
-    pub(crate) out: Sender<ToWorker>,
-    pub(crate) inbox: Receiver<ToMaster>,
-    pub(crate) worker: JoinHandle<(SessionEnd, PersistentState<FakeRenderer>)>,
-    pub(crate) shutdown: ShutdownHandle,
+pub(super) struct FakeMaster {
+    pub(super) out: Sender<ToWorker>,
+    pub(super) inbox: Receiver<ToMaster>,
+    pub(super) worker: JoinHandle<(SessionEnd, PersistentState<FakeRenderer>)>,
+    pub(super) shutdown: ShutdownHandle,
     assets: Vec<(AssetId, Vec<u8>)>,
     /// Requested assets, in order.
-    pub(crate) requests: Vec<AssetId>,
+    pub(super) requests: Vec<AssetId>,
 }
 
 impl FakeMaster {
     /// Starts a session with a worker of this state.
-    pub(crate) fn start(worker: PersistentState<FakeRenderer>, assets: &[&[u8]]) -> Self {
+    pub(super) fn start(worker: PersistentState<FakeRenderer>, assets: &[&[u8]]) -> Self {
         Self::start_with_peers(worker, assets, None)
     }
 
     /// Starts a session with a worker that serves assets to other workers.
-    pub(crate) fn start_with_peers(
+    pub(super) fn start_with_peers(
         mut worker: PersistentState<FakeRenderer>,
         assets: &[&[u8]],
         peer_server: Option<PeerServer>,
@@ -55,17 +55,17 @@ impl FakeMaster {
     }
 
     /// Replaces the bytes that are sent for an asset.
-    pub(crate) fn corrupt(&mut self, original: &[u8], bytes: &[u8]) {
+    pub(super) fn corrupt(&mut self, original: &[u8], bytes: &[u8]) {
         self.assets.retain(|(id, _)| *id != AssetId::of(original));
         self.assets.push((AssetId::of(original), bytes.to_vec()));
     }
 
-    pub(crate) async fn send(&self, message: ToWorker) {
+    pub(super) async fn send(&self, message: ToWorker) {
         self.out.send(message).await.unwrap();
     }
 
     /// Announces a frame with this scene body and this view.
-    pub(crate) async fn announce(&self, frame: u64, scene: &[u8], view: &[u8]) {
+    pub(super) async fn announce(&self, frame: u64, scene: &[u8], view: &[u8]) {
         let view = Bytes::copy_from_slice(view);
         let scene = AssetId::of(scene);
         let (frame, width, height) = (FrameId(frame), WIDTH, HEIGHT);
@@ -73,7 +73,7 @@ impl FakeMaster {
     }
 
     /// Receives the next message that is no request for an asset. Serves requests before it.
-    pub(crate) async fn receive(&mut self) -> Option<ToMaster> {
+    pub(super) async fn receive(&mut self) -> Option<ToMaster> {
         loop {
             match self.inbox.recv().await?.unwrap() {
                 ToMaster::NeedAsset { id, offset, .. } => self.send_asset(id, offset).await,
@@ -83,7 +83,7 @@ impl FakeMaster {
     }
 
     /// Sends an asset from byte `first` on.
-    pub(crate) async fn send_asset(&mut self, id: AssetId, first: u64) {
+    pub(super) async fn send_asset(&mut self, id: AssetId, first: u64) {
         self.requests.push(id);
         let Some((_, bytes)) = self.assets.iter().find(|(known, _)| *known == id) else {
             self.send(ToWorker::AssetUnknown { id }).await;
@@ -101,14 +101,14 @@ impl FakeMaster {
     }
 
     /// Serves the next request for an asset.
-    pub(crate) async fn serve_request(&mut self) {
+    pub(super) async fn serve_request(&mut self) {
         let (id, offset, _) = self.receive_request().await;
         self.send_asset(id, offset).await;
     }
 
     /// Receives the next request for an asset without serving it: its id, its offset, and whether a transfer from another
     /// worker has failed.
-    pub(crate) async fn receive_request(&mut self) -> (AssetId, u64, bool) {
+    pub(super) async fn receive_request(&mut self) -> (AssetId, u64, bool) {
         loop {
             match self.inbox.recv().await.unwrap().unwrap() {
                 ToMaster::NeedAsset { id, offset, again } => return (id, offset, again),
@@ -119,7 +119,7 @@ impl FakeMaster {
     }
 
     /// Receives the next finished lease with its pixels.
-    pub(crate) async fn receive_pixels(&mut self) -> (Lease, Bytes) {
+    pub(super) async fn receive_pixels(&mut self) -> (Lease, Bytes) {
         match self.receive().await {
             Some(ToMaster::Pixels { header, bytes }) => (header.lease, bytes),
             other => panic!("expected pixels, not {other:?}"),
@@ -127,7 +127,7 @@ impl FakeMaster {
     }
 
     /// Receives the failure of a frame and returns its reason.
-    pub(crate) async fn receive_failure(&mut self, expected: u64) -> String {
+    pub(super) async fn receive_failure(&mut self, expected: u64) -> String {
         match self.receive().await {
             Some(ToMaster::Failed { frame, reason }) if frame == FrameId(expected) => reason,
             other => panic!("expected the failure of frame {expected}, not {other:?}"),
@@ -135,7 +135,7 @@ impl FakeMaster {
     }
 
     /// Closes the connection and returns the end of the session and the worker's state.
-    pub(crate) async fn close(self) -> (SessionEnd, PersistentState<FakeRenderer>) {
+    pub(super) async fn close(self) -> (SessionEnd, PersistentState<FakeRenderer>) {
         drop((self.out, self.inbox));
         self.worker.await.unwrap()
     }

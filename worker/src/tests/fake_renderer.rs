@@ -15,26 +15,26 @@ use rayfarm_protocol::{AssetId, FrameAnnounce, PixelFormat};
 use crate::renderer::{Cancelled, RayCounts, Renderer};
 
 /// Number of pixels per row of all frames.
-pub(crate) const WIDTH: u32 = 5;
+pub(super) const WIDTH: u32 = 5;
 
 /// Number of rows of all frames.
-pub(crate) const HEIGHT: u32 = 40;
+pub(super) const HEIGHT: u32 = 40;
 
 /// Number of bytes of a row.
 const ROW_BYTES: usize = PixelFormat::SEGMENT.row_bytes(WIDTH);
 
 /// Salt of scenes whose compilation lasts until it is cancelled, and then until the gate is open.
-pub(crate) const SLOW_SCENE: u8 = 100;
+pub(super) const SLOW_SCENE: u8 = 100;
 
 /// Gate for render threads of frames whose view is `wait`. Closed at first.
 #[derive(Default)]
-pub(crate) struct Gate {
+pub(super) struct Gate {
     is_open: Mutex<bool>,
     changed: Condvar,
 }
 
 impl Gate {
-    pub(crate) fn open(&self) {
+    pub(super) fn open(&self) {
         *self.is_open.lock().unwrap() = true;
         self.changed.notify_all();
     }
@@ -47,18 +47,18 @@ impl Gate {
 
 /// Counts of calls to a [`FakeRenderer`].
 #[derive(Debug, Default)]
-pub(crate) struct Calls {
+pub(super) struct Calls {
     /// Compilations that have begun.
-    pub(crate) compiled: AtomicUsize,
+    pub(super) compiled: AtomicUsize,
     compiling: AtomicUsize,
     /// Most concurrent compilations.
-    pub(crate) most_compiling: AtomicUsize,
+    pub(super) most_compiling: AtomicUsize,
     /// Compilations and preparations that noticed a cancellation.
-    pub(crate) cancelled: AtomicUsize,
+    pub(super) cancelled: AtomicUsize,
     /// Preparations that have begun.
-    pub(crate) prepared: AtomicUsize,
+    pub(super) prepared: AtomicUsize,
     /// Sizes of the thread pools that decoded and compiled scenes.
-    pub(crate) pool_sizes: Mutex<BTreeSet<usize>>,
+    pub(super) pool_sizes: Mutex<BTreeSet<usize>>,
 }
 
 impl Calls {
@@ -75,19 +75,19 @@ impl Calls {
 }
 
 /// Waits until one of the counts of [`Calls`] reaches a number.
-pub(crate) async fn until(count: &AtomicUsize, number: usize) {
+pub(super) async fn until(count: &AtomicUsize, number: usize) {
     while count.load(Relaxed) < number {
         tokio::time::sleep(Duration::from_millis(1)).await;
     }
 }
 
 #[derive(Default)]
-pub(crate) struct FakeRenderer {
-    pub(crate) gate: Arc<Gate>,
-    pub(crate) calls: Arc<Calls>,
+pub(super) struct FakeRenderer {
+    pub(super) gate: Arc<Gate>,
+    pub(super) calls: Arc<Calls>,
 }
 
-pub(crate) struct FakeFrame {
+pub(super) struct FakeFrame {
     view: Bytes,
     salt: u8,
 }
@@ -98,12 +98,12 @@ fn shade(salt: u8, view: &[u8], y: u32) -> u8 {
 }
 
 /// Pixels of rows of a frame with this scene body and this view.
-pub(crate) fn expected(scene: &[u8], view: &[u8], rows: Range<u32>) -> Vec<u8> {
+pub(super) fn expected(scene: &[u8], view: &[u8], rows: Range<u32>) -> Vec<u8> {
     rows.flat_map(|y| vec![shade(scene[5], view, y); ROW_BYTES]).collect()
 }
 
 /// Body of a scene with these meshes.
-pub(crate) fn scene(salt: u8, meshes: &[&[u8]]) -> Vec<u8> {
+pub(super) fn scene(salt: u8, meshes: &[&[u8]]) -> Vec<u8> {
     let ids = meshes.iter().flat_map(|mesh| AssetId::of(mesh).0);
     b"scene".iter().copied().chain([salt]).chain(ids).collect()
 }

@@ -4,11 +4,9 @@ use std::path::Path;
 
 use rayfarm_protocol::{AssetId, ToWorker};
 
-use crate::testing::{FakeMaster, expected, lease, persistent_with_disk, scene};
+use super::{FakeMaster, LARGE_CACHE, expected, lease, persistent_with_disk, scene};
 
 const MESHES: [&[u8]; 2] = [b"mesh of a teapot", b"mesh of a cup"];
-/// Size of a cache that holds all assets of a test, in bytes.
-const LARGE_CACHE: u64 = 1 << 20;
 
 /// Runs a worker for one frame, and returns the assets that it requested from its master.
 async fn run_worker(folder: &Path, limit_bytes: u64) -> Vec<AssetId> {

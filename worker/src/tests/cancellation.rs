@@ -6,10 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rayfarm_protocol::{FrameId, ToMaster, ToWorker};
 
-use crate::testing::{FakeMaster, SLOW_SCENE, expected, lease, persistent, scene, until};
-
-/// Size of a cache that holds all assets of a test, in bytes.
-const LARGE_CACHE: u64 = 1 << 20;
+use super::{FakeMaster, LARGE_CACHE, SLOW_SCENE, expected, lease, persistent, scene, until};
 
 #[tokio::test]
 async fn a_newer_scene_cancels_the_compilation_of_the_older_one() {

@@ -12,13 +12,10 @@ use rayfarm_protocol::{AssetId, ToMaster, ToWorker};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinHandle;
 
+use super::{FakeMaster, LARGE_CACHE, expected, lease, persistent, scene};
 use crate::peer::{PartialAsset, PeerCache, PeerServer, serve_peers};
-use crate::testing::{FakeMaster, expected, lease, persistent, scene};
 
 const KEY: ShareKey = ShareKey([8; 32]);
-
-/// Size of a cache that holds all assets of a test, in bytes.
-const LARGE_CACHE: u64 = 64 << 20;
 
 /// Time limit of each wait, far above what it takes.
 const TEST_LIMIT: Duration = Duration::from_secs(60);

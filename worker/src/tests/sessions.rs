@@ -2,13 +2,11 @@
 
 use rayfarm_protocol::{FrameId, Reconnect, ToMaster, ToWorker};
 
-use super::{SessionConfig, SessionEnd, run_session};
+use super::{FakeMaster, HEIGHT, LARGE_CACHE, WIDTH, expected, lease, persistent, scene};
+use crate::session::{SessionConfig, SessionEnd, run_session};
 use crate::shutdown::ShutdownHandle;
-use crate::testing::{FakeMaster, HEIGHT, WIDTH, expected, lease, persistent, scene};
 
 const MESH: &[u8] = b"mesh of a teapot";
-/// Size of a cache that holds all assets of a test, in bytes.
-const LARGE_CACHE: u64 = 1 << 20;
 
 #[tokio::test]
 async fn leases_become_pixels_with_any_number_of_threads() {

@@ -1,10 +1,11 @@
-//! Test doubles: a renderer whose scenes are short byte strings, and a master at the other end of a pipe.
+//! Tests of whole sessions, with a renderer whose scenes are short byte strings and a master at the other end of a pipe.
 
+mod cancellation;
+mod disk;
 mod fake_master;
 mod fake_renderer;
-
-pub(crate) use fake_master::{FakeMaster, lease};
-pub(crate) use fake_renderer::{FakeRenderer, Gate, HEIGHT, SLOW_SCENE, WIDTH, expected, scene, until};
+mod peers;
+mod sessions;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,8 +14,14 @@ use crate::render_pool::RenderPool;
 use crate::scenes::{BuildPool, DiskCache, DiskWriter, SceneLoader};
 use crate::session::PersistentState;
 
+use fake_master::{FakeMaster, lease};
+use fake_renderer::{FakeRenderer, Gate, HEIGHT, SLOW_SCENE, WIDTH, expected, scene, until};
+
+/// Size of a cache that holds all assets of a test, in bytes.
+const LARGE_CACHE: u64 = 64 << 20;
+
 /// A worker's state with a fake renderer, and the renderer's gate.
-pub(crate) fn persistent(threads: usize, cache_bytes: u64) -> (PersistentState<FakeRenderer>, Arc<Gate>) {
+fn persistent(threads: usize, cache_bytes: u64) -> (PersistentState<FakeRenderer>, Arc<Gate>) {
     let renderer = Arc::new(FakeRenderer::default());
     let gate = Arc::clone(&renderer.gate);
     let pool = RenderPool::new(Arc::clone(&renderer), threads).unwrap();
@@ -23,7 +30,7 @@ pub(crate) fn persistent(threads: usize, cache_bytes: u64) -> (PersistentState<F
 }
 
 /// The state of a worker that has just started, with a disk cache in `folder`.
-pub(crate) fn persistent_with_disk(folder: &Path, limit_bytes: u64) -> PersistentState<FakeRenderer> {
+fn persistent_with_disk(folder: &Path, limit_bytes: u64) -> PersistentState<FakeRenderer> {
     let disk = DiskWriter::new(DiskCache::new(folder.to_owned(), limit_bytes)).unwrap();
     PersistentState { disk: Some(disk), ..persistent(1, 1 << 20).0 }
 }
