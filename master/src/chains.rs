@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use rayfarm_protocol::AssetId;
-use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, SHELF_TIME};
+use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, PEER_CACHE_TIME};
 
 use crate::scheduler::WorkerId;
 
@@ -81,7 +81,7 @@ impl Chains {
         reaches: impl Fn(WorkerId) -> bool,
     ) -> Source {
         let Some(copies) = self.copies.get(&id) else { return Source::Master };
-        let fresh = |copy: &Copy| copy.complete.is_none_or(|since| since + SHELF_TIME / 2 > now);
+        let fresh = |copy: &Copy| copy.complete.is_none_or(|since| since + PEER_CACHE_TIME / 2 > now);
         let followers = |of: WorkerId| {
             let follows = |copy: &&Copy| copy.source == Source::Worker(of) && copy.complete.is_none();
             copies.values().filter(follows).count()
@@ -169,7 +169,7 @@ mod tests {
         wanted(&mut chains, 1, false);
         chains.complete(NOW, WorkerId(1), ID);
         let unreachable = chains.wanted(NOW, WorkerId(2), ID, false, |_| false);
-        let too_late = chains.wanted(NOW + SHELF_TIME, WorkerId(2), ID, false, |_| true);
+        let too_late = chains.wanted(NOW + PEER_CACHE_TIME, WorkerId(2), ID, false, |_| true);
         assert_eq!([unreachable, too_late], [Source::Master; 2]);
     }
 }

@@ -108,7 +108,7 @@ async fn live(stream: TcpStream, mut script: Script) -> Outcome {
                 answer(&sender, &mut script, lease, &view).await;
             }
             ToWorker::Ping { nonce } => sender.send(ToMaster::Pong { nonce }).await.unwrap(),
-            ToWorker::Goodbye { reason, .. } => outcome.goodbye = Some(reason),
+            ToWorker::Disconnect { reason, .. } => outcome.goodbye = Some(reason),
             ToWorker::Drain => outcome.drained = true,
             ToWorker::Cancel { .. } => {}
             ToWorker::AssetBegin { .. }

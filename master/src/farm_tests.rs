@@ -151,7 +151,7 @@ async fn pixels_of_somebody_elses_lease_are_refused() {
     let header = PixelsHeader { lease, encoding: Encoding::Raw, cost: Default::default() };
     sender.send(ToMaster::Pixels { header, bytes: Bytes::from_static(&[0; 3]) }).await.unwrap();
     let answer = receiver.recv().await.unwrap().unwrap();
-    assert!(matches!(answer, ToWorker::Goodbye { reason, .. } if reason.contains("does not hold")));
+    assert!(matches!(answer, ToWorker::Disconnect { reason, .. } if reason.contains("does not hold")));
     fake_worker::start(farm.address(), Script::Honest).await;
     render(&mut farm, view()).await;
 }

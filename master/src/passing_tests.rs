@@ -7,7 +7,7 @@ use std::time::Duration;
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::{Filter, Scene, TextureMap};
 use rayfarm_tracer::texture::Texture;
-use rayfarm_worker::{Ending, Share, WorkerOptions};
+use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 
 use crate::farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
 use crate::test_scene::{scene, view};
@@ -46,7 +46,7 @@ async fn sent_until_all_render(share: Share) -> u64 {
     let farm = FarmOptions { listen, policy: SegmentPolicy::Static(4), ..FarmOptions::default() };
     let drawn = FarmScene { scene, meshes: Vec::new(), textures: vec![texture] };
     let mut farm = Farm::start(farm, drawn).await.unwrap();
-    let ending = Ending::new();
+    let ending = ShutdownHandle::new();
     let workers: Vec<_> = (0..WORKERS)
         .map(|_| tokio::spawn(rayfarm_worker::run(options(farm.address(), share), ending.clone())))
         .collect();

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayfarm_protocol::passing::ShareKey;
+use rayfarm_protocol::peer::ShareKey;
 use rayfarm_protocol::session::{Sender, Traffic};
 use rayfarm_protocol::{AssetId, Hello, Reconnect, ToWorker};
 use tokio::task::JoinHandle;
@@ -169,7 +169,7 @@ impl Roster {
             Return::Unwanted => Reconnect::Never,
             Return::NextMaster => Reconnect::NextMaster,
         };
-        let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), reconnect };
+        let goodbye = ToWorker::Disconnect { reason: reason.to_owned(), reconnect };
         Some(tokio::spawn(async move {
             let last_words = async {
                 // A session that has ended already needs none.

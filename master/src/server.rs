@@ -164,7 +164,7 @@ async fn listen(
             ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
             ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
-            ToMaster::Goodbye { reason } => return Ok(reason),
+            ToMaster::Disconnect { reason } => return Ok(reason),
         }
     }
     Err(SessionError::Closed)

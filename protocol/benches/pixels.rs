@@ -1,30 +1,33 @@
-//! What pixels weigh on the wire, and what it takes to make them lighter:
+//! The size of pixels on the wire, and the time to encode and decode them:
 //!
 //! ```text
 //! cargo bench -p rayfarm-protocol --bench pixels -- FRAME.ppm ...
 //! ```
 //!
-//! For each picture (binary PPM, as `rayfarm-master render -o FRAME.ppm` writes it), cut into bands of 16 rows as render
-//! threads do: bytes, their share of the raw ones, and milliseconds of one thread to encode and to decode the whole
-//! picture, the least of some repeats. Beside LZ4, which is what travels, stand LZ4 behind differences to the left
-//! neighbour and LZ4 behind differences to the row above, which do not: see `protocol/src/pixels/blocks.rs`.
+//! Each picture is a binary PPM, as `rayfarm-master render -o FRAME.ppm` writes it, and is cut into bands of 16 rows as
+//! render threads do. The table has the bytes, their share of the raw bytes, and the milliseconds of one thread to encode
+//! and decode the whole picture: the least of 15 repeats. The wire carries plain LZ4. LZ4 after differences to the left
+//! neighbour and to the row above is measured for comparison: see `protocol/src/pixels/blocks.rs`.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark fails by panicking")]
 
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::pixels::{Packer, unpack};
+use rayfarm_protocol::pixels::{Packer, PixelFormat, unpack};
 
 const BAND_ROWS: usize = 16;
 const REPEATS: usize = 15;
 
-/// RGB8 rows.
+/// Number of bytes of a pixel of the pictures.
+const PIXEL_BYTES: usize = PixelFormat::Rgb8.bytes_per_pixel();
+
+/// A picture as RGB8 rows.
 struct Picture {
     name: String,
     row_bytes: usize,
     pixels: Vec<u8>,
 }
 
-/// What stands in front of LZ4.
+/// A filter in front of LZ4.
 #[derive(Clone, Copy)]
 enum Filter {
     None,
@@ -57,7 +60,7 @@ fn main() {
     }
 }
 
-/// Bytes of the blocks, and the least times to encode and decode them.
+/// Number of bytes of all blocks, and the least times to encode and decode them.
 fn measure(picture: &Picture, filter: Filter) -> (usize, Duration, Duration) {
     let Picture { row_bytes, pixels, .. } = picture;
     let mut packer = Packer::new();
@@ -81,15 +84,15 @@ fn measure(picture: &Picture, filter: Filter) -> (usize, Duration, Duration) {
         }
         decode = decode.min(begun.elapsed());
     }
-    assert!(back == *pixels, "{} did not survive", picture.name);
+    assert!(back == *pixels, "{} differs after decoding", picture.name);
     (bytes, encode, decode)
 }
 
-/// How far back the byte lies that is subtracted.
+/// Distance in bytes to the byte that is subtracted.
 fn distance(row_bytes: usize, filter: Filter) -> usize {
     match filter {
         Filter::None => 0,
-        Filter::Left => 3,
+        Filter::Left => PIXEL_BYTES,
         Filter::Up => row_bytes,
     }
 }
@@ -107,8 +110,8 @@ fn undo(band: &mut [u8], row_bytes: usize, filter: Filter) {
     match filter {
         Filter::None => {}
         Filter::Left => {
-            let mut sum = [0u8; 3];
-            for pixel in band.chunks_exact_mut(3) {
+            let mut sum = [0u8; PIXEL_BYTES];
+            for pixel in band.chunks_exact_mut(PIXEL_BYTES) {
                 for (sum, channel) in sum.iter_mut().zip(pixel) {
                     *sum = sum.wrapping_add(*channel);
                     *channel = *sum;
@@ -125,7 +128,7 @@ fn undo(band: &mut [u8], row_bytes: usize, filter: Filter) {
     }
 }
 
-/// A binary PPM of 8 bits.
+/// Reads a binary PPM of 8 bits per channel.
 fn read(path: &str) -> Picture {
     let file = std::fs::read(path).unwrap_or_else(|error| panic!("{path}: {error}"));
     let mut fields = file.splitn(4, |byte| byte.is_ascii_whitespace());
@@ -136,7 +139,7 @@ fn read(path: &str) -> Picture {
     assert_eq!(number("magic"), "P6", "{path} is no binary PPM");
     let width: usize = number("width").parse().unwrap();
     let height: usize = number("height").parse().unwrap();
-    let row_bytes = width * 3;
+    let row_bytes = width * PIXEL_BYTES;
     let start = file.len().checked_sub(row_bytes * height).unwrap_or_else(|| panic!("{path} is too short"));
     let name = std::path::Path::new(path).file_stem().unwrap().to_string_lossy().into_owned();
     Picture { name, row_bytes, pixels: file[start..].to_vec() }

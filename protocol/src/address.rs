@@ -1,26 +1,26 @@
-//! Addresses as people write them, link-local ones with the name of an interface included (`[fe80::1%eth0]:7117`), and
-//! the addresses of this machine.
+//! Socket addresses as text, with the name of an interface as the scope of a link-local address
+//! (`[fe80::1%eth0]:7117`), and the addresses of this machine.
 
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, SocketAddrV6};
 
-/// An address of this machine, and the interface that has it.
+/// An address of this machine, with its network interface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Interface {
-    /// The interface's name, such as `eth0`.
+    /// Name of the interface, such as `eth0`.
     pub name: String,
-    /// Its number, which is the scope of a link-local address.
+    /// Number of the interface, which is the scope of a link-local address; 0 where it is unknown.
     pub index: u32,
-    /// One of its addresses.
+    /// One address of the interface.
     pub ip: IpAddr,
-    /// Whether it is connected to anything, as far as the system knows.
+    /// Whether the interface is connected, as far as the system reports it.
     pub is_up: bool,
 }
 
-/// Lists the addresses of this machine, one entry for each.
+/// Lists the addresses of this machine, one entry per address.
 ///
 /// # Errors
-/// The system's.
+/// Errors of the system.
 pub fn interfaces() -> io::Result<Vec<Interface>> {
     let found = if_addrs::get_if_addrs()?.into_iter().map(|interface| Interface {
         ip: interface.ip(),
@@ -36,10 +36,10 @@ pub fn interfaces() -> io::Result<Vec<Interface>> {
     Ok(found.collect())
 }
 
-/// Reads `ADDR:PORT` with the address in digits; `None` where it is no such address (it may hold a host's name).
+/// Parses `ADDR:PORT` with a numeric address. Returns `None` for any other text, such as one with a host name.
 ///
 /// # Errors
-/// A scope that is no interface of this machine, with those that are.
+/// A scope that is no interface of this machine. The message lists the interfaces.
 pub fn parse(text: &str) -> Result<Option<SocketAddr>, String> {
     if let Ok(address) = text.parse() {
         return Ok(Some(address));
@@ -53,10 +53,10 @@ pub fn parse(text: &str) -> Result<Option<SocketAddr>, String> {
     }
 }
 
-/// Looks up `HOST:PORT`; a link-local address may have an interface's name as its scope.
+/// Resolves `HOST:PORT`. A link-local address may have the name of an interface as its scope.
 ///
 /// # Errors
-/// The resolver's, or a scope that is no interface of this machine.
+/// Errors of the resolver; a scope that is no interface of this machine.
 pub async fn resolve(text: &str) -> io::Result<Vec<SocketAddr>> {
     match parse(text) {
         Ok(Some(address)) => Ok(vec![address]),
@@ -65,7 +65,7 @@ pub async fn resolve(text: &str) -> io::Result<Vec<SocketAddr>> {
     }
 }
 
-/// An address as [`parse`] reads it, the scope of a link-local one as the interface's name where that is known.
+/// Formats an address as [`parse`] reads it, with the name of the interface as its scope where `interfaces` has it.
 pub fn show(address: SocketAddr, interfaces: &[Interface]) -> String {
     let SocketAddr::V6(v6) = address else { return address.to_string() };
     let name = |scope: u32| interfaces.iter().find(|interface| scope > 0 && interface.index == scope);
@@ -75,14 +75,14 @@ pub fn show(address: SocketAddr, interfaces: &[Interface]) -> String {
     }
 }
 
-/// `[fe80::1%eth0]:7117` as its three parts.
+/// Splits `[fe80::1%eth0]:7117` into address, scope and port.
 fn split_scoped(text: &str) -> Option<(Ipv6Addr, &str, u16)> {
     let (inside, port) = text.strip_prefix('[')?.rsplit_once("]:")?;
     let (ip, scope) = inside.split_once('%')?;
     Some((ip.parse().ok()?, scope, port.parse().ok()?))
 }
 
-/// The names of interfaces, each once, for people.
+/// Lists the names of interfaces for an error message, each once.
 fn names(interfaces: &[Interface]) -> String {
     let mut names: Vec<&str> = interfaces.iter().map(|interface| interface.name.as_str()).collect();
     names.sort_unstable();
@@ -97,14 +97,14 @@ fn names(interfaces: &[Interface]) -> String {
 mod tests {
     use super::*;
 
-    /// The loopback interface of this machine, which every machine has.
+    /// The loopback interface of this machine.
     fn loopback() -> Interface {
         let found = interfaces().unwrap().into_iter().find(|interface| interface.ip.is_loopback());
         found.unwrap()
     }
 
     #[test]
-    fn addresses_in_digits_are_read_and_names_are_left_to_the_resolver() {
+    fn numeric_addresses_are_parsed_and_host_names_are_not() {
         for text in ["127.0.0.1:7117", "[::1]:7117", "[fe80::1%3]:7117", "0.0.0.0:0"] {
             assert_eq!(parse(text), Ok(Some(text.parse().unwrap())), "{text}");
         }
@@ -130,14 +130,14 @@ mod tests {
     }
 
     #[test]
-    fn other_addresses_are_shown_as_they_are() {
+    fn addresses_without_a_known_scope_are_formatted_unchanged() {
         for text in ["127.0.0.1:7117", "[2001:db8::1]:7117", "[fe80::1%4294967295]:7117"] {
             assert_eq!(show(text.parse().unwrap(), &[loopback()]), text);
         }
     }
 
     #[tokio::test]
-    async fn a_scoped_address_is_resolved_like_any_other() {
+    async fn scoped_addresses_are_resolved() {
         let loopback = loopback();
         let resolved = resolve(&format!("[fe80::1%{}]:7117", loopback.name)).await.unwrap();
         assert_eq!(resolved, [SocketAddrV6::new("fe80::1".parse().unwrap(), 7117, 0, loopback.index).into()]);

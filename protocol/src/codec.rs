@@ -1,8 +1,8 @@
-//! The only place that knows bincode.
+//! Encoding of values as bytes. No other file depends on bincode.
 //!
-//! bincode 2.0.1 is the last real version and unmaintained (RUSTSEC-2025-0141), so two functions are all of it that
-//! the project uses. The bytes are those of `config::legacy()`: little endian, fixed-width integers, `u64` lengths,
-//! `u32` variant numbers. Golden-byte tests hold them fast, so that another codec can take its place in this one file.
+//! bincode 2.0.1 is the last functional release and is unmaintained (RUSTSEC-2025-0141), so the crate uses two of its
+//! functions only. The bytes are those of `config::legacy()`: little endian, fixed-width integers, `u64` lengths, `u32`
+//! variant numbers. Golden-byte tests pin them, so that this file can change to another codec.
 
 use bincode::config::{self, Config};
 use serde::Serialize;
@@ -10,56 +10,56 @@ use serde::de::DeserializeOwned;
 
 use crate::limits::MAX_DECODE_BYTES;
 
-/// Why a value was not encoded or decoded.
+/// Error of encoding or decoding a value.
 #[derive(Debug, thiserror::Error)]
 pub enum CodecError {
-    /// A value that has no encoding.
+    /// The value has no encoding.
     #[error("cannot encode: {0}")]
     Encode(#[from] bincode::error::EncodeError),
 
-    /// Bytes that are no value of the expected type.
+    /// The bytes are no value of the expected type.
     #[error("not a valid value: {0}")]
     Decode(#[from] bincode::error::DecodeError),
 
-    /// More bytes than allowed; nothing was decoded.
+    /// There are more bytes than allowed. Nothing was decoded.
     #[error("{len} bytes, at most {limit} are allowed")]
     TooLong {
-        /// Bytes given.
+        /// Number of bytes.
         len: usize,
-        /// The bound.
+        /// Largest number allowed.
         limit: usize,
     },
 
-    /// The value ends before its bytes do.
-    #[error("{extra} bytes left over behind the value")]
+    /// Bytes are left after the value.
+    #[error("{extra} bytes left over after the value")]
     Trailing {
-        /// Bytes that were not consumed.
+        /// Number of bytes that were not consumed.
         extra: usize,
     },
 }
 
-/// The bytes of a value.
+/// Encodes a value.
 ///
 /// # Errors
-/// Where the value has no encoding (a sequence of unknown length).
+/// A value without an encoding: a sequence of unknown length.
 pub fn encode<T: Serialize + ?Sized>(value: &T) -> Result<Vec<u8>, CodecError> {
     Ok(bincode::serde::encode_to_vec(value, config::legacy())?)
 }
 
-/// The value of these bytes: at most `limit` of them (and never more than [`MAX_DECODE_BYTES`]), all consumed.
+/// Decodes a value from all of `bytes`: at most `limit` bytes, and at most [`MAX_DECODE_BYTES`].
 ///
-/// Types decoded here must not hold sequences of zero-sized elements, whose length nothing bounds.
+/// `T` must not hold sequences of zero-sized elements, because their length is unbounded.
 ///
 /// # Errors
-/// Too many bytes, bytes that are no `T`, bytes left over.
+/// Too many bytes; bytes that are no `T`; bytes left after the value.
 pub fn decode<T: DeserializeOwned>(bytes: &[u8], limit: usize) -> Result<T, CodecError> {
     let limit = limit.min(MAX_DECODE_BYTES);
     let len = bytes.len();
     if len > limit {
         return Err(CodecError::TooLong { len, limit });
     }
-    // bincode believes a string's length up to its configured limit and allocates before it looks for the bytes. The
-    // limit is a constant of its type, so the tightest of a few steps above the real length bounds that allocation.
+    // bincode trusts a string's length up to its configured limit and allocates before it checks for the bytes. The
+    // limit is a constant of the configuration's type, so the smallest of four limits above `len` bounds that allocation.
     match len {
         0..=0xfff => decode_all(bytes, config::legacy().with_limit::<0xfff>()),
         0x1000..=0xffff => decode_all(bytes, config::legacy().with_limit::<0xffff>()),
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_are_these() {
+    fn golden_bytes() {
         assert_eq!(encode(&Shape::Unit).unwrap(), [0, 0, 0, 0]);
         assert_eq!(encode(&Shape::Pair(0x0102, -2)).unwrap(), [1, 0, 0, 0, 2, 1, 0xfe, 0xff, 0xff, 0xff]);
         let golden: &[u8] = &[
@@ -136,13 +136,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_encoded_decodes(text in ".{0,60}", list in prop::collection::vec(any::<u8>(), 0..5000), flag: bool) {
+        fn encoding_round_trips(text in ".{0,60}", list in prop::collection::vec(any::<u8>(), 0..5000), flag: bool) {
             let value = Shape::Named { text, list, maybe: None, flag };
             prop_assert_eq!(decode::<Shape>(&encode(&value).unwrap(), 1 << 20).unwrap(), value);
         }
 
         #[test]
-        fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn arbitrary_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let _ = decode::<Shape>(&bytes, 4096);
             let _ = decode::<Vec<String>>(&bytes, 4096);
         }

@@ -1,4 +1,4 @@
-//! What can go wrong between two peers, and what to do about it.
+//! Errors between two peers, with what to do about them.
 
 use std::fmt;
 use std::io;
@@ -8,17 +8,17 @@ use crate::PROTOCOL_VERSION;
 use crate::codec::CodecError;
 use crate::envelope::Kind;
 
-/// The two ends of a connection.
+/// One of the two ends of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Hands out segments; listens.
+    /// The end that listens and leases segments.
     Master,
-    /// Renders them; connects.
+    /// The end that connects and renders segments.
     Worker,
 }
 
 impl Role {
-    /// The role at the other end.
+    /// Role of the other end.
     pub fn peer(self) -> Self {
         match self {
             Self::Master => Self::Worker,
@@ -36,123 +36,123 @@ impl fmt::Display for Role {
     }
 }
 
-/// Why a handshake or a session failed.
+/// Error of a handshake, a session or a message.
 #[derive(Debug, thiserror::Error)]
 pub enum ProtocolError {
     /// The transport failed.
     #[error("{doing}: {source}")]
     Io {
-        /// What was being done.
+        /// The operation that failed.
         doing: &'static str,
-        /// The transport's own error.
+        /// Error of the transport.
         source: io::Error,
     },
 
-    /// The peer closed the connection where more had to come.
+    /// The peer closed the connection in the middle of an exchange.
     #[error("the peer closed the connection {at}")]
     Closed {
-        /// Where in the conversation.
+        /// Position in the exchange.
         at: &'static str,
     },
 
-    /// Something had begun and did not end in time.
+    /// The peer began something and did not finish it in time.
     #[error("the peer did not finish {what} within {seconds} s", seconds = .limit.as_secs())]
     Deadline {
-        /// What had begun.
+        /// What the peer began.
         what: &'static str,
-        /// How long it was waited for.
+        /// The time limit.
         limit: Duration,
     },
 
-    /// The first bytes are not the magic: something else runs at the other end.
+    /// The first bytes are not the magic: another program runs at the other end.
     #[error("the peer is no rayfarm {expected}: {what}; check the address and the port")]
     NotRayfarm {
-        /// What should be there.
+        /// Role that was expected at the other end.
         expected: Role,
-        /// What it said, and what that looks like.
+        /// The bytes that arrived, and the protocol that they belong to.
         what: String,
     },
 
-    /// Two masters, or two workers.
+    /// Both ends are masters, or both are workers.
     #[error("both ends of the connection are {role}s; a worker connects to a master: check the address")]
     SameRole {
-        /// What both are.
+        /// Role of both ends.
         role: Role,
     },
 
-    /// The peer is of another release.
+    /// The peer's release uses another version of the protocol.
     #[error("{}", version_mismatch(*.our_role, PROTOCOL_VERSION, *.theirs))]
     Version {
-        /// What we are.
+        /// Role of this end.
         our_role: Role,
-        /// The protocol version the peer speaks.
+        /// Protocol version of the peer.
         theirs: u16,
     },
 
-    /// The master does not want this worker.
+    /// The master refused this worker.
     #[error("refused by the {by}: {reason}")]
     Refused {
-        /// Who refused.
+        /// Role of the end that refused.
         by: Role,
-        /// Why.
+        /// The master's reason.
         reason: String,
     },
 
-    /// The master does not take this worker now, and may later.
-    #[error("the master does not take workers now: {reason}")]
+    /// The master does not accept this worker now, and may accept it later.
+    #[error("the master does not accept workers now: {reason}")]
     NotNow {
-        /// Why.
+        /// The master's reason.
         reason: String,
     },
 
-    /// An envelope of a type that this version does not know.
-    #[error("the peer sent an envelope of unknown type {kind:#04x}: these bytes are no message of rayfarm's")]
+    /// An envelope has a type that this version does not know.
+    #[error("the peer sent an envelope of unknown type {kind:#04x}: the bytes are no message of rayfarm")]
     UnknownKind {
-        /// The type's byte.
+        /// Byte of the type.
         kind: u8,
     },
 
-    /// An envelope that has no business in this direction or at this point.
+    /// An envelope has a type that is not allowed in this direction or at this point.
     #[error("the peer sent {kind}, where {expected} was expected")]
     Unexpected {
-        /// What came.
+        /// Type of the envelope.
         kind: Kind,
-        /// What could have come.
+        /// Description of the allowed types.
         expected: &'static str,
     },
 
-    /// A header announces more than its type may carry. Nothing was allocated for it.
+    /// A header announces more bytes than its type may have. Nothing was allocated for them.
     #[error("{kind} announces {announced} bytes; at most {limit} are allowed")]
     TooLong {
-        /// The envelope's type.
+        /// Type of the envelope.
         kind: Kind,
-        /// Bytes announced, or about to be sent.
+        /// Number of bytes announced, or about to be sent.
         announced: u64,
-        /// The bound.
+        /// Largest number allowed.
         limit: u64,
     },
 
-    /// An envelope whose content breaks a rule.
+    /// The content of an envelope breaks a rule.
     #[error("{kind} is malformed: {why}")]
     Malformed {
-        /// The envelope's type.
+        /// Type of the envelope.
         kind: Kind,
-        /// The rule.
+        /// The rule and the offending value.
         why: String,
     },
 
-    /// An envelope whose body does not decode.
+    /// The body of an envelope does not decode.
     #[error("{kind} does not decode: {source}")]
     Codec {
-        /// The envelope's type.
+        /// Type of the envelope.
         kind: Kind,
-        /// What the codec said.
+        /// Error of the codec.
         source: CodecError,
     },
 }
 
 impl ProtocolError {
-    /// Whether trying again would give the same answer: another release, another program, a refusal.
+    /// Whether every later attempt must fail as well: another release, another program, a refusal.
     pub fn is_final(&self) -> bool {
         match self {
             Self::NotRayfarm { .. } | Self::SameRole { .. } | Self::Version { .. } | Self::Refused { .. } => {
@@ -173,7 +173,7 @@ fn version_mismatch(our_role: Role, ours: u16, theirs: u16) -> String {
     let peer = our_role.peer();
     let older = if ours < theirs { our_role } else { peer };
     format!(
-        "this {our_role} speaks protocol version {ours}, the {peer} speaks version {theirs}; \
+        "this {our_role} has protocol version {ours}, the {peer} has version {theirs}; \
          install the same release of rayfarm on both machines (the {older}'s is the older one)"
     )
 }

@@ -1,36 +1,37 @@
-//! Names of things: assets, frames, leases.
+//! Identifiers of assets, frames and leases.
 
 use std::fmt;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-/// The name of an immutable blob: BLAKE3 of its bytes. The scene body and every compiled mesh is an asset.
+/// Identifier of an immutable blob (scene body, compiled mesh, texture): the BLAKE3 hash of its bytes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct AssetId(pub [u8; 32]);
 
 impl AssetId {
-    /// The name of these bytes.
+    /// Hashes the bytes of an asset.
     pub fn of(bytes: &[u8]) -> Self {
         Self(blake3::hash(bytes).into())
     }
 }
 
 impl fmt::Display for AssetId {
+    /// Writes all 64 hexadecimal digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 
 impl fmt::Debug for AssetId {
+    /// Writes the first eight digits, which distinguish assets in a log.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Eight digits tell assets apart in a log; the whole name is Display's.
         let [a, b, c, d, ..] = self.0;
         write!(f, "AssetId({a:02x}{b:02x}{c:02x}{d:02x})")
     }
 }
 
-/// One picture of a run of the master. Later frames have greater numbers.
+/// Number of a frame within a run of the master. Later frames have greater numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct FrameId(pub u64);
 
@@ -40,23 +41,23 @@ impl fmt::Display for FrameId {
     }
 }
 
-/// One worker's promise of one segment: these rows of this frame.
+/// Assignment of one segment of a frame to a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Lease {
-    /// The picture.
+    /// The frame.
     pub frame: FrameId,
-    /// The segment within the frame.
+    /// Number of the segment within the frame.
     pub segment: u32,
-    /// How often the segment had been leased before: a late answer to an older lease is told from the right one.
+    /// Number of earlier leases of the segment. It distinguishes a late reply to an earlier lease from the current one.
     pub attempt: u32,
-    /// The first row, counted from the top.
+    /// First row, counted from the top.
     pub first_row: u32,
-    /// How many rows; never 0 on the wire.
+    /// Number of rows, at least 1 on the wire.
     pub row_count: u32,
 }
 
 impl Lease {
-    /// The rows, or `None` where they run past the last number there is or are none.
+    /// Range of the rows, or `None` where it is empty or its end exceeds `u32::MAX`.
     pub fn rows(&self) -> Option<Range<u32>> {
         let end = self.first_row.checked_add(self.row_count)?;
         (self.row_count > 0).then_some(self.first_row..end)

@@ -1,87 +1,83 @@
-//! Every bound on what a peer can make this side hold, and for how long.
+//! Bounds on everything that a peer can make this side hold, and on how long it can make it wait.
 
 use std::time::Duration;
 
-/// Body of a control message, and of anything sent before the handshake is done.
+/// Largest body of a control message, and of every message of a handshake, in bytes (4 KiB).
 pub const MAX_CONTROL_BYTES: usize = 4 << 10;
 
-/// A worker's name, its SIMD level, its software version: each.
+/// Largest size of a worker's name, of its SIMD level and of its software version, in bytes each.
 pub const MAX_NAME_BYTES: usize = 255;
 
-/// Render threads of a worker: more than its command line takes are a lie.
+/// Largest thread count accepted in a [`Hello`](crate::Hello).
 pub const MAX_THREADS: u32 = 65_535;
 
-/// The reason in a refusal, a failure or a goodbye. Longer ones are cut before they are sent.
+/// Largest reason in a refusal, a failure or a disconnect, in bytes. Longer reasons are cut before they are sent.
 pub const MAX_REASON_BYTES: usize = 2 << 10;
 
-/// The opaque view of one frame.
+/// Largest opaque view of a frame, in bytes.
 pub const MAX_VIEW_BYTES: usize = 4 << 10;
 
-/// Width and height of a frame, in pixels.
+/// Largest width and largest height of a frame, in pixels.
 pub const MAX_FRAME_SIDE: u32 = 32_768;
 
-/// Bytes of one asset (2 GiB). A worker's own cache bound is usually far smaller and decides first.
+/// Largest asset, in bytes (2 GiB). The bound of a worker's own cache is usually far smaller and applies first.
 pub const MAX_ASSET_BYTES: u64 = 2 << 30;
 
-/// Bytes of an asset in one envelope. Small enough that a control message waits at most some 2 ms behind it on gigabit.
+/// Most bytes of an asset in one envelope (256 KiB). A control message waits for one chunk at most: about 2 ms on gigabit
+/// Ethernet.
 pub const MAX_CHUNK_BYTES: usize = 256 << 10;
 
-/// Workers that one worker passes assets on to at a time; more wait.
-pub const MAX_FOLLOWERS: usize = 8;
+/// Most peers to which a worker sends assets at a time. More connections wait.
+pub const MAX_PEER_CLIENTS: usize = 8;
 
-/// How long a worker keeps a whole asset ready to be passed on after it was last asked for.
-pub const SHELF_TIME: Duration = Duration::from_secs(20);
+/// How long a worker keeps a complete asset for its peers after the last request for it.
+pub const PEER_CACHE_TIME: Duration = Duration::from_secs(20);
 
-/// Bytes of whole assets that a worker keeps for that alone (512 MiB).
-pub const MAX_SHELF_BYTES: usize = 512 << 20;
+/// Most bytes of complete assets that a worker keeps for its peers (512 MiB).
+pub const MAX_PEER_CACHE_BYTES: usize = 512 << 20;
 
-/// How long another worker may take to accept a connection.
-pub const PEER_CONNECT: Duration = Duration::from_secs(2);
+/// How long a peer may take to accept a connection.
+pub const PEER_CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// A worker that passes on what it has yet to receive says so this often while it waits...
-pub const PEER_PULSE: Duration = Duration::from_millis(500);
+/// Interval of the keepalives that a worker sends to a peer while it waits for bytes of an asset itself.
+pub const PEER_KEEPALIVE_INTERVAL: Duration = Duration::from_millis(500);
 
-/// ...and so often in a row at most.
-pub const MAX_PULSES: u32 = 240;
+/// Most consecutive keepalives without a chunk between them.
+pub const MAX_PEER_KEEPALIVES: u32 = 240;
 
-/// How long a worker may be silent in the middle of what it passes on.
-pub const PEER_PATIENCE: Duration = Duration::from_secs(3);
+/// How long a peer may be silent in the middle of a transfer.
+pub const PEER_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Pixel bytes of one segment (32 MiB: a whole 3840 x 2160 frame fits). See [`max_lease_rows`].
+/// Most pixel bytes of one segment (32 MiB: a whole frame of 3840 x 2160 pixels fits).
 pub const MAX_PIXELS_BYTES: usize = 32 << 20;
 
-/// The longest value that [`crate::codec`] decodes (256 MiB): a scene body with a million single triangles and spheres.
+/// Longest value that [`crate::codec`] decodes, in bytes (256 MiB): a scene body with a million triangles and spheres.
 pub const MAX_DECODE_BYTES: usize = 256 << 20;
 
-/// Control messages that wait for the writer of a session.
+/// Capacity of a session's queue of outgoing control messages.
 pub const CONTROL_QUEUE: usize = 256;
 
-/// Bulk messages that wait for the writer of a session.
+/// Capacity of a session's queue of outgoing bulk messages.
 pub const BULK_QUEUE: usize = 8;
 
-/// Messages that were received and wait for the user of a session.
+/// Capacity of a session's queue of received messages.
 pub const INBOX_QUEUE: usize = 256;
 
-/// Body bytes of those messages; the reader stops reading while they are more.
+/// Most body bytes in the queue of received messages. While there are more, the session does not read.
 pub const INBOX_BYTES: usize = 2 * (MAX_PIXELS_BYTES + MAX_CONTROL_BYTES);
 
-/// From the first byte of the preamble to the end of the handshake.
+/// Time limit from the first byte of the preamble to the end of the handshake.
 pub const HANDSHAKE_DEADLINE: Duration = Duration::from_secs(5);
 
-/// How long the reader goes on after the writer has failed: the peer's last word may still be on its way in.
-pub const LAST_WORD_GRACE: Duration = Duration::from_millis(500);
+/// How long a session reads on after its writer has failed or has written a disconnect: the peer's own disconnect may be
+/// in the receive buffer.
+pub const CLOSE_GRACE: Duration = Duration::from_millis(500);
 
-/// The slowest peer that is waited for in the middle of an envelope.
-const SLOWEST_BYTES_PER_SECOND: u64 = 256 << 10;
+/// Lowest data rate that is accepted in the middle of an envelope.
+const MIN_BYTES_PER_SECOND: u64 = 256 << 10;
 
-/// How long an envelope with a body of `body_bytes` may take once it has begun, in either direction.
-/// Between envelopes a peer may be silent for ever.
+/// Time limit for an envelope with a body of `body_bytes`, in either direction, from its first byte to its last. The time
+/// between two envelopes is unlimited.
 pub const fn envelope_deadline(body_bytes: usize) -> Duration {
-    Duration::from_millis(10_000 + body_bytes as u64 * 1000 / SLOWEST_BYTES_PER_SECOND)
-}
-
-/// The most rows of a frame that one lease may cover, so that their raw pixels fit into one envelope; at least 1.
-pub fn max_lease_rows(width: u32) -> u32 {
-    let row_bytes = (width.max(1) as usize).saturating_mul(3);
-    u32::try_from(MAX_PIXELS_BYTES / row_bytes).unwrap_or(u32::MAX).max(1)
+    Duration::from_millis(10_000 + body_bytes as u64 * 1000 / MIN_BYTES_PER_SECOND)
 }

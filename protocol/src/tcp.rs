@@ -1,14 +1,14 @@
-//! How a TCP connection between a master and a worker is set up, at both of its ends.
+//! Options of the TCP connections between a master and its workers, set at both ends.
 
 use std::io;
 
 use tokio::net::TcpStream;
 
-/// Sends small messages at once: leases and pings must not wait for company. Within one machine it also takes the
-/// plainest congestion control.
+/// Disables Nagle's algorithm, so that leases and pings are sent at once. Within one machine it also selects the Reno
+/// congestion control.
 ///
 /// # Errors
-/// The socket's. A congestion control that cannot be had is not one: it saves time and nothing depends on it.
+/// Errors of the socket. A congestion control that is not available is no error: it only saves time.
 pub fn configure(stream: &TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     if is_within_machine(stream) {
@@ -17,21 +17,21 @@ pub fn configure(stream: &TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether both ends are on this machine.
+/// Whether both ends of a connection are on this machine.
 pub fn is_within_machine(stream: &TcpStream) -> bool {
     let ends = stream.local_addr().and_then(|ours| Ok((ours.ip(), stream.peer_addr()?.ip())));
     ends.is_ok_and(|(ours, theirs)| ours == theirs || theirs.is_loopback())
 }
 
-/// Whether a socket that listens on any IPv6 address takes IPv4 connections as well, by this system's default.
+/// Whether a socket that listens at the unspecified IPv6 address accepts IPv4 connections by this system's default.
 pub fn is_dual_stack() -> bool {
     use socket2::{Domain, Socket, Type};
     let socket = Socket::new(Domain::IPV6, Type::STREAM, None);
     socket.and_then(|socket| socket.only_v6()).is_ok_and(|only| !only)
 }
 
-/// A loopback is never congested, but a system whose default paces what it sends (BBR) spends timers on it: 3 % of
-/// a frame of W1. Every Linux has Reno, and lets everybody use it.
+/// Selects Reno on Linux, where every user may. A loopback is never congested, but a default that paces its packets (BBR)
+/// spends time on timers: 3 % of a frame of a bust of 99,938 triangles.
 fn relax_congestion_control(stream: &TcpStream) {
     #[cfg(target_os = "linux")]
     let _ = socket2::SockRef::from(stream).set_tcp_congestion(b"reno");
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn both_ends_on_a_loopback_send_at_once_and_unpaced() {
+    async fn loopback_connections_have_no_delay_and_no_pacing() {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         let (ours, theirs) = tokio::join!(TcpStream::connect(address), listener.accept());

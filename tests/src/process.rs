@@ -1,23 +1,22 @@
-//! Child processes that never outlive their test.
+//! Child processes with captured output, killed at the end of their test.
 
-use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How long anything here may take before its test fails. Generous: machines are shared, and nothing is timed.
-const PATIENCE: Duration = Duration::from_secs(180);
+/// Time limit of every wait. It is long because machines are shared, and no test measures time with it.
+const TIME_LIMIT: Duration = Duration::from_secs(180);
 
-/// How a process ended and what it said.
+/// Exit status and output of a process that has ended.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Exit status as the shell sees it; `None` when a signal ended it.
+    /// Exit status, or `None` for a process that a signal has ended.
     pub code: Option<i32>,
-    /// Standard output.
+    /// Text of standard output.
     pub stdout: String,
-    /// Standard error.
+    /// Text of standard error.
     pub stderr: String,
 }
 
@@ -32,29 +31,29 @@ impl Outcome {
     pub fn expect_failure(self, code: i32, words: &[&str]) -> Self {
         assert_eq!(self.code, Some(code), "{self:#?}");
         for word in words {
-            assert!(self.stderr.contains(word), "standard error does not say `{word}`: {self:#?}");
+            assert!(self.stderr.contains(word), "standard error does not contain `{word}`: {self:#?}");
         }
         self
     }
 }
 
-/// A process under way, with what it has said so far. Killed when dropped.
+/// A running process with its output so far. Killed when it is dropped.
 pub struct Running {
     child: Child,
     stdin: Option<ChildStdin>,
-    stdout: Said,
-    stderr: Said,
+    stdout: Capture,
+    stderr: Capture,
     name: String,
 }
 
-/// What a stream has carried so far.
-struct Said {
+/// Text of an output stream so far.
+struct Capture {
     text: Arc<Mutex<String>>,
     reader: Option<thread::JoinHandle<()>>,
 }
 
-impl Said {
-    fn by(mut stream: impl Read + Send + 'static) -> Self {
+impl Capture {
+    fn start(mut stream: impl Read + Send + 'static) -> Self {
         let text = Arc::new(Mutex::new(String::new()));
         let shared = Arc::clone(&text);
         let reader = thread::spawn(move || {
@@ -70,8 +69,8 @@ impl Said {
         self.text.lock().unwrap().clone()
     }
 
-    /// All of it. The stream must have ended.
-    fn whole(&mut self) -> String {
+    /// Waits for the end of the stream and returns all of its text.
+    fn finish(&mut self) -> String {
         if let Some(reader) = self.reader.take() {
             reader.join().unwrap();
         }
@@ -80,13 +79,13 @@ impl Said {
 }
 
 impl Running {
-    /// Starts a command with its output captured.
+    /// Starts a command without standard input.
     pub fn start(command: &mut Command) -> Self {
         Self::spawn(command.stdin(Stdio::null()))
     }
 
-    /// Starts a command that [`Running::say`] talks to.
-    pub fn start_listening(command: &mut Command) -> Self {
+    /// Starts a command whose standard input [`Running::write_line`] writes.
+    pub fn start_with_stdin(command: &mut Command) -> Self {
         Self::spawn(command.stdin(Stdio::piped()))
     }
 
@@ -97,40 +96,40 @@ impl Running {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap_or_else(|error| panic!("cannot start {name}: {error}"));
-        let stdout = Said::by(child.stdout.take().unwrap());
-        let stderr = Said::by(child.stderr.take().unwrap());
+        let stdout = Capture::start(child.stdout.take().unwrap());
+        let stderr = Capture::start(child.stderr.take().unwrap());
         Self { stdin: child.stdin.take(), child, stdout, stderr, name }
     }
 
-    /// Writes a line to its standard input.
-    pub fn say(&mut self, line: &str) {
-        let stdin = self.stdin.as_mut().expect("started with start_listening");
-        writeln!(stdin, "{line}").unwrap_or_else(|error| panic!("{} does not listen: {error}", self.name));
+    /// Writes a line to standard input.
+    pub fn write_line(&mut self, line: &str) {
+        let stdin = self.stdin.as_mut().expect("started with start_with_stdin");
+        writeln!(stdin, "{line}").unwrap_or_else(|error| panic!("cannot write to {}: {error}", self.name));
     }
 
-    /// What it has written to standard output so far.
+    /// Returns standard output so far.
     pub fn stdout(&self) -> String {
         self.stdout.so_far()
     }
 
-    /// The process id.
+    /// Returns the process id.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
 
-    /// What it has written to standard error so far.
+    /// Returns standard error so far.
     pub fn stderr(&self) -> String {
         self.stderr.so_far()
     }
 
-    /// Waits until standard error contains `words`.
+    /// Waits until standard error contains `words`. Fails the test where the process ends first.
     pub fn wait_for(&mut self, words: &str) {
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TIME_LIMIT;
         while !self.stderr().contains(words) {
             let ended = self.child.try_wait().unwrap();
             assert!(
                 ended.is_none() && Instant::now() < deadline,
-                "{} never said `{words}`; {ended:?}; it said:\n{}",
+                "{} did not write `{words}`; {ended:?}; standard error:\n{}",
                 self.name,
                 self.stderr()
             );
@@ -143,7 +142,7 @@ impl Running {
         signal(self.id(), name);
     }
 
-    /// Ids of the processes that this one has started and that still run (not those that only wait to be reaped).
+    /// Returns the ids of the child processes that run, without zombies.
     pub fn children(&self) -> Vec<u32> {
         let output = Command::new("ps").args(["-o", "pid=,stat=", "--ppid", &self.id().to_string()]).output();
         let text = String::from_utf8(output.unwrap().stdout).unwrap();
@@ -151,23 +150,21 @@ impl Running {
         alive.map(|line| line.split_whitespace().next().unwrap().parse().unwrap()).collect()
     }
 
-    /// Waits for the end.
+    /// Waits for the end of the process.
     pub fn finish(mut self) -> Outcome {
         let status = self.wait();
-        // Readers end when nobody holds the pipes any more: a grandchild that lives on would show here.
-        Outcome { code: status.code(), stdout: self.stdout.whole(), stderr: self.stderr.whole() }
+        // The streams end when no process has their pipes open. A grandchild that still runs would block here.
+        Outcome { code: status.code(), stdout: self.stdout.finish(), stderr: self.stderr.finish() }
     }
 
     fn wait(&mut self) -> ExitStatus {
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TIME_LIMIT;
         loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 return status;
             }
             if Instant::now() > deadline {
-                let mut complaint = format!("{} does not end; it said:\n", self.name);
-                write!(complaint, "{}", self.stderr()).unwrap();
-                panic!("{complaint}");
+                panic!("{} does not end; standard error:\n{}", self.name, self.stderr());
             }
             thread::sleep(Duration::from_millis(5));
         }
@@ -176,23 +173,23 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It may have ended already; then neither matters.
+        // Both fail where the process has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Sends a signal to any process.
+/// Sends a signal to a process.
 pub(crate) fn signal(id: u32, name: &str) {
     let status = Command::new("kill").args([&format!("-{name}"), &id.to_string()]).status().unwrap();
     assert!(status.success(), "cannot send {name} to {id}");
 }
 
-/// Waits until a condition holds; fails the test with `what` if it never does.
+/// Waits until a condition is true. Fails the test with `what` at the time limit.
 pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + TIME_LIMIT;
     while !condition() {
-        assert!(Instant::now() < deadline, "waited in vain until {what}");
+        assert!(Instant::now() < deadline, "the time limit is over before {what}");
         thread::sleep(Duration::from_millis(10));
     }
 }

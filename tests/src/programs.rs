@@ -1,20 +1,20 @@
-//! The programs under test, built as the test itself was built.
+//! The programs under test, built with the profile of the test itself.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// `rayfarm-master`, ready for arguments.
+/// Returns a command that runs `rayfarm-master`.
 pub fn master() -> Command {
     Command::new(folder().join(format!("rayfarm-master{}", std::env::consts::EXE_SUFFIX)))
 }
 
-/// `rayfarm-worker`, ready for arguments.
+/// Returns a command that runs `rayfarm-worker`.
 pub fn worker() -> Command {
     Command::new(folder().join(format!("rayfarm-worker{}", std::env::consts::EXE_SUFFIX)))
 }
 
-/// Where cargo puts programs; builds them first, so that no test runs yesterday's.
+/// Builds the programs once per process, so that no test runs an outdated one. Returns their folder.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -22,7 +22,7 @@ fn folder() -> &'static Path {
         let test = std::env::current_exe().unwrap();
         let profile = test.parent().and_then(Path::parent).unwrap().to_path_buf();
         let mut build = Command::new(env!("CARGO"));
-        // With what `cargo test` builds as well: what they share is then built once.
+        // The same targets as `cargo test` builds, so that their dependencies are built once.
         build.args(["build", "--quiet", "--workspace", "--lib", "--bins", "--examples", "--tests"]);
         build.arg("--target-dir").arg(profile.parent().unwrap());
         if profile.ends_with("release") {

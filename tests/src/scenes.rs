@@ -1,32 +1,30 @@
-//! Scenes and folders for tests.
+//! Scenes and temporary folders for tests.
 
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// The project's top folder.
+use crate::require::require_file;
+
+/// Returns the top folder of the project.
 pub fn project_root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// A file of the meshes and workloads that lie beside the project on some machines. Where they do not, says so and
-/// returns `None`: the test is then skipped.
+/// Returns the path of a mesh or a workload in the folder `../shared` of the project, which some machines have. Where the
+/// file does not exist, prints a skip and returns `None`: the test is to return then.
 pub fn shared(file: &str) -> Option<PathBuf> {
     let path = project_root().join("../shared").join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there", path.display());
-    None
+    require_file(&path).then_some(path)
 }
 
-/// A folder with a few small scenes in it, gone after the test.
+/// A temporary folder with the scene `small.toml` and its mesh `bumps.obj`. Removed when it is dropped.
 pub struct Scenes {
     folder: TempDir,
 }
 
 impl Scenes {
-    /// Writes them.
+    /// Makes the folder and writes its files.
     pub fn new() -> Self {
         let scenes = Self { folder: tempfile::tempdir().unwrap() };
         scenes.write("small.toml", SMALL);
@@ -34,12 +32,12 @@ impl Scenes {
         scenes
     }
 
-    /// Path of a file in the folder.
+    /// Returns the path of a file in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Writes a file into the folder.
+    /// Writes a file in the folder and returns its path.
     pub fn write(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
         std::fs::write(self.path(name), text).unwrap();
         self.path(name)
@@ -50,7 +48,7 @@ impl Scenes {
         std::fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// Names of all files in the folder.
+    /// Returns the names of all files in the folder.
     pub fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.folder.path()).unwrap();
         entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
@@ -63,7 +61,7 @@ impl Default for Scenes {
     }
 }
 
-/// Two placements of one mesh over a plane, a sphere, a point and a spot light.
+/// A scene with two models of one mesh, a plane, a sphere, a point light and a spot light.
 const SMALL: &str = r#"
 ambient = [0.05, 0.05, 0.05]
 
@@ -120,7 +118,7 @@ normal = [0.0, 1.0, 0.0]
 material = "clay"
 "#;
 
-/// A sheet of n x n squares with bumps, two units wide.
+/// Returns an OBJ file with a bumpy sheet of n x n squares, two units wide.
 pub fn bumps(n: u32) -> String {
     use std::fmt::Write;
     let mut obj = String::from("# a bumpy sheet\n");

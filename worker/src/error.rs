@@ -1,63 +1,61 @@
-//! Why a worker ends without having been asked to.
+//! Errors that end a worker.
 
 use rayfarm_protocol::ProtocolError;
 
-/// Why a worker gave up.
+/// Error that ends a worker, or a session where the worker reconnects.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkerError {
-    /// The master's address has no meaning on this machine.
-    #[error(
-        "cannot resolve the master's address {master}: {source}; it must be HOST:PORT, and the host known here"
-    )]
+    /// The master's address does not resolve on this machine.
+    #[error("cannot resolve the master's address {master}: {source}; expected HOST:PORT with a known host")]
     Resolve {
-        /// What was asked for.
+        /// Address of the master.
         master: String,
-        /// The resolver's answer.
+        /// Error of the resolver.
         source: std::io::Error,
     },
 
-    /// Nobody answers there.
+    /// No process accepts connections at the master's address.
     #[error(
         "cannot connect to the master at {master}: {source}; is it running, listening there, and not behind a firewall?"
     )]
     Connect {
-        /// What was asked for.
+        /// Address of the master.
         master: String,
-        /// The system's answer.
+        /// Error of the system.
         source: std::io::Error,
     },
 
-    /// Somebody answers, but we did not come to terms.
+    /// The handshake with the process at the master's address failed.
     #[error("no session with the master at {master}: {source}")]
     Handshake {
-        /// What was asked for.
+        /// Address of the master.
         master: String,
-        /// Why.
+        /// Error of the handshake.
         source: ProtocolError,
     },
 
-    /// A session ended without a goodbye.
+    /// A session ended without a disconnect.
     #[error("lost the master at {master}: {why}")]
     Lost {
-        /// What was asked for.
+        /// Address of the master.
         master: String,
-        /// Why.
+        /// Reason for the end.
         why: String,
     },
 
-    /// This machine does not give us threads.
-    #[error("cannot start {threads} render threads: {source}; ask for fewer with --threads")]
+    /// The system does not start the threads.
+    #[error("cannot start {threads} render threads: {source}; request fewer with --threads")]
     Threads {
-        /// How many were asked for.
+        /// Number of threads requested.
         threads: usize,
-        /// The system's answer.
+        /// Error of the system.
         source: std::io::Error,
     },
 }
 
 impl WorkerError {
-    /// Whether connecting again later can help.
-    pub(crate) fn is_passing(&self) -> bool {
+    /// Whether a later attempt to connect can succeed.
+    pub(crate) fn is_transient(&self) -> bool {
         match self {
             Self::Resolve { .. } | Self::Connect { .. } | Self::Lost { .. } => true,
             Self::Handshake { source, .. } => !source.is_final(),

@@ -1,58 +1,34 @@
-//! A render node: connects to a master, fetches what it lacks, and traces the rows it is told to with all its cores.
+//! A render node of rayfarm: it connects to a master, fetches scenes, and traces the rows of its leases with all cores.
 //!
-//! The way of a frame through this crate:
+//! From the connection to the pixels:
 //!
-//! 1. `client` connects, introduces itself, and comes back when the connection fails.
-//! 2. `desk` takes the master's messages and decides what they lead to. It is pure: no socket, no thread, no clock.
-//! 3. `scene_loader` fetches a scene by hash (`transfer`), keeps it (`asset_store`), and leaves its assets to later runs (`disk_cache`); `frames` holds the leases of a
-//!    frame until it is ready.
-//! 4. What comes in may be passed on: `fetch` gets an asset from another worker, `share` gives what is on the `shelf`.
-//! 5. `duty` performs what the desk decided: sends, decodes and compiles on blocking threads and the `build_pool`, as long as the
-//!    result is `wanted`, and hands out leases.
-//! 6. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
+//! 1. `app` connects, performs the handshake, and reconnects after a failure.
+//! 2. `session` has the state machine of a session (`state`: messages in, effects out, no socket, no thread, no clock)
+//!    and the runner that performs its effects. `frames` queues the leases of a frame until the frame is ready.
+//! 3. `scenes` loads a scene by the hash of its body: assets come from memory, from the disk, from the master or from
+//!    another worker, and are decoded and compiled on threads of their own.
+//! 4. `peer` transfers assets between workers.
+//! 5. `render_pool` cuts leases into bands, renders and encodes them, and sends finished leases as pixels.
 //!
-//! What is drawn, and how, is behind [`Renderer`]; the real one is [`TracerRenderer`].
+//! A [`Renderer`] decodes scenes and renders rows. [`TracerRenderer`] is the one of `rayfarm_tracer`; tests have another.
+//! Folders depend on each other in one direction: app, session, scenes and render pool, peer.
 
-mod asset_store;
-mod buffers;
-mod build_pool;
-pub mod cli;
-mod client;
-mod desk;
-mod disk_cache;
-#[cfg(test)]
-mod disk_tests;
-mod disk_writer;
-mod duty;
-#[cfg(test)]
-mod duty_tests;
-mod ending;
+mod app;
+mod cancel;
+mod catch_panic;
 mod error;
-mod fetch;
-mod frames;
-mod growing;
-mod guard;
-mod job_queue;
-mod pause;
+mod peer;
 mod render_pool;
 mod renderer;
-mod scene_loader;
-mod share;
+mod scenes;
+mod session;
+mod shutdown;
 #[cfg(test)]
-mod share_tests;
-mod shelf;
-mod silence;
-#[cfg(test)]
-mod testing;
+mod tests;
 mod tracer;
-mod transfer;
-mod waiting;
-mod wanted;
-#[cfg(test)]
-mod wanted_tests;
 
-pub use client::{DiskCacheOptions, Share, WorkerOptions, run, run_with};
-pub use ending::Ending;
+pub use app::{DiskCacheOptions, Share, WorkerOptions, cli, run, run_with};
 pub use error::WorkerError;
-pub use renderer::{Cancelled, Counts, Renderer};
+pub use renderer::{Cancelled, RayCounts, Renderer};
+pub use shutdown::ShutdownHandle;
 pub use tracer::TracerRenderer;

@@ -1,4 +1,4 @@
-//! `rayfarm-worker`: a render node.
+//! `rayfarm-worker`: a render node of rayfarm.
 
 use std::process::ExitCode;
 

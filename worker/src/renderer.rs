@@ -1,61 +1,61 @@
-//! What a worker needs of a ray tracer, and nothing more: tests and simulations put in their own.
+//! The interface between a worker and a ray tracer. Tests and simulations implement it as well.
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use rayfarm_protocol::{AssetId, FrameAnnounce};
 
-/// Rays traced for some rows.
+/// Numbers of rays traced for some rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// From the camera.
+pub struct RayCounts {
+    /// Rays from the camera.
     pub primary: u64,
-    /// Towards lights.
+    /// Rays to lights.
     pub shadow: u64,
-    /// Reflected and transmitted.
+    /// Reflected and transmitted rays.
     pub secondary: u64,
 }
 
-/// Rendering was told to stop.
+/// Rendering ended early because it was cancelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cancelled;
 
-/// Bytes in, pixels out. Errors are texts for people: they travel to the master as the reason of a failure.
+/// Decoder of scenes and renderer of rows. Errors are texts, which the master receives as the reason of a failed frame.
 ///
-/// Everything but [`render`](Self::render) runs on a blocking thread, never on one that serves the network. A panic
-/// anywhere is caught, and becomes such a reason. What takes its time asks `cancelled` now and then.
+/// All methods but [`render`](Self::render) run on blocking threads, never on a thread that serves the network. A panic
+/// in any method is caught and becomes such a text. Long work polls `cancelled` between steps.
 pub trait Renderer: Send + Sync + 'static {
-    /// A scene body, decoded, before its parts are there.
+    /// Decoded scene body without its parts.
     type Draft: Send + 'static;
-    /// What a scene names by hash: a mesh, a texture.
+    /// Decoded asset that a scene body names by hash: a mesh or a texture.
     type Part: Send + Sync + 'static;
-    /// A scene with its parts.
+    /// Compiled scene: a body with all its parts.
     type Scene: Send + Sync + 'static;
-    /// One frame of it, shared by the render threads.
+    /// Prepared frame of a scene, shared by the render threads.
     type Frame: Send + Sync + 'static;
 
-    /// The SIMD level, for the master's log.
+    /// Name of the SIMD level, for the master's log.
     fn simd(&self) -> String;
 
-    /// Most rows of a frame that should be rendered in one go; bands begin on multiples of it.
+    /// Number of rows in a band: bands begin at its multiples, and one thread renders a band.
     fn band_rows(&self, frame: &Self::Frame) -> u32;
 
-    /// Decodes a scene body, and names the parts it needs.
+    /// Decodes a scene body and lists the parts that it names.
     ///
     /// # Errors
-    /// Bytes that are no scene, or one that breaks a rule.
+    /// Bytes that are no scene; an invalid scene.
     fn decode_scene(&self, body: &[u8]) -> Result<(Self::Draft, Vec<AssetId>), String>;
 
-    /// Takes a part in. The bytes are freed afterwards.
+    /// Decodes a part. Its bytes are freed afterwards.
     ///
     /// # Errors
-    /// Bytes that are no part of any kind.
+    /// Bytes that are no part.
     fn decode_part(&self, bytes: &[u8]) -> Result<Self::Part, String>;
 
-    /// Puts a scene and all its parts together.
+    /// Compiles a scene from its body and all its parts.
     ///
     /// # Errors
-    /// When they do not fit; or when `cancelled` says so, then the text is of no use.
+    /// Parts that do not match the body; a cancellation, whose text is discarded.
     fn compile(
         &self,
         draft: Self::Draft,
@@ -63,10 +63,10 @@ pub trait Renderer: Send + Sync + 'static {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self::Scene, String>;
 
-    /// Prepares a frame: its view is decoded, and must agree with the announced size.
+    /// Prepares a frame of a scene. The view must match the announced size.
     ///
     /// # Errors
-    /// A view that cannot be rendered; or when `cancelled` says so, then the text is of no use.
+    /// A view that cannot be rendered; a cancellation, whose text is discarded.
     fn prepare(
         &self,
         scene: Arc<Self::Scene>,
@@ -74,18 +74,19 @@ pub trait Renderer: Send + Sync + 'static {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self::Frame, String>;
 
-    /// Whether every pixel of this frame has one of the colours that take two bytes on the wire.
-    fn is_narrow(&self, frame: &Self::Frame) -> bool;
+    /// Whether every pixel of the frame has a colour of RGB 5-6-5, so that it takes two bytes on the wire.
+    fn is_rgb565(&self, frame: &Self::Frame) -> bool;
 
-    /// Renders rows into `out`: `rows.len() * width * 3` bytes, RGB8, sRGB.
+    /// Renders rows into `out`, from top to bottom without gaps, in the format
+    /// [`PixelFormat::SEGMENT`](rayfarm_protocol::PixelFormat::SEGMENT).
     ///
     /// # Errors
-    /// When `cancelled` said so; what `out` holds then is worth nothing.
+    /// A cancellation. The content of `out` is unspecified then.
     fn render(
         &self,
         frame: &Self::Frame,
         rows: Range<u32>,
         out: &mut [u8],
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<Counts, Cancelled>;
+    ) -> Result<RayCounts, Cancelled>;
 }

@@ -1,4 +1,4 @@
-//! The real renderer.
+//! The renderer of `rayfarm_tracer`.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,19 +10,19 @@ use rayfarm_tracer::scene::{ColorDepth, FrameView, Scene};
 use rayfarm_tracer::texture::{self, Texture};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
-use crate::renderer::{Cancelled, Counts, Renderer};
+use crate::renderer::{Cancelled, RayCounts, Renderer};
 
-/// `rayfarm_tracer`, fed with bytes: scene bodies and views as the codec writes [`Scene`] and [`FrameView`], meshes as
-/// [`CompiledMesh::bytes`], textures as [`Texture::bytes`].
+/// Renderer of `rayfarm_tracer`. Scene bodies and views are [`Scene`] and [`FrameView`] as the codec encodes them, meshes
+/// are [`CompiledMesh::bytes`], textures are [`Texture::bytes`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TracerRenderer;
 
-/// What a scene names by hash.
+/// Decoded asset that a scene names by hash.
 #[derive(Debug)]
 pub enum Part {
-    /// Triangles.
+    /// A compiled mesh.
     Mesh(Arc<CompiledMesh>),
-    /// A picture.
+    /// A texture.
     Texture(Arc<Texture>),
 }
 
@@ -89,13 +89,13 @@ impl Renderer for TracerRenderer {
         let (width, height) = (announce.width, announce.height);
         if (view.width, view.height) != (width, height) {
             let (w, h) = (view.width, view.height);
-            return Err(format!("the frame is announced as {width} x {height}, its view says {w} x {h}"));
+            return Err(format!("the frame is announced as {width} x {height}, its view has {w} x {h}"));
         }
         PreparedFrame::new_unless(scene, &view, cancelled)
             .map_err(|error| format!("the frame cannot be prepared: {error}"))
     }
 
-    fn is_narrow(&self, frame: &PreparedFrame) -> bool {
+    fn is_rgb565(&self, frame: &PreparedFrame) -> bool {
         frame.view().quality.colors == ColorDepth::Reduced
     }
 
@@ -105,8 +105,8 @@ impl Renderer for TracerRenderer {
         rows: Range<u32>,
         out: &mut [u8],
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<Counts, Cancelled> {
+    ) -> Result<RayCounts, Cancelled> {
         let counts = render_rows(frame, rows, out, cancelled).map_err(|_| Cancelled)?;
-        Ok(Counts { primary: counts.primary, shadow: counts.shadow, secondary: counts.secondary })
+        Ok(RayCounts { primary: counts.primary, shadow: counts.shadow, secondary: counts.secondary })
     }
 }

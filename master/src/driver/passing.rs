@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use rayfarm_protocol::passing::{ShareKey, token};
+use rayfarm_protocol::peer::{ShareKey, Token};
 use rayfarm_protocol::{AssetId, ToWorker};
 
 use super::Driver;
@@ -37,7 +37,7 @@ impl Driver {
             return false;
         }
         let Some((peer, key)) = inner.roster.source(now, worker, id, again) else { return false };
-        let message = ToWorker::AssetFrom { id, size: size as u64, peer, token: token(&key, id) };
+        let message = ToWorker::AssetFrom { id, size: size as u64, peer, token: Token::new(&key, id) };
         let lost = send(&mut inner, worker, message);
         lost.into_iter().for_each(|event| self.drive(&mut inner, event));
         true

@@ -1,6 +1,6 @@
 //! From the bytes of a lease, however they are written, to its rows: RGB8.
 
-use rayfarm_protocol::pixels::{BlockError, narrow_bytes, unpack, widen};
+use rayfarm_protocol::pixels::{BlockError, from_rgb565, rgb565_bytes, unpack};
 use rayfarm_protocol::{Encoding, Lease};
 
 /// Pixels that do not fit their lease.
@@ -32,17 +32,17 @@ impl Decoder {
     ) -> Result<(), Misfit> {
         let misfit = |expected| Misfit::Bytes { lease, expected, got: bytes.len() };
         let torn = |source| Misfit::Blocks { lease, source };
-        let narrow = narrow_bytes(target.len());
+        let narrow = rgb565_bytes(target.len());
         match encoding {
             Encoding::Raw if target.len() == bytes.len() => target.copy_from_slice(bytes),
             Encoding::Raw => return Err(misfit(target.len())),
             Encoding::Lz4 => unpack(bytes, target).map_err(torn)?,
-            Encoding::Narrow if widen(bytes, target) => {}
-            Encoding::Narrow => return Err(misfit(narrow)),
-            Encoding::NarrowLz4 => {
+            Encoding::Rgb565 if from_rgb565(bytes, target) => {}
+            Encoding::Rgb565 => return Err(misfit(narrow)),
+            Encoding::Rgb565Lz4 => {
                 self.narrow.resize(narrow, 0);
                 unpack(bytes, &mut self.narrow).map_err(torn)?;
-                if !widen(&self.narrow, target) {
+                if !from_rgb565(&self.narrow, target) {
                     return Err(misfit(narrow));
                 }
             }

@@ -148,7 +148,7 @@ const NARROW: [u8; 6] = [0x01, 0xfc, 0, 0, 0xff, 0x17];
 
 #[test]
 fn narrow_pixels_are_widened_into_their_rows() {
-    for (encoding, bytes) in [(Encoding::Narrow, NARROW.to_vec()), (Encoding::NarrowLz4, packed(&NARROW, 4))]
+    for (encoding, bytes) in [(Encoding::Rgb565, NARROW.to_vec()), (Encoding::Rgb565Lz4, packed(&NARROW, 4))]
     {
         let framebuffers = opened(1, 4);
         write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
@@ -164,11 +164,11 @@ fn narrow_pixels_are_widened_into_their_rows() {
 fn narrow_pixels_of_another_length_are_refused() {
     let framebuffers = opened(1, 3);
     for got in [0, 5, 7, 9] {
-        let refused = framebuffers.write(A, lease(0, 3), Encoding::Narrow, &vec![0; got]).unwrap_err();
+        let refused = framebuffers.write(A, lease(0, 3), Encoding::Rgb565, &vec![0; got]).unwrap_err();
         assert_eq!(refused, Misfit::Bytes { lease: lease(0, 3), expected: 6, got });
     }
     for broken in [packed(&NARROW[..5], 6), packed(&FEW_COLORS, 9), vec![0xff; 40]] {
-        let refused = framebuffers.write(A, lease(0, 3), Encoding::NarrowLz4, &broken).unwrap_err();
+        let refused = framebuffers.write(A, lease(0, 3), Encoding::Rgb565Lz4, &broken).unwrap_err();
         assert!(matches!(refused, Misfit::Blocks { .. }), "{refused}");
     }
     write(&framebuffers, lease(0, 3), &[7; 9]).unwrap();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use rayfarm_protocol::AssetId;
-use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, PEER_PATIENCE};
+use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, PEER_TIMEOUT};
 use serde::Serialize;
 
 use super::SECOND;
@@ -265,7 +265,7 @@ impl Net {
         if !hangs {
             self.chains.left(id);
         }
-        let after = if hangs { PEER_PATIENCE.as_nanos() as u64 } else { self.setup.round_trip / 2 };
+        let after = if hangs { PEER_TIMEOUT.as_nanos() as u64 } else { self.setup.round_trip / 2 };
         for follower in self.followers(id) {
             let Some(node) = self.nodes.get(&follower).filter(|node| node.chunks < self.chunks) else {
                 continue;

@@ -1,12 +1,12 @@
-//! How a connection begins: who is there, do the versions agree, is this worker wanted.
+//! The beginning of a connection: roles, versions, and the master's decision about the worker.
 //!
-//! 1. Both sides send a preamble (magic, version, role) and read the other's, before any codec.
-//! 2. Versions differ: both sides know both numbers and say so; the master also sends them as plain text.
-//! 3. The worker sends [`Hello`], the master answers [`Welcome`], a refusal with its reason, or a goodbye where it may
-//!    take the worker later.
+//! 1. Each end sends a preamble (magic, version, role) and reads the preamble of the other, before any codec.
+//! 2. Where the versions differ, both ends report both numbers. The master also sends them as plain text.
+//! 3. The worker sends [`Hello`]. The master replies with [`Welcome`], with a refusal and its reason, or with a disconnect
+//!    where it may accept the worker later.
 //!
-//! All of it has one deadline, [`limits::HANDSHAKE_DEADLINE`], and no envelope in it is longer than
-//! [`limits::MAX_CONTROL_BYTES`]. Not a byte behind the handshake is read.
+//! One deadline covers all steps: [`HANDSHAKE_DEADLINE`]. No envelope of a handshake has a body longer than
+//! [`MAX_CONTROL_BYTES`](crate::limits::MAX_CONTROL_BYTES), and no byte after the handshake is read.
 
 mod preamble;
 
@@ -17,18 +17,19 @@ use tokio::time::timeout;
 use crate::envelope::{Envelope, Kind, read_body, read_header};
 use crate::limits::{HANDSHAKE_DEADLINE, MAX_NAME_BYTES, MAX_THREADS};
 use crate::message::{
-    Reconnect, decode_control, decode_goodbye, decode_reason, encode_control, encode_goodbye, encode_reason,
+    Reconnect, decode_control, decode_disconnect, decode_reason, encode_control, encode_disconnect,
+    encode_reason,
 };
 use crate::{Hello, ProtocolError, Role, Welcome};
 
 use preamble::Preamble;
 
-/// Why a master does not take a worker, for people.
+/// Reason, as text, for which a master does not accept a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// Trying again gives the same answer.
+    /// The master will never accept the worker.
     Final(String),
-    /// It may take the worker later.
+    /// The master may accept the worker later.
     NotNow(String),
 }
 
@@ -44,16 +45,16 @@ impl From<&str> for Refusal {
     }
 }
 
-/// Introduces a worker to the master at the other end. Overlong texts in `hello` are cut.
+/// Performs the worker's part of a handshake. Overlong texts in `hello` are cut.
 ///
 /// # Errors
-/// The peer is no master, is of another version, refuses for good or for now, closes, or is not done within the deadline.
+/// A peer that is no master, has another version, refuses the worker, closes, or does not finish in time.
 pub async fn as_worker<S>(io: &mut S, hello: &Hello) -> Result<Welcome, ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
     within_deadline(async {
-        agree(io, Role::Worker).await?;
+        exchange_preambles(io, Role::Worker).await?;
         let short = |text: &str| cut(text, MAX_NAME_BYTES).to_owned();
         let hello = Hello {
             name: short(&hello.name),
@@ -68,19 +69,19 @@ where
     .await
 }
 
-/// Hears a worker out and lets `decide` take it or refuse it with a reason.
+/// Performs the master's part of a handshake. `decide` accepts or refuses the worker.
 ///
 /// # Errors
-/// The peer is no worker, is of another version, was refused, closes, or is not done within the deadline.
+/// A peer that is no worker, has another version, is refused, closes, or does not finish in time.
 pub async fn as_master<S, D>(io: &mut S, decide: D) -> Result<Hello, ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
     D: FnOnce(&Hello) -> Result<Welcome, Refusal>,
 {
     within_deadline(async {
-        if let Err(error) = agree(io, Role::Master).await {
+        if let Err(error) = exchange_preambles(io, Role::Master).await {
             if matches!(error, ProtocolError::Version { .. } | ProtocolError::SameRole { .. }) {
-                tell(io, &error.to_string()).await;
+                send_refusal(io, &error.to_string()).await;
             }
             return Err(error);
         }
@@ -94,12 +95,12 @@ where
                 Ok(hello)
             }
             Err(Refusal::Final(reason)) => {
-                tell(io, &reason).await;
+                send_refusal(io, &reason).await;
                 Err(ProtocolError::Refused { by: Role::Master, reason })
             }
             Err(Refusal::NotNow(reason)) => {
-                // Best effort, as for a refusal.
-                let _ = send(io, encode_goodbye(&reason, Reconnect::Now)?).await;
+                // The refusal is the result, whether the worker receives it or not.
+                let _ = send(io, encode_disconnect(&reason, Reconnect::Now)?).await;
                 let _ = io.shutdown().await;
                 Err(ProtocolError::NotNow { reason })
             }
@@ -108,7 +109,8 @@ where
     .await
 }
 
-async fn agree<S>(io: &mut S, our_role: Role) -> Result<(), ProtocolError>
+/// Exchanges preambles, and checks that the roles differ and the versions match.
+async fn exchange_preambles<S>(io: &mut S, our_role: Role) -> Result<(), ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
@@ -122,18 +124,21 @@ where
     Ok(())
 }
 
-/// A worker's account of itself is printed and shown: it must be short, printable and not absurd.
+/// Validates a worker's introduction and makes its texts printable, because they are logged and displayed.
 fn checked_hello(hello: Hello) -> Result<Hello, String> {
     let texts = [("name", &hello.name), ("SIMD level", &hello.simd), ("software version", &hello.software)];
     if let Some((what, text)) = texts.into_iter().find(|(_, text)| text.len() > MAX_NAME_BYTES) {
-        return Err(format!("the worker's {what} has {} bytes, at most {MAX_NAME_BYTES} fit", text.len()));
+        return Err(format!(
+            "the worker's {what} has {} bytes, at most {MAX_NAME_BYTES} are allowed",
+            text.len()
+        ));
     }
     if hello.threads == 0 {
         return Err("a worker needs at least one render thread".to_owned());
     }
     if hello.threads > MAX_THREADS {
         return Err(format!(
-            "the worker claims {} render threads, at most {MAX_THREADS} are believed",
+            "the worker has {} render threads, at most {MAX_THREADS} are accepted",
             hello.threads
         ));
     }
@@ -151,14 +156,15 @@ async fn send(io: &mut (impl AsyncWrite + Unpin), envelope: Envelope) -> Result<
     io.flush().await.map_err(|source| ProtocolError::Io { doing: "sending", source })
 }
 
-/// Best effort: the error that is told is the one that counts, not that the peer did not hear it.
-async fn tell(io: &mut (impl AsyncWrite + Unpin), reason: &str) {
+/// Sends a refusal and closes. A failure to send is ignored: the refusal itself is the error to report.
+async fn send_refusal(io: &mut (impl AsyncWrite + Unpin), reason: &str) {
     if let Ok(envelope) = encode_reason(Kind::Refused, &[], reason) {
         let _ = send(io, envelope).await;
         let _ = io.shutdown().await;
     }
 }
 
+/// Receives the body of a message of type `wanted`. A refusal or a disconnect of the master becomes an error.
 async fn receive(
     io: &mut (impl AsyncRead + Unpin),
     wanted: Kind,
@@ -171,8 +177,8 @@ async fn receive(
             let reason = decode_reason(&read_body(io, header).await?);
             Err(ProtocolError::Refused { by: Role::Master, reason })
         }
-        Kind::Goodbye if wanted == Kind::Welcome => {
-            let (reason, _) = decode_goodbye(read_body(io, header).await?)?;
+        Kind::Disconnect if wanted == Kind::Welcome => {
+            let (reason, _) = decode_disconnect(read_body(io, header).await?)?;
             Err(ProtocolError::NotNow { reason })
         }
         kind => Err(ProtocolError::Unexpected { kind, expected }),

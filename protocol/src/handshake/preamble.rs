@@ -1,5 +1,5 @@
-//! The first twelve bytes of either side: magic, version, role. Their layout never changes, so that any two releases
-//! can tell each other apart.
+//! The first twelve bytes from either end: magic, version (little endian), role. Their layout never changes, so that any
+//! two releases can report their mismatch.
 //!
 //! ```text
 //! 0           8         10     11
@@ -14,7 +14,7 @@ use crate::{PROTOCOL_VERSION, ProtocolError, Role};
 pub(crate) const PREAMBLE_BYTES: usize = 12;
 const MAGIC: [u8; 8] = *b"RAYFARM\n";
 
-/// What the peer is and speaks.
+/// Version and role of one end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Preamble {
     pub(crate) version: u16,
@@ -40,7 +40,7 @@ fn role_byte(role: Role) -> u8 {
     }
 }
 
-/// Sends ours and reads theirs at the same time: a pipe may be narrower than a preamble.
+/// Sends this end's preamble and reads the peer's concurrently: a pipe may hold less than one preamble.
 pub(crate) async fn exchange<S>(io: &mut S, our_role: Role) -> Result<Preamble, ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
@@ -50,14 +50,14 @@ where
         writer.write_all(&Preamble::ours(our_role).to_bytes()).await?;
         writer.flush().await
     };
-    // What the peer says explains more than that it did not listen, so a failed write waits for the read.
+    // The peer's bytes explain more than a failed write does, so the read is finished first.
     let (sent, theirs) = tokio::try_join!(async { Ok(sending.await) }, read(&mut reader, our_role.peer()))?;
     sent.map_err(|source| ProtocolError::Io { doing: "sending the preamble", source })?;
     Ok(theirs)
 }
 
-/// Reads the peer's, and gives up at the first byte that does not fit: a peer that speaks something else may never
-/// send twelve.
+/// Reads the peer's preamble, and fails at the first byte that differs from the magic: another program may never send
+/// twelve bytes.
 async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Preamble, ProtocolError> {
     let mut bytes = [0; PREAMBLE_BYTES];
     let mut filled = 0;
@@ -65,7 +65,7 @@ async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Pream
         let room = bytes.get_mut(filled..).unwrap_or_default();
         let read = io.read(room).await;
         match read.map_err(|source| ProtocolError::Io { doing: "waiting for the preamble", source })? {
-            0 if filled == 0 => return Err(ProtocolError::Closed { at: "before it said anything" }),
+            0 if filled == 0 => return Err(ProtocolError::Closed { at: "before it sent anything" }),
             0 => return Err(ProtocolError::Closed { at: "in the middle of the preamble" }),
             more => filled += more,
         }
@@ -86,7 +86,7 @@ async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Pream
     Ok(Preamble { version: u16::from_le_bytes([v0, v1]), role })
 }
 
-/// Names the usual things that listen on, or knock at, a wrong port.
+/// Describes the first bytes of another program, and names its protocol where it is a common one.
 fn describe(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let text = printable(&text);
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bytes_are_these() {
+    fn golden_bytes() {
         let master = Preamble { version: 0x0102, role: Role::Master };
         assert_eq!(master.to_bytes(), *b"RAYFARM\n\x02\x01\x01\0");
         let worker = Preamble { version: 1, role: Role::Worker };
@@ -124,7 +124,7 @@ mod tests {
             (b"\x16\x03\x01\x02\0\x01\0", "TLS"),
             (b"\0\x01\x02", "began with"),
             (b"RAYFARM", "closed"),
-            (b"", "before it said anything"),
+            (b"", "before it sent anything"),
             (b"RAYFARM\n\x01\0\x07\0", "unknown role 7"),
         ] {
             let message = read(&mut &*bytes, Role::Master).await.unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! What the two sides say. Every message knows its envelope, and the other way round.
+//! The messages of a session, and their conversion to and from envelopes.
 
 mod body;
 mod to_master;
@@ -13,72 +13,75 @@ use crate::{AssetId, FrameId, ProtocolError};
 pub use to_master::ToMaster;
 pub use to_worker::ToWorker;
 
+#[cfg(feature = "transport")]
 pub(crate) use body::{decode_control, decode_reason, encode_control, encode_reason};
-pub(crate) use to_worker::{decode_goodbye, encode_goodbye};
+#[cfg(feature = "transport")]
+pub(crate) use to_worker::{decode_disconnect, encode_disconnect};
 
-/// A worker says who it is. Texts are at most [`crate::limits::MAX_NAME_BYTES`] each.
+/// Introduction of a worker. Each text has at most [`crate::limits::MAX_NAME_BYTES`] bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
-    /// What people call the machine.
+    /// Name of the worker in logs and displays.
     pub name: String,
-    /// Render threads, at least 1.
+    /// Number of render threads, 1 to [`crate::limits::MAX_THREADS`].
     pub threads: u32,
-    /// The SIMD level chosen at run time, for the log.
+    /// SIMD level selected at run time, for the log.
     pub simd: String,
-    /// The release of the software.
+    /// Version of the worker's software.
     pub software: String,
 }
 
-/// A master takes a worker.
+/// Acceptance of a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
-    /// The worker's number in this run of the master.
+    /// Number of the worker within this run of the master.
     pub worker: u64,
 }
 
-/// When a worker whose session has ended may connect again.
+/// Whether, and when, a worker may connect again after the end of its session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reconnect {
-    /// Not to this master: the worker was meant to leave.
+    /// Not to this master: the end was intended.
     Never,
-    /// Now: this session has failed, and the master goes on.
+    /// At once: the session failed, and the master continues.
     Now,
-    /// When another master listens there: this one ends.
+    /// When another master listens at the address: this one ends.
     NextMaster,
 }
 
-/// A frame that leases may follow for. The same bytes go to every worker: `view` is serialised once and shared.
+/// Announcement of a frame whose leases may follow. `view` is serialised once, and its bytes go to every worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameAnnounce {
     /// The frame.
     pub frame: FrameId,
-    /// The scene body it shows.
+    /// The scene body that the frame shows.
     pub scene: AssetId,
-    /// Pixels per row, 1 to [`crate::limits::MAX_FRAME_SIDE`].
+    /// Number of pixels per row, 1 to [`crate::limits::MAX_FRAME_SIDE`].
     pub width: u32,
-    /// Rows, likewise.
+    /// Number of rows, 1 to [`crate::limits::MAX_FRAME_SIDE`].
     pub height: u32,
-    /// What changes from frame to frame, opaque here; at most [`crate::limits::MAX_VIEW_BYTES`].
+    /// Everything that changes from frame to frame, opaque to the protocol; at most [`crate::limits::MAX_VIEW_BYTES`]
+    /// bytes.
     pub view: Bytes,
 }
 
-/// One direction of a session: [`ToWorker`] or [`ToMaster`].
+/// Messages of one direction of a session: [`ToWorker`] or [`ToMaster`].
 pub trait Message: Sized + Send + 'static {
-    /// What this direction may carry, for error messages.
+    /// Description of the direction's messages, for errors.
     const EXPECTED: &'static str;
 
     /// Whether envelopes of this type belong to this direction.
     fn carries(kind: Kind) -> bool;
 
-    /// The message as an envelope; bulk bytes are shared, not copied.
+    /// Converts the message to an envelope. Bulk bytes are shared, not copied.
     ///
     /// # Errors
-    /// What breaks a bound of [`crate::limits`].
+    /// A value out of the bounds of [`crate::limits`].
     fn to_envelope(&self) -> Result<Envelope, ProtocolError>;
 
-    /// The message in the body of an envelope of type `kind`; bulk bytes stay where they are.
+    /// Converts the body of an envelope of type `kind` to a message. Bulk bytes are shared, not copied.
     ///
     /// # Errors
-    /// A body that is no such message, or breaks a bound.
+    /// A type of the other direction; a body that is no such message; a value out of bounds.
     fn from_body(kind: Kind, body: Bytes) -> Result<Self, ProtocolError>;
 }

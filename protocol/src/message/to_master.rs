@@ -1,60 +1,60 @@
-//! What a worker says.
+//! Messages from a worker to its master.
 
 use bytes::{Buf, Bytes};
 
 use super::Message;
-use super::body::{decode_control, decode_reason, encode_control, encode_reason, nothing, split_head};
+use super::body::{decode_control, decode_reason, encode_control, encode_reason, expect_empty, split_head};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::MAX_ASSET_BYTES;
 use crate::pixels::{PIXELS_HEAD_BYTES, PixelsHeader};
 use crate::{AssetId, FrameId, ProtocolError};
 
-/// What a worker says to its master.
+/// Message from a worker to its master.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ToMaster {
-    /// Send me this asset, or tell me who passes it on.
+    /// Requests an asset from the master, or the address of a worker that serves it.
     NeedAsset {
-        /// Its name.
+        /// The asset.
         id: AssetId,
-        /// From which byte on.
+        /// First byte that is requested.
         offset: u64,
-        /// Whether another worker was to pass it on and did not: the master is to send it itself.
+        /// Whether a transfer from another worker has failed, so that the master must send the asset itself.
         again: bool,
     },
-    /// I pass assets on, at the address from which I am connected.
+    /// Announces that the worker serves assets to other workers, at the address from which it is connected.
     Sharing {
-        /// The port where I listen for other workers.
+        /// The port at which it listens for other workers.
         port: u16,
     },
-    /// All of this asset is here, and bears its name.
+    /// Reports that all of an asset has arrived and matches its hash.
     HaveAsset {
-        /// Its name.
+        /// The asset.
         id: AssetId,
     },
-    /// The rows of a lease.
+    /// Delivers the rows of a lease.
     Pixels {
-        /// Which rows, how they are written, and what they cost.
+        /// Lease, encoding and cost.
         header: PixelsHeader,
-        /// The pixels.
+        /// The encoded pixels.
         bytes: Bytes,
     },
-    /// Answers a ping.
+    /// Replies to a ping.
     Pong {
-        /// The ping's number.
+        /// Number of the ping.
         nonce: u64,
     },
-    /// None of this frame's leases will be rendered here.
+    /// Reports that the worker renders none of a frame's leases.
     Failed {
         /// The frame.
         frame: FrameId,
-        /// Why, for people.
+        /// The reason, as text.
         reason: String,
     },
-    /// Give me no more leases; I finish those I hold.
+    /// Requests that the master sends no more leases. The worker finishes those that it has.
     Drain,
-    /// The last message.
-    Goodbye {
-        /// Why.
+    /// Ends the session. No message follows.
+    Disconnect {
+        /// The reason, as text.
         reason: String,
     },
 }
@@ -66,12 +66,14 @@ impl Message for ToMaster {
 
     fn carries(kind: Kind) -> bool {
         match kind {
-            Kind::NeedAsset | Kind::Pixels | Kind::Pong | Kind::Failed | Kind::Drain | Kind::Goodbye => true,
+            Kind::NeedAsset | Kind::Pixels | Kind::Pong | Kind::Failed | Kind::Drain | Kind::Disconnect => {
+                true
+            }
             Kind::Sharing | Kind::HaveAsset => true,
             Kind::Hello | Kind::Welcome | Kind::Refused => false,
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping => false,
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => false,
-            Kind::AssetFrom | Kind::ShareKey | Kind::Fetch => false,
+            Kind::AssetFrom | Kind::ShareKey | Kind::PeerRequest => false,
         }
     }
 
@@ -89,7 +91,7 @@ impl Message for ToMaster {
             Self::Pong { nonce } => encode_control(Kind::Pong, nonce),
             Self::Failed { frame, reason } => encode_reason(Kind::Failed, &frame.0.to_le_bytes(), reason),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
-            Self::Goodbye { reason } => encode_reason(Kind::Goodbye, &[], reason),
+            Self::Disconnect { reason } => encode_reason(Kind::Disconnect, &[], reason),
         }
     }
 
@@ -104,12 +106,12 @@ impl Message for ToMaster {
             Kind::Pixels => decode_pixels(body)?,
             Kind::Pong => Self::Pong { nonce: decode_control(kind, &body)? },
             Kind::Failed => decode_failed(body)?,
-            Kind::Drain => nothing(kind, &body).map(|()| Self::Drain)?,
-            Kind::Goodbye => Self::Goodbye { reason: decode_reason(&body) },
+            Kind::Drain => expect_empty(kind, &body).map(|()| Self::Drain)?,
+            Kind::Disconnect => Self::Disconnect { reason: decode_reason(&body) },
             Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping => return Err(unexpected(kind)),
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => return Err(unexpected(kind)),
-            Kind::AssetFrom | Kind::ShareKey | Kind::Fetch => return Err(unexpected(kind)),
+            Kind::AssetFrom | Kind::ShareKey | Kind::PeerRequest => return Err(unexpected(kind)),
         })
     }
 }
@@ -122,11 +124,15 @@ fn checked_offset(offset: u64) -> Result<u64, ProtocolError> {
     if offset <= MAX_ASSET_BYTES {
         return Ok(offset);
     }
-    Err(ProtocolError::malformed(Kind::NeedAsset, format!("byte {offset} lies beyond the end of any asset")))
+    Err(ProtocolError::malformed(Kind::NeedAsset, format!("byte {offset} is beyond the end of any asset")))
 }
 
 fn checked_port(port: u16) -> Result<u16, ProtocolError> {
-    if port > 0 { Ok(port) } else { Err(ProtocolError::malformed(Kind::Sharing, "nobody listens at port 0")) }
+    if port > 0 {
+        Ok(port)
+    } else {
+        Err(ProtocolError::malformed(Kind::Sharing, "port 0 is no port to listen at"))
+    }
 }
 
 fn decode_pixels(mut body: Bytes) -> Result<ToMaster, ProtocolError> {
@@ -135,11 +141,14 @@ fn decode_pixels(mut body: Bytes) -> Result<ToMaster, ProtocolError> {
     Ok(ToMaster::Pixels { header, bytes: body })
 }
 
-/// The number of bytes is the framebuffer's to check: only it knows how wide the frame is.
+/// Checks the rows only. The framebuffer checks the number of bytes, because only it has the width of the frame.
 fn check_rows(header: &PixelsHeader) -> Result<(), ProtocolError> {
     match header.lease.rows() {
         Some(_) => Ok(()),
-        None => Err(ProtocolError::malformed(Kind::Pixels, format!("{} is no run of rows", header.lease))),
+        None => Err(ProtocolError::malformed(
+            Kind::Pixels,
+            format!("{} has no valid range of rows", header.lease),
+        )),
     }
 }
 

@@ -1,77 +1,77 @@
-//! What a master says.
+//! Messages from a master to a worker.
 
 use std::net::SocketAddr;
 
 use bytes::{Buf, BufMut, Bytes};
 
-use super::body::{decode_control, decode_reason, encode_control, encode_reason, nothing, split_head};
+use super::body::{decode_control, decode_reason, encode_control, encode_reason, expect_empty, split_head};
 use super::{FrameAnnounce, Message, Reconnect};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
-use crate::passing::{ShareKey, Token};
+use crate::token::{ShareKey, Token};
 use crate::{AssetId, FrameId, Lease, ProtocolError};
 
-/// What a master says to a worker.
+/// Message from a master to a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ToWorker {
-    /// Leases of this frame may follow.
+    /// Announces a frame. Leases of it may follow.
     Frame(FrameAnnounce),
-    /// Render these rows, and send them.
+    /// Leases rows of a frame to the worker, which renders and sends them.
     Segment(Lease),
-    /// Nothing before this frame is wanted any more.
+    /// Cancels all frames before a given one.
     Cancel {
-        /// The first frame that still is.
+        /// The first frame that is not cancelled.
         before: FrameId,
     },
-    /// An asset that the worker asked for follows, in chunks from the first byte to the last.
+    /// Announces a requested asset, which follows in chunks from the first requested byte to the last.
     AssetBegin {
-        /// Its name.
+        /// The asset.
         id: AssetId,
-        /// All its bytes, at most [`MAX_ASSET_BYTES`].
+        /// Number of bytes of the whole asset, at most [`MAX_ASSET_BYTES`].
         size: u64,
     },
-    /// A part of it.
+    /// Delivers a part of an asset.
     AssetChunk {
-        /// Its name.
+        /// The asset.
         id: AssetId,
-        /// Where in the asset these bytes begin.
+        /// Position of the bytes in the asset.
         offset: u64,
-        /// 1 to [`MAX_CHUNK_BYTES`] of them.
+        /// The bytes, 1 to [`MAX_CHUNK_BYTES`] of them.
         bytes: Bytes,
     },
-    /// Get the asset that you asked for from this worker.
+    /// Names another worker that serves a requested asset.
     AssetFrom {
-        /// Its name.
+        /// The asset.
         id: AssetId,
-        /// All its bytes, at most [`MAX_ASSET_BYTES`].
+        /// Number of bytes of the whole asset, at most [`MAX_ASSET_BYTES`].
         size: u64,
-        /// Where the worker listens.
+        /// Address at which that worker listens.
         peer: SocketAddr,
-        /// What opens the asset there.
+        /// Token of the asset at that worker.
         token: Token,
     },
-    /// Answers [`crate::ToMaster::Sharing`]: pass on what a token made with this key is shown for.
+    /// Replies to [`crate::ToMaster::Sharing`]: the worker may serve assets to requests whose token is made of this key.
     ShareKey {
-        /// The key, of this session.
+        /// The key of this session.
         key: ShareKey,
     },
-    /// The master does not have the asset that the worker asked for.
+    /// Reports that the master does not have a requested asset.
     AssetUnknown {
-        /// Its name.
+        /// The asset.
         id: AssetId,
     },
-    /// Asks for a pong with the same number, at once.
+    /// Requests a pong with the same number at once.
     Ping {
         /// The number.
         nonce: u64,
     },
-    /// Finish the leases you hold; no more will come.
+    /// Announces that no more leases follow. The worker finishes those that it has.
     Drain,
-    /// The last message.
-    Goodbye {
-        /// Why.
+    /// Ends the session. No message follows.
+    Disconnect {
+        /// The reason, as text.
         reason: String,
-        /// When the worker may connect again.
+        /// Whether, and when, the worker may connect again.
         reconnect: Reconnect,
     },
 }
@@ -84,12 +84,12 @@ impl Message for ToWorker {
 
     fn carries(kind: Kind) -> bool {
         match kind {
-            Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping | Kind::Drain | Kind::Goodbye => true,
+            Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping | Kind::Drain | Kind::Disconnect => true,
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => true,
             Kind::AssetFrom | Kind::ShareKey => true,
             Kind::Hello | Kind::Welcome | Kind::Refused => false,
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => false,
-            Kind::Sharing | Kind::HaveAsset | Kind::Fetch => false,
+            Kind::Sharing | Kind::HaveAsset | Kind::PeerRequest => false,
         }
     }
 
@@ -107,7 +107,7 @@ impl Message for ToWorker {
             Self::ShareKey { key } => encode_control(Kind::ShareKey, key),
             Self::Ping { nonce } => encode_control(Kind::Ping, nonce),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
-            Self::Goodbye { reason, reconnect } => encode_goodbye(reason, *reconnect),
+            Self::Disconnect { reason, reconnect } => encode_disconnect(reason, *reconnect),
         }
     }
 
@@ -128,14 +128,14 @@ impl Message for ToWorker {
             }
             Kind::ShareKey => Self::ShareKey { key: decode_control(kind, &body)? },
             Kind::Ping => Self::Ping { nonce: decode_control(kind, &body)? },
-            Kind::Drain => nothing(kind, &body).map(|()| Self::Drain)?,
-            Kind::Goodbye => {
-                let (reason, reconnect) = decode_goodbye(body)?;
-                Self::Goodbye { reason, reconnect }
+            Kind::Drain => expect_empty(kind, &body).map(|()| Self::Drain)?,
+            Kind::Disconnect => {
+                let (reason, reconnect) = decode_disconnect(body)?;
+                Self::Disconnect { reason, reconnect }
             }
             Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => return Err(unexpected(kind)),
-            Kind::Sharing | Kind::HaveAsset | Kind::Fetch => return Err(unexpected(kind)),
+            Kind::Sharing | Kind::HaveAsset | Kind::PeerRequest => return Err(unexpected(kind)),
         })
     }
 }
@@ -147,7 +147,7 @@ fn unexpected(kind: Kind) -> ProtocolError {
 fn checked_lease(lease: Lease) -> Result<Lease, ProtocolError> {
     match lease.rows() {
         Some(rows) if rows.end <= MAX_FRAME_SIDE => Ok(lease),
-        _ => Err(ProtocolError::malformed(Kind::Segment, format!("{lease} is no run of rows of a frame"))),
+        _ => Err(ProtocolError::malformed(Kind::Segment, format!("{lease} has no valid range of rows"))),
     }
 }
 
@@ -194,23 +194,23 @@ fn checked_frame(announce: &FrameAnnounce) -> Result<&FrameAnnounce, ProtocolErr
     Ok(announce)
 }
 
-pub(crate) fn encode_goodbye(reason: &str, reconnect: Reconnect) -> Result<Envelope, ProtocolError> {
+pub(crate) fn encode_disconnect(reason: &str, reconnect: Reconnect) -> Result<Envelope, ProtocolError> {
     let code = match reconnect {
         Reconnect::Never => 0,
         Reconnect::Now => 1,
         Reconnect::NextMaster => 2,
     };
-    encode_reason(Kind::Goodbye, &[code], reason)
+    encode_reason(Kind::Disconnect, &[code], reason)
 }
 
-pub(crate) fn decode_goodbye(mut body: Bytes) -> Result<(String, Reconnect), ProtocolError> {
-    let reconnect = match split_head::<1>(Kind::Goodbye, &mut body)? {
+pub(crate) fn decode_disconnect(mut body: Bytes) -> Result<(String, Reconnect), ProtocolError> {
+    let reconnect = match split_head::<1>(Kind::Disconnect, &mut body)? {
         [0] => Reconnect::Never,
         [1] => Reconnect::Now,
         [2] => Reconnect::NextMaster,
         [other] => {
-            let problem = format!("{other} does not say when to connect again");
-            return Err(ProtocolError::malformed(Kind::Goodbye, problem));
+            let problem = format!("reconnect code {other} is not known");
+            return Err(ProtocolError::malformed(Kind::Disconnect, problem));
         }
     };
     Ok((decode_reason(&body), reconnect))
@@ -241,7 +241,7 @@ fn check_chunk(offset: u64, bytes: &Bytes) -> Result<(), ProtocolError> {
     }
     match offset.checked_add(bytes.len() as u64) {
         Some(end) if end <= MAX_ASSET_BYTES => Ok(()),
-        _ => Err(ProtocolError::malformed(Kind::AssetChunk, "it lies beyond the end of any asset")),
+        _ => Err(ProtocolError::malformed(Kind::AssetChunk, "it ends beyond the end of any asset")),
     }
 }
 

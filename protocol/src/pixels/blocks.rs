@@ -1,63 +1,63 @@
-//! [`Encoding::Lz4`](super::Encoding::Lz4): blocks of some rows each, so that render threads pack what each of them has
-//! traced, still warm, and nobody packs a whole segment alone.
+//! [`Encoding::Lz4`](super::Encoding::Lz4): blocks of LZ4, one for each band of rows. Each render thread compresses the
+//! band that it has traced while the pixels are in its cache, and no thread compresses a whole segment.
 //!
 //! ```text
 //! 0          4           8
 //! | raw size | wire size | LZ4 block, or the raw bytes where the sizes are equal | next block ...
 //! ```
 //!
-//! Differences to the left neighbour in front of LZ4 were tried, and are not worth their time: they made each of five of
-//! the project's scenes and three reference pictures larger, by 2 to 21 %. Those to the row above made one of the three
-//! smaller, by 14 %, and the others larger, by 9 and 29 %. What is rendered has flat backgrounds, repeated rows and
-//! facets, which LZ4 sees better as they are. `benches/pixels.rs` measures it on any picture.
+//! Differences to the left neighbour in front of LZ4 were tried and rejected: they made five test scenes and three
+//! reference pictures larger by 2 to 21 %. Differences to the row above made one of the three pictures smaller by 14 %
+//! and the others larger by 9 and 29 %. Rendered pictures have flat backgrounds, repeated rows and facets, which LZ4
+//! matches better without a filter. `benches/pixels.rs` measures both on any picture.
 
 use bytes::{Buf, BufMut};
 use lz4_flex::block::{CompressTable, compress_into_with_table, decompress_into, get_maximum_output_size};
 
 const BLOCK_HEAD_BYTES: usize = 8;
 
-/// Packs rows; keeps its tables from block to block.
+/// A compressor of blocks. Keeps its tables and its buffer from block to block.
 pub struct Packer {
     table: CompressTable,
     room: Vec<u8>,
 }
 
-/// Why bytes are no blocks of the expected rows.
+/// Why bytes are not the blocks of the expected rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BlockError {
-    /// A block ends before its own end.
+    /// The bytes end within a block.
     #[error("they end in the middle of a block")]
     Torn,
-    /// A block holds nothing, or more raw bytes than are still expected.
-    #[error("a block announces {announced} bytes of pixels where 1 to {room} are due")]
+    /// A block announces no raw bytes, or more than are still expected.
+    #[error("a block announces {announced} bytes of pixels, expected 1 to {room}")]
     Size {
-        /// What it announces.
+        /// Raw bytes that the block announces.
         announced: usize,
-        /// What still fits.
+        /// Raw bytes that are still expected.
         room: usize,
     },
-    /// The bytes of a block are no LZ4, or of another length than announced.
-    #[error("a block of {announced} bytes of pixels does not decompress to them")]
+    /// A block is not LZ4, or decompresses to another number of bytes than announced.
+    #[error("a block does not decompress to the {announced} bytes of pixels that it announces")]
     Corrupt {
-        /// What it should become.
+        /// Raw bytes that the block announces.
         announced: usize,
     },
-    /// The blocks end before the rows do.
-    #[error("{missing} bytes of pixels are missing behind the last block")]
+    /// The blocks hold fewer bytes than the rows.
+    #[error("{missing} bytes of pixels are missing after the last block")]
     Missing {
-        /// How many.
+        /// Raw bytes that no block holds.
         missing: usize,
     },
 }
 
 impl Packer {
-    /// With nothing to keep yet.
+    /// A compressor with empty buffers.
     pub fn new() -> Self {
         Self { table: CompressTable::default(), room: Vec::new() }
     }
 
-    /// The block of these raw bytes, in an allocation of its own size. It is never longer than they are, but for its
-    /// head of eight bytes. `None` for no bytes, or more than a block can hold.
+    /// Compresses raw bytes to one block, in an allocation of exactly its size. The block is at most eight bytes (its
+    /// head) longer than `raw`. Returns `None` for an empty `raw`, or one longer than a block can hold (4 GiB - 1).
     pub fn block(&mut self, raw: &[u8]) -> Option<Vec<u8>> {
         let raw_size = u32::try_from(raw.len()).ok().filter(|size| *size > 0)?;
         self.room.resize(get_maximum_output_size(raw.len()), 0);
@@ -84,10 +84,10 @@ impl std::fmt::Debug for Packer {
     }
 }
 
-/// Unpacks blocks into `raw`, which they must fill to the last byte; allocates nothing.
+/// Decompresses blocks into `raw`, which they must fill exactly. Allocates nothing.
 ///
 /// # Errors
-/// Bytes that are no such blocks. What `raw` holds then is worth nothing.
+/// Bytes that are no blocks, or blocks of another total size. The content of `raw` is unspecified then.
 pub fn unpack(mut packed: &[u8], mut raw: &mut [u8]) -> Result<(), BlockError> {
     while !packed.is_empty() {
         let (announced, body) = split_block(&mut packed)?;
@@ -109,7 +109,7 @@ pub fn unpack(mut packed: &[u8], mut raw: &mut [u8]) -> Result<(), BlockError> {
     }
 }
 
-/// The first block: its raw size, and its body.
+/// Splits the first block off and returns its raw size and its body.
 fn split_block<'a>(packed: &mut &'a [u8]) -> Result<(usize, &'a [u8]), BlockError> {
     if packed.len() < BLOCK_HEAD_BYTES {
         return Err(BlockError::Torn);
@@ -129,7 +129,7 @@ mod tests {
 
     use super::*;
 
-    /// Flat runs and noise, as pictures have both.
+    /// Bytes with flat runs, noise and repeated pixels, as in pictures.
     fn pictures() -> impl Strategy<Value = Vec<u8>> {
         let run = prop_oneof![
             (any::<u8>(), 1..400usize).prop_map(|(value, len)| vec![value; len]),
@@ -145,27 +145,27 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_are_these() {
-        // In LZ4's words: a literal, 17 bytes from one before, six literals.
+    fn golden_bytes() {
+        // As LZ4: one literal, a match of 17 bytes at distance 1, six literals.
         let golden = [24, 0, 0, 0, 11, 0, 0, 0, 0x1d, 7, 1, 0, 0x60, 7, 7, 7, 7, 7, 7];
         let mut rows = [0; 24];
         assert_eq!(unpack(&golden, &mut rows), Ok(()));
         assert_eq!(rows, [7; 24]);
-        // Others may find other words for it; the head is ours.
+        // Another LZ4 encoder may choose other matches. The head is fixed.
         let block = packed(&rows, 24);
         assert_eq!(block[..8], [24, 0, 0, 0, block.len() as u8 - 8, 0, 0, 0]);
-        // What does not shrink is stored.
+        // Bytes that LZ4 does not make fewer are stored.
         assert_eq!(packed(&[1, 2, 3], 3), [3, 0, 0, 0, 3, 0, 0, 0, 1, 2, 3]);
     }
 
     #[test]
-    fn nothing_is_no_block() {
+    fn no_bytes_make_no_block() {
         assert_eq!(Packer::new().block(&[]), None);
         assert_eq!(unpack(&[], &mut []), Ok(()));
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn each_defect_has_its_error() {
         let whole = packed(&[5; 100], 50);
         let unpack = |bytes: &[u8], len: usize| unpack(bytes, &mut vec![0; len]);
         assert_eq!(unpack(&whole, 100), Ok(()));
@@ -174,14 +174,14 @@ mod tests {
         assert_eq!(unpack(&whole[..whole.len() - 1], 100), Err(BlockError::Torn));
         assert_eq!(unpack(&[0; 8], 100), Err(BlockError::Size { announced: 0, room: 100 }));
         assert_eq!(unpack(&[4, 0, 0, 0, 1, 0, 0, 0, 0], 4), Err(BlockError::Corrupt { announced: 4 }));
-        // A size beyond everything is held against what is due, before anything is done about it.
+        // A huge size is compared with the expected bytes before anything is allocated or decompressed.
         let huge = [0xff, 0xff, 0xff, 0xff, 1, 0, 0, 0, 0];
         assert_eq!(unpack(&huge, 9), Err(BlockError::Size { announced: u32::MAX as usize, room: 9 }));
     }
 
     proptest! {
         #[test]
-        fn what_was_packed_unpacks(raw in pictures(), block_bytes in 1..2000usize) {
+        fn packing_round_trips(raw in pictures(), block_bytes in 1..2000usize) {
             let packed = packed(&raw, block_bytes);
             let blocks = raw.len().div_ceil(block_bytes);
             prop_assert!(packed.len() <= raw.len() + BLOCK_HEAD_BYTES * blocks);
@@ -191,12 +191,12 @@ mod tests {
         }
 
         #[test]
-        fn arbitrary_bytes_are_refused_or_harmless(bytes in vec(any::<u8>(), 0..300), len in 0..400usize) {
+        fn arbitrary_bytes_do_not_panic(bytes in vec(any::<u8>(), 0..300), len in 0..400usize) {
             let _ = unpack(&bytes, &mut vec![0; len]);
         }
 
         #[test]
-        fn mutated_blocks_are_refused_or_harmless(
+        fn mutated_blocks_do_not_panic(
             raw in pictures(),
             block_bytes in 20..2000usize,
             hits in vec((any::<Index>(), any::<u8>()), 1..6),

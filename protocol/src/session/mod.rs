@@ -1,10 +1,12 @@
-//! A handshaken connection: one task that writes, one that reads, bounded queues towards the user.
+//! A handshaken connection: a task that writes, a task that reads, and bounded queues to the user.
 //!
-//! Control messages overtake bulk ones (chunks, pixels) in the writer, so that a cancel never waits behind a scene.
-//! The order that holds: a bulk message is written after every control message that was sent before it, control
-//! messages keep their order, bulk messages keep theirs. [`Goodbye`](crate::ToWorker::Goodbye) counts as bulk: it is
-//! the last word, so everything sent before it goes first; then the writer flushes, closes its direction, and waits a
-//! moment for the peer to close the other: a connection closed over unread bytes is reset, and takes the goodbye with it.
+//! The writer prefers control messages to bulk messages (chunks, pixels), so that a cancel never waits for a scene. Three
+//! orders are guaranteed: control messages keep their order; bulk messages keep theirs; a bulk message is written after
+//! every control message that was sent before it.
+//!
+//! [`Disconnect`](crate::ToWorker::Disconnect) is a bulk message, so everything that was sent before it is written first.
+//! After it the writer flushes and closes its direction, and the session waits up to [`CLOSE_GRACE`] for the peer to close
+//! the other direction. A connection that is closed with unread bytes is reset, and a reset discards the disconnect.
 //!
 //! ```text
 //! Sender --control queue--> writer --> transport --> reader --inbox--> Receiver
@@ -25,7 +27,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::ProtocolError;
 use crate::envelope::Kind;
-use crate::limits::{BULK_QUEUE, CONTROL_QUEUE, INBOX_QUEUE, LAST_WORD_GRACE};
+use crate::limits::{BULK_QUEUE, CLOSE_GRACE, CONTROL_QUEUE, INBOX_QUEUE};
 use crate::message::Message;
 
 pub use reader::Receiver;
@@ -34,9 +36,10 @@ pub use traffic::Traffic;
 
 /// Starts the two tasks of a session on the current tokio runtime, after a handshake.
 ///
-/// `Out` is what this side says ([`crate::ToWorker`] or [`crate::ToMaster`]), `In` what it hears. The connection ends
-/// when a goodbye was written, when every [`Sender`] is gone and their messages are written, at [`Sender::abort`], or
-/// when the transport or the peer fails; what was received before that is still handed out.
+/// `Out` and `In` are the outgoing and incoming messages: [`crate::ToWorker`] and [`crate::ToMaster`] on a master, the
+/// reverse on a worker. The connection ends after a disconnect was written, after every [`Sender`] was dropped and all
+/// queued messages were written, at [`Sender::abort`], and when the transport or the peer fails. Messages that were
+/// received before the end are still delivered.
 pub fn spawn<S, Out, In>(io: S) -> (Sender<Out>, Receiver<In>, Arc<Traffic>)
 where
     S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
@@ -49,15 +52,16 @@ where
     let (inbox, messages) = mpsc::channel(INBOX_QUEUE);
     let traffic = Arc::new(Traffic::default());
     let abort = CancellationToken::new();
-    let (reading, unheard) = (CancellationToken::new(), CancellationToken::new());
+    let (reader_ended, inbox_closed) = (CancellationToken::new(), CancellationToken::new());
 
-    // Weak: the inbox ends with the reader, though the writer may wait for messages for ever.
+    // Weak, because the inbox must end with the reader while the writer waits for messages.
     let failures = inbox.downgrade();
-    let reader_ends = reading.clone().drop_guard();
-    let reader = reader::Reader { io: read_half, inbox, traffic: traffic.clone(), unheard: unheard.clone() };
+    let reader_guard = reader_ended.clone().drop_guard();
+    let reader =
+        reader::Reader { io: read_half, inbox, traffic: traffic.clone(), inbox_closed: inbox_closed.clone() };
     let reader_abort = abort.clone();
     tokio::spawn(async move {
-        let _reader_ends = reader_ends;
+        let _reader_guard = reader_guard;
         reader_abort.run_until_cancelled(reader.run()).await;
     });
     let mut writer = writer::Writer::new(write_half, control_queue, bulk_queue, traffic.clone());
@@ -71,13 +75,13 @@ where
         match result {
             Err(error) => report(failures, error, writer_abort).await,
             Ok(()) => {
-                if !writer.has_said_goodbye() {
+                if !writer.has_disconnected() {
                     tokio::select! {
-                        () = unheard.cancelled() => {}
-                        () = reading.cancelled() => {}
+                        () = inbox_closed.cancelled() => {}
+                        () = reader_ended.cancelled() => {}
                     }
                 }
-                let _ = tokio::time::timeout(LAST_WORD_GRACE, reading.cancelled()).await;
+                let _ = tokio::time::timeout(CLOSE_GRACE, reader_ended.cancelled()).await;
                 writer_abort.cancel();
             }
         }
@@ -87,26 +91,26 @@ where
     (sender, Receiver { messages }, traffic)
 }
 
-/// A failed write usually means that the peer has gone, and that its last word lies in our receive buffer: the reader
-/// gets a moment to find it before it is stopped and the failure reported.
+/// Reports a failed write after [`CLOSE_GRACE`]. The peer has usually closed by then, and its disconnect may be in the
+/// receive buffer, where the reader finds it first.
 async fn report<In>(
     failures: mpsc::WeakSender<reader::Delivery<In>>,
     error: ProtocolError,
     abort: CancellationToken,
 ) {
-    tokio::time::sleep(LAST_WORD_GRACE).await;
+    tokio::time::sleep(CLOSE_GRACE).await;
     let Some(inbox) = failures.upgrade() else { return };
     abort.cancel();
     let _ = inbox.send(reader::Delivery { message: Err(error), _room: None }).await;
 }
 
-/// Which of the writer's two queues a message waits in.
+/// Whether a message goes through the bulk queue.
 fn is_bulk(kind: Kind) -> bool {
     match kind {
-        Kind::AssetBegin | Kind::AssetChunk | Kind::Pixels | Kind::Goodbye => true,
+        Kind::AssetBegin | Kind::AssetChunk | Kind::Pixels | Kind::Disconnect => true,
         Kind::Hello | Kind::Welcome | Kind::Refused => false,
         Kind::Frame | Kind::Segment | Kind::Cancel | Kind::AssetUnknown => false,
-        Kind::AssetFrom | Kind::ShareKey | Kind::Sharing | Kind::HaveAsset | Kind::Fetch => false,
+        Kind::AssetFrom | Kind::ShareKey | Kind::Sharing | Kind::HaveAsset | Kind::PeerRequest => false,
         Kind::NeedAsset | Kind::Failed | Kind::Ping | Kind::Pong | Kind::Drain => false,
     }
 }

@@ -1,4 +1,4 @@
-//! The task that reads, and the user's end of what it read.
+//! The task that reads, and the receiving half of a session.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::envelope::{read_body, read_header};
 use crate::limits::INBOX_BYTES;
 use crate::message::Message;
 
-/// A peer's message on its way to the user, with the room it takes in the inbox.
+/// A received message on its way to the user, with its share of the inbox's bytes.
 pub(super) struct Delivery<In> {
     pub(super) message: Result<In, ProtocolError>,
     pub(super) _room: Option<OwnedSemaphorePermit>,
@@ -30,12 +30,12 @@ impl<In> std::fmt::Debug for Receiver<In> {
 }
 
 impl<In: Message> Receiver<In> {
-    /// The next message. `None` once the connection has ended: cleanly, or after the error that was handed out before.
-    /// Safe to drop half-way, as `select!` does.
+    /// Waits for the next message. Returns `None` after the connection has ended cleanly, and after an error was
+    /// returned. Cancel safe.
     pub async fn recv(&mut self) -> Option<Result<In, ProtocolError>> {
         let Delivery { message, _room } = self.messages.recv().await?;
         if message.is_err() {
-            // One error ends a session: nothing that comes after it can be trusted to be in step.
+            // One error ends a session: the bytes after it may not begin at an envelope.
             self.messages.close();
             while self.messages.try_recv().is_ok() {}
         }
@@ -43,22 +43,22 @@ impl<In: Message> Receiver<In> {
     }
 }
 
-/// What the reading task works with.
+/// State of the reading task.
 pub(super) struct Reader<S, In> {
     pub(super) io: ReadHalf<S>,
     pub(super) inbox: mpsc::Sender<Delivery<In>>,
     pub(super) traffic: Arc<Traffic>,
-    /// Cancelled when nobody listens any more.
-    pub(super) unheard: CancellationToken,
+    /// Cancelled when the [`Receiver`] is closed or dropped.
+    pub(super) inbox_closed: CancellationToken,
 }
 
 impl<S: AsyncRead, In: Message> Reader<S, In> {
-    /// Reads until the peer closes or an error, which is delivered. When nobody listens any more, what comes is thrown
-    /// away: bytes left unread would turn our closing into a reset.
+    /// Reads until the peer closes or an error occurs, which is delivered. After the receiver is closed, incoming bytes
+    /// are discarded: unread bytes would turn this end's close into a reset.
     pub(super) async fn run(self) {
         let mut io = BufReader::new(self.io);
         let room = Arc::new(Semaphore::new(INBOX_BYTES));
-        let listening = async {
+        let delivering = async {
             loop {
                 let delivery = match read_message(&mut io, &room, &self.traffic).await {
                     Ok(None) => return,
@@ -74,10 +74,10 @@ impl<S: AsyncRead, In: Message> Reader<S, In> {
         tokio::select! {
             biased;
             () = self.inbox.closed() => {}
-            () = listening => if !self.inbox.is_closed() { return },
+            () = delivering => if !self.inbox.is_closed() { return },
         }
-        self.unheard.cancel();
-        // It ends with the peer, or with the session.
+        self.inbox_closed.cancel();
+        // Ends when the peer closes, or with the session.
         let _ = tokio::io::copy(&mut io, &mut tokio::io::sink()).await;
     }
 }
@@ -91,7 +91,7 @@ async fn read_message<In: Message>(
     if !In::carries(header.kind) {
         return Err(ProtocolError::Unexpected { kind: header.kind, expected: In::EXPECTED });
     }
-    // Every body fits: INBOX_BYTES is above every type's limit, and below what one permit can count.
+    // Every body fits: INBOX_BYTES is above the limit of every type, and a u32 can count it.
     let permits = u32::try_from(header.body_bytes).unwrap_or(u32::MAX);
     let taken = room.clone().acquire_many_owned(permits).await;
     let body = read_body(io, header).await?;

@@ -1,4 +1,4 @@
-//! The user's end of the two outgoing queues.
+//! The sending half of a session.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -11,7 +11,7 @@ use crate::ProtocolError;
 use crate::envelope::Envelope;
 use crate::message::Message;
 
-/// Sends messages of one direction; clones share the queues.
+/// Sends messages of one direction. Clones share the two queues.
 pub struct Sender<Out> {
     pub(super) control: mpsc::Sender<Envelope>,
     pub(super) bulk: mpsc::Sender<Envelope>,
@@ -19,45 +19,45 @@ pub struct Sender<Out> {
     pub(super) direction: PhantomData<fn(Out)>,
 }
 
-/// Why a message was not sent.
+/// Error of [`Sender::send`].
 #[derive(Debug, thiserror::Error)]
 pub enum SendError {
-    /// The session has ended; its [`Receiver`](super::Receiver) knows why.
+    /// The session has ended. Its [`Receiver`](super::Receiver) returns the reason.
     #[error("the session has ended")]
     Closed,
-    /// The message breaks a bound and was not sent; the session lives on.
+    /// The message breaks a bound and was not sent. The session continues.
     #[error(transparent)]
     Invalid(#[from] ProtocolError),
 }
 
-/// Why a message was not sent at once.
+/// Error of [`Sender::try_send`].
 #[derive(Debug, thiserror::Error)]
 pub enum TrySendError<Out> {
-    /// The queue is full: the peer reads too slowly. Here is the message back.
+    /// The queue is full because the peer reads too slowly. The message is returned.
     #[error("the session's queue is full")]
     Full(Out),
-    /// The session has ended; its [`Receiver`](super::Receiver) knows why.
+    /// The session has ended. Its [`Receiver`](super::Receiver) returns the reason.
     #[error("the session has ended")]
     Closed,
-    /// The message breaks a bound and was not sent; the session lives on.
+    /// The message breaks a bound and was not sent. The session continues.
     #[error(transparent)]
     Invalid(#[from] ProtocolError),
 }
 
 impl<Out: Message> Sender<Out> {
-    /// Puts a message into its queue, waiting while that is full.
+    /// Queues a message, and waits while its queue is full.
     ///
     /// # Errors
-    /// The session has ended, or the message breaks a bound.
+    /// An ended session; a message that breaks a bound.
     pub async fn send(&self, message: Out) -> Result<(), SendError> {
         let envelope = message.to_envelope()?;
         self.queue(&envelope).send(envelope).await.map_err(|_| SendError::Closed)
     }
 
-    /// Puts a message into its queue if there is room.
+    /// Queues a message without waiting.
     ///
     /// # Errors
-    /// The queue is full, the session has ended, or the message breaks a bound.
+    /// A full queue; an ended session; a message that breaks a bound.
     pub fn try_send(&self, message: Out) -> Result<(), TrySendError<Out>> {
         let envelope = message.to_envelope()?;
         self.queue(&envelope).try_send(envelope).map_err(|error| match error {
@@ -72,13 +72,13 @@ impl<Out: Message> Sender<Out> {
 }
 
 impl<Out> Sender<Out> {
-    /// Waits until the session takes no more. After a goodbye this means that everything was written, and that the peer
-    /// has closed too or has had [`crate::limits::LAST_WORD_GRACE`] to do so.
+    /// Waits until the session accepts no more messages. After a disconnect, everything is written by then, and the peer
+    /// has closed or has had [`crate::limits::CLOSE_GRACE`] to do so.
     pub async fn closed(&self) {
         self.control.closed().await;
     }
 
-    /// Ends the session at once, in both directions, unwritten messages and all. For a peer that is not worth a goodbye.
+    /// Ends both directions of the session at once, without a disconnect. Queued messages are dropped.
     pub fn abort(&self) {
         self.abort.cancel();
     }

@@ -1,10 +1,10 @@
-//! What went over the wire, counted.
+//! Byte counters of a session.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crate::envelope::{Envelope, HEADER_BYTES, Header, Kind};
 
-/// Bytes of a session's envelopes, headers included; the handshake is not counted. Readable at any time.
+/// Numbers of bytes of a session's envelopes, headers included. The handshake is not counted.
 #[derive(Debug, Default)]
 pub struct Traffic {
     sent: AtomicU64,
@@ -13,17 +13,17 @@ pub struct Traffic {
 }
 
 impl Traffic {
-    /// Bytes written.
+    /// Number of bytes written.
     pub fn sent_bytes(&self) -> u64 {
         self.sent.load(Relaxed)
     }
 
-    /// Bytes read.
+    /// Number of bytes read.
     pub fn received_bytes(&self) -> u64 {
         self.received.load(Relaxed)
     }
 
-    /// Bytes written that describe what to draw: frame announcements and assets.
+    /// Number of bytes written for frame announcements and assets.
     pub fn scene_sent_bytes(&self) -> u64 {
         self.scene_sent.load(Relaxed)
     }

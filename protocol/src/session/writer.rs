@@ -1,4 +1,4 @@
-//! The task that writes: control first, flushes when there is nothing to write, closes at the end.
+//! The task that writes: control messages first, a flush when both queues are empty, a close at the end.
 
 use std::sync::Arc;
 
@@ -11,17 +11,18 @@ use crate::ProtocolError;
 use crate::envelope::{Envelope, Kind};
 use crate::limits::envelope_deadline;
 
-/// Small messages are gathered up to this; larger bodies go past the buffer uncopied.
+/// Size of the write buffer, in bytes. Small messages are gathered in it; larger bodies bypass it without a copy.
 const BUFFER_BYTES: usize = 8 << 10;
 
+/// State of the writing task.
 pub(super) struct Writer<W> {
     io: BufWriter<W>,
     control: mpsc::Receiver<Envelope>,
     bulk: mpsc::Receiver<Envelope>,
-    /// A bulk message taken from its queue that lets control go first once more.
+    /// A bulk message that was taken from its queue and waits for the control messages sent before it.
     held: Option<Envelope>,
     traffic: Arc<Traffic>,
-    said_goodbye: bool,
+    disconnected: bool,
 }
 
 impl<W: AsyncWrite + Unpin> Writer<W> {
@@ -37,42 +38,43 @@ impl<W: AsyncWrite + Unpin> Writer<W> {
             bulk,
             held: None,
             traffic,
-            said_goodbye: false,
+            disconnected: false,
         }
     }
 
-    /// Writes until a goodbye was written or every sender is gone.
+    /// Writes until a disconnect is written or every sender is dropped.
     pub(super) async fn run(&mut self) -> Result<(), ProtocolError> {
         while let Some(envelope) = self.next().await? {
             envelope.write(&mut self.io).await?;
             self.traffic.count_sent(&envelope);
-            if envelope.kind() == Kind::Goodbye {
-                self.said_goodbye = true;
+            if envelope.kind() == Kind::Disconnect {
+                self.disconnected = true;
                 break;
             }
         }
-        self.finish("taking the last message", true).await
+        self.finish("receiving the last message", true).await
     }
 
-    /// Whether [`run`](Self::run) ended with a goodbye, and not for want of senders.
-    pub(super) fn has_said_goodbye(&self) -> bool {
-        self.said_goodbye
+    /// Whether [`run`](Self::run) ended with a disconnect, and not because every sender was dropped.
+    pub(super) fn has_disconnected(&self) -> bool {
+        self.disconnected
     }
 
+    /// Waits for the next message, after a flush where none is ready. `None` when every sender is dropped.
     async fn next(&mut self) -> Result<Option<Envelope>, ProtocolError> {
         if let Some(envelope) = self.ready() {
             return Ok(Some(envelope));
         }
-        self.finish("taking a message", false).await?;
+        self.finish("receiving a message", false).await?;
         Ok(self.wait().await)
     }
 
-    /// What can be written without waiting.
+    /// Takes the next message that is queued already.
     fn ready(&mut self) -> Option<Envelope> {
         if self.held.is_none() {
             self.held = self.bulk.try_recv().ok();
         }
-        // Looked at after the bulk queue: whatever was sent before the held message is in here by now.
+        // Checked after the bulk queue: every control message sent before the held message is queued by now.
         self.control.try_recv().ok().or_else(|| self.held.take())
     }
 
@@ -88,6 +90,7 @@ impl<W: AsyncWrite + Unpin> Writer<W> {
         }
     }
 
+    /// Flushes, and closes if `close` is set, within a deadline.
     async fn finish(&mut self, what: &'static str, close: bool) -> Result<(), ProtocolError> {
         let limit = envelope_deadline(BUFFER_BYTES);
         let flushed =

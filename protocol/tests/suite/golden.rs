@@ -1,9 +1,10 @@
-//! The bytes of every message. Whoever changes one of these changes the protocol: `PROTOCOL_VERSION` must grow too.
+//! Golden bytes of every message. A change of any of them is a change of the protocol and needs a greater
+//! `PROTOCOL_VERSION`.
 
 use bytes::Bytes;
 use rayfarm_protocol::envelope::{Kind, read_body, read_header};
 use rayfarm_protocol::message::Message;
-use rayfarm_protocol::passing::{Fetch, ShareKey, Token, ask, token};
+use rayfarm_protocol::peer::{PeerRequest, ShareKey, Token, send_request};
 use rayfarm_protocol::{
     AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, Reconnect, ToMaster,
     ToWorker, Welcome, codec, limits,
@@ -13,7 +14,7 @@ use crate::common::{lease, pixels, wire};
 
 const ID: AssetId = AssetId([0xab; 32]);
 
-/// Both directions: the message has these bytes, and these bytes are the message.
+/// Checks that a message encodes to these bytes, and that these bytes decode to the message.
 async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&[u8]]) {
     let expected = parts.concat();
     assert_eq!(wire(&message).await, expected);
@@ -25,12 +26,12 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 }
 
 #[test]
-fn these_bytes_belong_to_this_version() {
+fn the_golden_bytes_are_those_of_version_4() {
     assert_eq!(PROTOCOL_VERSION, 4);
 }
 
 #[tokio::test]
-async fn to_worker() {
+async fn messages_to_a_worker() {
     let view = Bytes::from_static(b"view");
     let announce = FrameAnnounce { frame: FrameId(7), scene: ID, width: 640, height: 480, view };
     let frame: [&[u8]; 6] = [
@@ -64,16 +65,16 @@ async fn to_worker() {
     golden(key, &[&[32, 0, 0, 0, 0x17, 0, 0, 0], &[0xef; 32]]).await;
     golden(ToWorker::Ping { nonce: 5 }, &[&[8, 0, 0, 0, 0x30, 0, 0, 0], &number]).await;
     golden(ToWorker::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
-    let goodbye = ToWorker::Goodbye { reason: "hé".into(), reconnect: Reconnect::Now };
-    golden(goodbye, &[&[4, 0, 0, 0, 0x33, 0, 0, 0], &[1], b"h\xc3\xa9"]).await;
+    let disconnect = ToWorker::Disconnect { reason: "hé".into(), reconnect: Reconnect::Now };
+    golden(disconnect, &[&[4, 0, 0, 0, 0x33, 0, 0, 0], &[1], b"h\xc3\xa9"]).await;
     for (reconnect, code) in [(Reconnect::Never, 0), (Reconnect::NextMaster, 2)] {
-        let goodbye = ToWorker::Goodbye { reason: "no".into(), reconnect };
-        golden(goodbye, &[&[3, 0, 0, 0, 0x33, 0, 0, 0], &[code], b"no"]).await;
+        let disconnect = ToWorker::Disconnect { reason: "no".into(), reconnect };
+        golden(disconnect, &[&[3, 0, 0, 0, 0x33, 0, 0, 0], &[code], b"no"]).await;
     }
 }
 
 #[tokio::test]
-async fn to_master() {
+async fn messages_to_a_master() {
     let number = [5, 0, 0, 0, 0, 0, 0, 0];
     let need = ToMaster::NeedAsset { id: ID, offset: 5, again: true };
     golden(need, &[&[41, 0, 0, 0, 0x20, 0, 0, 0], &ID.0, &number, &[1]]).await;
@@ -94,9 +95,9 @@ async fn to_master() {
         &[2, 2],
     ];
     golden(pixels(2, 2), &rows).await;
-    let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("pixels are pixels") };
+    let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("`pixels` makes another message") };
     let codes: [&[u8]; 3] = [&[1, 0, 0, 0, 0, 0, 0, 0], &[2, 0, 0, 0, 0, 0, 0, 0], &[3, 0, 0, 0, 0, 0, 0, 0]];
-    for (encoding, code) in [Encoding::Lz4, Encoding::Narrow, Encoding::NarrowLz4].into_iter().zip(codes) {
+    for (encoding, code) in [Encoding::Lz4, Encoding::Rgb565, Encoding::Rgb565Lz4].into_iter().zip(codes) {
         let mut rows = rows;
         rows[3] = code;
         let (header, bytes) = (PixelsHeader { encoding, ..header }, bytes.clone());
@@ -106,19 +107,20 @@ async fn to_master() {
     let failed = ToMaster::Failed { frame: FrameId(5), reason: "no".into() };
     golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;
     golden(ToMaster::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
-    golden(ToMaster::Goodbye { reason: "x".into() }, &[&[1, 0, 0, 0, 0x33, 0, 0, 0], b"x"]).await;
+    golden(ToMaster::Disconnect { reason: "x".into() }, &[&[1, 0, 0, 0, 0x33, 0, 0, 0], b"x"]).await;
 }
 
 #[tokio::test]
-async fn what_a_worker_asks_another_for() {
+async fn a_request_of_a_worker_and_its_token() {
     let mut bytes = Vec::new();
-    ask(&mut bytes, &Fetch { id: ID, token: Token([0xcd; 32]), offset: 5 }).await.unwrap();
+    let request = PeerRequest { id: ID, token: Token([0xcd; 32]), offset: 5 };
+    send_request(&mut bytes, &request).await.unwrap();
     let parts: [&[u8]; 4] = [&[72, 0, 0, 0, 0x40, 0, 0, 0], &ID.0, &[0xcd; 32], &[5, 0, 0, 0, 0, 0, 0, 0]];
     assert_eq!(bytes, parts.concat());
-    let made = token(&ShareKey([0; 32]), ID);
-    assert_eq!(made, Token(blake3::keyed_hash(&[0; 32], &ID.0).into()));
-    assert_ne!(made, token(&ShareKey([1; 32]), ID));
-    assert_eq!(format!("{made:?} {:?}", ShareKey([1; 32])), "Token(..) ShareKey(..)");
+    let token = Token::new(&ShareKey([0; 32]), ID);
+    assert_eq!(token, Token(blake3::keyed_hash(&[0; 32], &ID.0).into()));
+    assert_ne!(token, Token::new(&ShareKey([1; 32]), ID));
+    assert_eq!(format!("{token:?} {:?}", ShareKey([1; 32])), "Token(..) ShareKey(..)");
 }
 
 #[test]
@@ -139,13 +141,13 @@ fn hello_and_welcome() {
 }
 
 #[test]
-fn an_asset_is_named_by_its_blake3() {
+fn an_asset_id_is_the_blake3_hash_of_the_bytes() {
     let name = "af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262";
     assert_eq!(AssetId::of(b"").to_string(), name);
 }
 
 #[test]
-fn a_control_message_never_has_room_for_bulk() {
+fn only_bulk_messages_have_large_limits() {
     for kind in Kind::ALL {
         let bulk = matches!(kind, Kind::Pixels | Kind::AssetChunk);
         assert_eq!(kind.limit_bytes() > 2 * limits::MAX_CONTROL_BYTES, bulk, "{kind}");

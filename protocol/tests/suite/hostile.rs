@@ -1,4 +1,4 @@
-//! What a peer announces costs nothing until it is checked: measured at the allocator.
+//! Announced sizes allocate nothing before they are checked: measured at the allocator. Malformed headers and bodies.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -11,17 +11,17 @@ use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ProtocolError, To
 use tokio::io::{AsyncWriteExt, duplex};
 
 thread_local! {
-    static LARGEST: Cell<usize> = const { Cell::new(0) };
+    static LARGEST_ALLOCATION: Cell<usize> = const { Cell::new(0) };
 }
 
-/// The system's allocator, remembering the largest request of each thread.
-struct Watching;
+/// The system's allocator, with a record of each thread's largest allocation.
+struct RecordingAllocator;
 
-// SAFETY: every call is handed to the system allocator unchanged; the thread-local cell is const-initialised and has
+// SAFETY: every call is passed to the system allocator unchanged; the thread-local cell is const-initialised and has
 // no destructor, so touching it allocates nothing.
-unsafe impl GlobalAlloc for Watching {
+unsafe impl GlobalAlloc for RecordingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LARGEST.with(|largest| largest.set(largest.get().max(layout.size())));
+        LARGEST_ALLOCATION.with(|largest| largest.set(largest.get().max(layout.size())));
         // SAFETY: the caller's promises are passed on.
         unsafe { System.alloc(layout) }
     }
@@ -33,59 +33,59 @@ unsafe impl GlobalAlloc for Watching {
 }
 
 #[global_allocator]
-static ALLOCATOR: Watching = Watching;
+static ALLOCATOR: RecordingAllocator = RecordingAllocator;
 
 fn header(announced: u32, kind: u8) -> [u8; HEADER_BYTES] {
     let [a, b, c, d] = announced.to_le_bytes();
     [a, b, c, d, kind, 0, 0, 0]
 }
 
-/// The error that a session gives for these bytes, and the largest allocation on the way there.
-async fn outcome<In: Message, Out: Message>(bytes: &[u8]) -> (Option<ProtocolError>, usize) {
+/// Receives these bytes in a session. Returns the session's error and the largest allocation.
+async fn receive<In: Message, Out: Message>(bytes: &[u8]) -> (Option<ProtocolError>, usize) {
     let (ours, mut theirs) = duplex(1 << 16);
     let (_out, mut received, _) = spawn::<_, Out, In>(ours);
-    LARGEST.with(|largest| largest.set(0));
+    LARGEST_ALLOCATION.with(|largest| largest.set(0));
     theirs.write_all(bytes).await.unwrap();
     drop(theirs);
     let result = received.recv().await;
-    (result.and_then(Result::err), LARGEST.with(Cell::get))
+    (result.and_then(Result::err), LARGEST_ALLOCATION.with(Cell::get))
 }
 
 #[tokio::test]
 async fn four_gibibytes_are_refused_before_any_allocation() {
-    for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::Fetch) {
+    for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::PeerRequest) {
         for announced in [u32::MAX, 1 << 31, kind.limit_bytes() as u32 + 1] {
             let (error, largest) = if ToWorker::carries(kind) {
-                outcome::<ToWorker, ToMaster>(&header(announced, kind as u8)).await
+                receive::<ToWorker, ToMaster>(&header(announced, kind as u8)).await
             } else {
-                outcome::<ToMaster, ToWorker>(&header(announced, kind as u8)).await
+                receive::<ToMaster, ToWorker>(&header(announced, kind as u8)).await
             };
             let error = error.unwrap();
             assert!(matches!(error, ProtocolError::TooLong { .. }), "{error}");
             assert!(error.to_string().contains(&announced.to_string()), "{error}");
-            assert!(largest < 64 << 10, "{kind} of {announced} bytes made {largest} be allocated");
+            assert!(largest < 64 << 10, "{kind} of {announced} bytes allocated {largest} bytes");
         }
     }
 }
 
 #[tokio::test]
-async fn bulk_for_the_wrong_side_is_refused_before_any_allocation() {
+async fn bulk_in_the_wrong_direction_is_refused_before_any_allocation() {
     let bytes = header(limits::MAX_PIXELS_BYTES as u32, Kind::Pixels as u8);
-    let (error, largest) = outcome::<ToWorker, ToMaster>(&bytes).await;
+    let (error, largest) = receive::<ToWorker, ToMaster>(&bytes).await;
     assert!(matches!(error, Some(ProtocolError::Unexpected { kind: Kind::Pixels, .. })));
     assert!(largest < 64 << 10, "{largest}");
 }
 
 #[tokio::test]
-async fn an_announced_body_costs_its_announced_size_and_no_more() {
+async fn a_body_allocates_exactly_its_announced_size() {
     let announced = Kind::Pixels.limit_bytes();
-    let (error, largest) = outcome::<ToMaster, ToWorker>(&header(announced as u32, Kind::Pixels as u8)).await;
+    let (error, largest) = receive::<ToMaster, ToWorker>(&header(announced as u32, Kind::Pixels as u8)).await;
     assert!(matches!(error, Some(ProtocolError::Closed { .. })));
     assert_eq!(largest, announced);
 }
 
 #[test]
-fn unknown_types_flags_and_streams_are_named() {
+fn unknown_types_flags_and_streams_are_refused() {
     for kind in 0..=u8::MAX {
         let known = Kind::ALL.into_iter().any(|known| known as u8 == kind);
         match Header::parse(header(0, kind)) {
@@ -107,6 +107,7 @@ async fn http_in_place_of_an_envelope_is_an_error() {
     assert!(error.to_string().contains("unknown type 0x2f"), "{error}");
 }
 
+/// Decodes a malformed body and returns the error's text.
 fn malformed(kind: Kind, body: &[u8]) -> String {
     let body = Bytes::copy_from_slice(body);
     let result = if ToWorker::carries(kind) {
@@ -121,7 +122,7 @@ fn malformed(kind: Kind, body: &[u8]) -> String {
 }
 
 #[test]
-fn bodies_that_break_a_rule_are_refused_with_the_rule() {
+fn malformed_bodies_are_refused_with_the_rule() {
     let short: &[u8] = &[0; 7];
     for kind in [Kind::Frame, Kind::Segment, Kind::Cancel, Kind::AssetBegin, Kind::AssetChunk, Kind::Ping] {
         malformed(kind, short);
@@ -132,7 +133,7 @@ fn bodies_that_break_a_rule_are_refused_with_the_rule() {
     for kind in [Kind::NeedAsset, Kind::Pixels, Kind::Pong, Kind::Failed] {
         malformed(kind, short);
     }
-    assert!(malformed(Kind::Drain, &[0]).contains("1 bytes where none belong"));
+    assert!(malformed(Kind::Drain, &[0]).contains("its body has 1 bytes and must be empty"));
 
     let mut frame = vec![0; 48];
     assert!(malformed(Kind::Frame, &frame).contains("0 x 0 pixels"));
@@ -143,9 +144,9 @@ fn bodies_that_break_a_rule_are_refused_with_the_rule() {
     assert!(malformed(Kind::Frame, &frame).contains("a view of 4097 bytes"));
 
     let mut segment = vec![0; 24];
-    assert!(malformed(Kind::Segment, &segment).contains("no run of rows"));
+    assert!(malformed(Kind::Segment, &segment).contains("no valid range of rows"));
     segment[16..24].copy_from_slice(&[0xff; 8]);
-    assert!(malformed(Kind::Segment, &segment).contains("no run of rows"));
+    assert!(malformed(Kind::Segment, &segment).contains("no valid range of rows"));
     assert!(malformed(Kind::Segment, &[0; 25]).contains("1 bytes left over"));
 
     let mut need = vec![0; 41];
@@ -170,18 +171,18 @@ fn bodies_that_break_a_rule_are_refused_with_the_rule() {
     chunk[32..40].copy_from_slice(&u64::MAX.to_le_bytes());
     assert!(malformed(Kind::AssetChunk, &chunk).contains("beyond the end of any asset"));
 
-    let master_goodbye = ToWorker::from_body(Kind::Goodbye, Bytes::from_static(&[3])).unwrap_err();
-    assert!(master_goodbye.to_string().contains("3 does not say when to connect again"), "{master_goodbye}");
+    let disconnect = ToWorker::from_body(Kind::Disconnect, Bytes::from_static(&[3])).unwrap_err();
+    assert!(disconnect.to_string().contains("reconnect code 3 is not known"), "{disconnect}");
 
     let mut pixels = vec![0; 88];
-    assert!(malformed(Kind::Pixels, &pixels).contains("no run of rows"));
+    assert!(malformed(Kind::Pixels, &pixels).contains("no valid range of rows"));
     pixels[20] = 1;
     pixels[24] = 9;
     assert!(malformed(Kind::Pixels, &pixels).contains("encoding 9 is not known"));
 }
 
 #[test]
-fn our_own_side_obeys_the_same_rules() {
+fn malformed_messages_are_not_sent() {
     let view = Bytes::from(vec![0; limits::MAX_VIEW_BYTES + 1]);
     let announce = FrameAnnounce { frame: FrameId(1), scene: AssetId([0; 32]), width: 1, height: 1, view };
     let none = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count: 0 };

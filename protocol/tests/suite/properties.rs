@@ -1,10 +1,10 @@
-//! Whatever the values, what is sent is what arrives; whatever the bytes, nothing panics.
+//! Properties: all messages survive a round trip, and arbitrary bytes cause no panic.
 
 use bytes::Bytes;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use rayfarm_protocol::message::Message;
-use rayfarm_protocol::passing::{ShareKey, Token};
+use rayfarm_protocol::peer::{ShareKey, Token};
 use rayfarm_protocol::session::spawn;
 use rayfarm_protocol::{
     AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelsHeader, ToMaster,
@@ -35,8 +35,8 @@ fn bytes(sizes: std::ops::Range<usize>) -> impl Strategy<Value = Bytes> {
     vec(any::<u8>(), sizes).prop_map(Bytes::from)
 }
 
-/// The wire carries neither a flow nor a scope.
-fn plain(address: std::net::SocketAddr) -> std::net::SocketAddr {
+/// Removes flow and scope of an address, which the wire does not carry.
+fn without_scope(address: std::net::SocketAddr) -> std::net::SocketAddr {
     (address.ip(), address.port()).into()
 }
 
@@ -61,7 +61,7 @@ fn to_worker() -> impl Strategy<Value = ToWorker> {
             |(id, size, peer, token)| ToWorker::AssetFrom {
                 id,
                 size,
-                peer: plain(peer),
+                peer: without_scope(peer),
                 token: Token(token)
             }
         ),
@@ -75,8 +75,8 @@ fn headers() -> impl Strategy<Value = PixelsHeader> {
     let encodings = prop_oneof![
         Just(Encoding::Raw),
         Just(Encoding::Lz4),
-        Just(Encoding::Narrow),
-        Just(Encoding::NarrowLz4)
+        Just(Encoding::Rgb565),
+        Just(Encoding::Rgb565Lz4)
     ];
     (leases(), encodings, any::<[u64; 7]>()).prop_map(|(lease, encoding, numbers)| {
         let [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary] = numbers;
@@ -109,30 +109,30 @@ fn hellos() -> impl Strategy<Value = Hello> {
     })
 }
 
-/// Says these bytes to a master, and then to a worker. Each must come to an end by itself; the worker that the master
-/// took, if any. An error means that somebody waited for ever.
+/// Sends these bytes to a master, and then to a worker, as a handshake. Returns the worker that the master accepted, if
+/// any. An error means that one of the two handshakes did not end within twice its deadline.
 async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::Elapsed> {
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();
     theirs.shutdown().await.unwrap();
-    let take = |_: &Hello| Ok(Welcome { worker: 1 });
-    let patience = 2 * limits::HANDSHAKE_DEADLINE;
-    let met = tokio::time::timeout(patience, handshake::as_master(&mut ours, take)).await?.ok();
+    let accept = |_: &Hello| Ok(Welcome { worker: 1 });
+    let limit = 2 * limits::HANDSHAKE_DEADLINE;
+    let accepted = tokio::time::timeout(limit, handshake::as_master(&mut ours, accept)).await?.ok();
 
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();
     theirs.shutdown().await.unwrap();
     let hello = Hello { name: String::new(), threads: 1, simd: String::new(), software: String::new() };
-    let _ = tokio::time::timeout(patience, handshake::as_worker(&mut ours, &hello)).await?;
-    Ok(met)
+    let _ = tokio::time::timeout(limit, handshake::as_worker(&mut ours, &hello)).await?;
+    Ok(accepted)
 }
 
 fn block_on<T>(work: impl Future<Output = T>) -> T {
     tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(work)
 }
 
-/// Feeds bytes to a session, torn into pieces, and returns everything that came out.
-async fn hear<In: Message, Out: Message>(input: Vec<u8>, piece: usize) -> Vec<Result<In, String>> {
+/// Sends bytes to a session in pieces, and returns everything that the session delivers.
+async fn receive<In: Message, Out: Message>(input: Vec<u8>, piece: usize) -> Vec<Result<In, String>> {
     let (ours, mut theirs) = duplex(97);
     let (out, mut received, _) = spawn::<_, Out, In>(ours);
     let feed = tokio::spawn(async move {
@@ -143,13 +143,13 @@ async fn hear<In: Message, Out: Message>(input: Vec<u8>, piece: usize) -> Vec<Re
             tokio::task::yield_now().await;
         }
     });
-    let mut heard = Vec::new();
+    let mut received_all = Vec::new();
     while let Some(message) = received.recv().await {
-        heard.push(message.map_err(|error| error.to_string()));
+        received_all.push(message.map_err(|error| error.to_string()));
     }
     drop((out, received));
     feed.await.unwrap();
-    heard
+    received_all
 }
 
 async fn stream(messages: &[impl Message]) -> Vec<u8> {
@@ -164,54 +164,54 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn workers_hear_what_masters_say(messages in vec(to_worker(), 1..8), piece in 1..200usize) {
-        let heard = block_on(async { hear::<ToWorker, ToMaster>(stream(&messages).await, piece).await });
-        prop_assert_eq!(heard, messages.into_iter().map(Ok).collect::<Vec<_>>());
+    fn messages_to_a_worker_round_trip(messages in vec(to_worker(), 1..8), piece in 1..200usize) {
+        let received = block_on(async { receive::<ToWorker, ToMaster>(stream(&messages).await, piece).await });
+        prop_assert_eq!(received, messages.into_iter().map(Ok).collect::<Vec<_>>());
     }
 
     #[test]
-    fn masters_hear_what_workers_say(messages in vec(to_master(), 1..8), piece in 1..200usize) {
-        let heard = block_on(async { hear::<ToMaster, ToWorker>(stream(&messages).await, piece).await });
-        prop_assert_eq!(heard, messages.into_iter().map(Ok).collect::<Vec<_>>());
+    fn messages_to_a_master_round_trip(messages in vec(to_master(), 1..8), piece in 1..200usize) {
+        let received = block_on(async { receive::<ToMaster, ToWorker>(stream(&messages).await, piece).await });
+        prop_assert_eq!(received, messages.into_iter().map(Ok).collect::<Vec<_>>());
     }
 
     #[test]
     fn arbitrary_bytes_end_in_at_most_one_error(input in vec(any::<u8>(), 0..400)) {
-        let heard = block_on(hear::<ToMaster, ToWorker>(input, 64));
-        prop_assert!(heard.iter().filter(|message| message.is_err()).count() <= 1);
-        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+        let received = block_on(receive::<ToMaster, ToWorker>(input, 64));
+        prop_assert!(received.iter().filter(|message| message.is_err()).count() <= 1);
+        prop_assert!(received.iter().rev().skip(1).all(Result::is_ok), "a message follows an error");
     }
 
     #[test]
-    fn a_mutated_stream_ends_in_at_most_one_error(
+    fn a_corrupted_stream_to_a_worker_ends_in_at_most_one_error(
         messages in vec(to_worker(), 1..5),
         hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
-        let heard = block_on(async {
+        let received = block_on(async {
             let mut bytes = stream(&messages).await;
             for (at, value) in hits {
                 let at = at.index(bytes.len());
                 bytes[at] = value;
             }
-            hear::<ToWorker, ToMaster>(bytes, 64).await
+            receive::<ToWorker, ToMaster>(bytes, 64).await
         });
-        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+        prop_assert!(received.iter().rev().skip(1).all(Result::is_ok), "a message follows an error");
     }
 
     #[test]
-    fn a_mutated_stream_of_a_worker_ends_in_at_most_one_error(
+    fn a_corrupted_stream_to_a_master_ends_in_at_most_one_error(
         messages in vec(to_master(), 1..5),
         hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
-        let heard = block_on(async {
+        let received = block_on(async {
             let mut bytes = stream(&messages).await;
             for (at, value) in hits {
                 let at = at.index(bytes.len());
                 bytes[at] = value;
             }
-            hear::<ToMaster, ToWorker>(bytes, 64).await
+            receive::<ToMaster, ToWorker>(bytes, 64).await
         });
-        prop_assert!(heard.iter().rev().skip(1).all(Result::is_ok), "something came after an error");
+        prop_assert!(received.iter().rev().skip(1).all(Result::is_ok), "a message follows an error");
     }
 
     #[test]
@@ -221,7 +221,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mutated_handshake_is_refused_or_still_one(
+    fn a_corrupted_handshake_is_refused_or_valid(
         hello in hellos(),
         hits in vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
@@ -246,11 +246,11 @@ proptest! {
     }
 
     #[test]
-    fn reasons_of_any_length_and_content_arrive_short_and_printable(reason in "\\PC{0,40}|[\\x00-\\x1f]{0,9}|(ä){3000}") {
-        let sent = ToMaster::Goodbye { reason: reason.clone() };
-        let heard = block_on(async { hear::<ToMaster, ToWorker>(wire(&sent).await, 1000).await });
-        let Some(Ok(ToMaster::Goodbye { reason: arrived })) = heard.into_iter().next() else {
-            return Err(TestCaseError::fail("no goodbye"));
+    fn reasons_of_any_content_arrive_bounded_and_printable(reason in "\\PC{0,40}|[\\x00-\\x1f]{0,9}|(ä){3000}") {
+        let sent = ToMaster::Disconnect { reason: reason.clone() };
+        let received = block_on(async { receive::<ToMaster, ToWorker>(wire(&sent).await, 1000).await });
+        let Some(Ok(ToMaster::Disconnect { reason: arrived })) = received.into_iter().next() else {
+            return Err(TestCaseError::fail("no disconnect"));
         };
         prop_assert!(arrived.len() <= limits::MAX_REASON_BYTES && printable(&arrived) == arrived);
         prop_assert!(!arrived.is_empty());

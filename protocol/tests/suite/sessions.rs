@@ -1,8 +1,9 @@
-//! Sessions over in-memory pipes: order, back pressure, endings.
+//! Sessions over in-memory pipes: order of messages, back pressure, ends.
 
 use std::time::Duration;
 
 use bytes::Bytes;
+use rayfarm_protocol::envelope::Kind;
 use rayfarm_protocol::session::{Receiver, SendError, Sender, TrySendError, spawn};
 use rayfarm_protocol::{AssetId, FrameId, ProtocolError, Reconnect, ToMaster, ToWorker, limits};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
@@ -40,7 +41,7 @@ async fn messages_arrive_through_pipes_of_any_width() {
 
 #[tokio::test]
 async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
-    // The peer reads nothing until everything is queued; pipe and write buffer hold less than one chunk.
+    // The peer reads nothing until all messages are queued. Pipe and write buffer hold less than one chunk.
     let (ours, theirs) = duplex(64);
     let (out, _in, _) = spawn::<_, ToWorker, ToMaster>(ours);
     out.send(ToWorker::Ping { nonce: 1 }).await.unwrap();
@@ -49,7 +50,7 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     }
     tokio::task::yield_now().await;
     out.send(ToWorker::Cancel { before: FrameId(9) }).await.unwrap();
-    out.send(ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never }).await.unwrap();
+    out.send(ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never }).await.unwrap();
 
     let (_out, mut received, _) = spawn::<_, ToMaster, ToWorker>(theirs);
     let mut order = Vec::new();
@@ -60,26 +61,32 @@ async fn control_overtakes_bulk_and_bulk_never_overtakes_earlier_control() {
     assert_eq!(at(&ToWorker::Ping { nonce: 1 }), 0);
     assert!(at(&ToWorker::Cancel { before: FrameId(9) }) < at(&chunk(1000, 20_000)));
     assert!(at(&chunk(1000, 20_000)) < at(&chunk(2000, 20_000)));
-    assert_eq!(order.last(), Some(&ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never }));
+    assert_eq!(
+        order.last(),
+        Some(&ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never })
+    );
     assert_eq!(order.len(), 7);
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_goodbye_is_flushed_and_closes() {
+async fn a_disconnect_is_flushed_and_closes() {
     let ((master_out, mut master_in), (worker_out, mut worker_in)) = pair(1 << 16);
     worker_out.send(pixels(3, 5000)).await.unwrap();
-    worker_out.send(ToMaster::Goodbye { reason: "shutting down".into() }).await.unwrap();
+    worker_out.send(ToMaster::Disconnect { reason: "shutting down".into() }).await.unwrap();
     assert_eq!(master_in.recv().await.unwrap().unwrap(), pixels(3, 5000));
     assert_eq!(
         master_in.recv().await.unwrap().unwrap(),
-        ToMaster::Goodbye { reason: "shutting down".into() }
+        ToMaster::Disconnect { reason: "shutting down".into() }
     );
     assert!(master_in.recv().await.is_none());
-    // The other direction is open for a moment: the master can answer, and close.
-    master_out.send(ToWorker::Goodbye { reason: "bye".into(), reconnect: Reconnect::Never }).await.unwrap();
+    // The other direction stays open for `CLOSE_GRACE`, so the master can reply and close.
+    master_out
+        .send(ToWorker::Disconnect { reason: "bye".into(), reconnect: Reconnect::Never })
+        .await
+        .unwrap();
     assert_eq!(
         worker_in.recv().await.unwrap().unwrap(),
-        ToWorker::Goodbye { reason: "bye".into(), reconnect: Reconnect::Never }
+        ToWorker::Disconnect { reason: "bye".into(), reconnect: Reconnect::Never }
     );
     assert!(worker_in.recv().await.is_none());
     worker_out.closed().await;
@@ -88,19 +95,19 @@ async fn a_goodbye_is_flushed_and_closes() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn after_a_goodbye_a_peer_that_does_not_close_is_not_waited_for() {
+async fn a_disconnect_waits_for_the_peer_to_close_for_a_limited_time() {
     let (ours, mut theirs) = duplex(1 << 16);
     let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
     let begun = tokio::time::Instant::now();
-    out.send(ToMaster::Goodbye { reason: "enough".into() }).await.unwrap();
+    out.send(ToMaster::Disconnect { reason: "enough".into() }).await.unwrap();
     out.closed().await;
-    assert_eq!(begun.elapsed(), limits::LAST_WORD_GRACE);
+    assert_eq!(begun.elapsed(), limits::CLOSE_GRACE);
     assert!(received.recv().await.is_none());
     assert!(theirs.write_all(&[0]).await.is_err());
 }
 
 #[tokio::test]
-async fn a_goodbye_survives_though_nobody_reads_what_the_peer_still_sends() {
+async fn a_disconnect_arrives_although_the_master_does_not_read_the_peers_messages() {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let connecting = tokio::net::TcpStream::connect(listener.local_addr().unwrap());
     let (ours, theirs) = tokio::join!(connecting, listener.accept());
@@ -108,17 +115,17 @@ async fn a_goodbye_survives_though_nobody_reads_what_the_peer_still_sends() {
     let (worker_out, mut worker_in, _) = spawn::<_, ToMaster, ToWorker>(theirs.unwrap().0);
     drop(received);
     let busy = tokio::spawn(async move { while worker_out.send(pixels(1, 100_000)).await.is_ok() {} });
-    out.send(ToWorker::Goodbye { reason: "the end".into(), reconnect: Reconnect::Never }).await.unwrap();
+    out.send(ToWorker::Disconnect { reason: "the end".into(), reconnect: Reconnect::Never }).await.unwrap();
     out.closed().await;
-    // Only now does the worker look: the connection is gone, its last word is not.
-    let heard = worker_in.recv().await.unwrap().unwrap();
-    assert_eq!(heard, ToWorker::Goodbye { reason: "the end".into(), reconnect: Reconnect::Never });
+    // The worker reads after the connection has ended.
+    let received = worker_in.recv().await.unwrap().unwrap();
+    assert_eq!(received, ToWorker::Disconnect { reason: "the end".into(), reconnect: Reconnect::Never });
     drop(worker_in);
     busy.await.unwrap();
 }
 
 #[tokio::test]
-async fn dropping_the_senders_writes_what_they_sent() {
+async fn queued_messages_are_written_after_the_senders_are_dropped() {
     let ((master_out, _master_in), (_worker_out, mut worker_in)) = pair(16);
     master_out.send(chunk(0, 4000)).await.unwrap();
     master_out.clone().send(ToWorker::Drain).await.unwrap();
@@ -132,7 +139,7 @@ async fn dropping_the_senders_writes_what_they_sent() {
 }
 
 #[tokio::test]
-async fn a_full_queue_gives_the_message_back() {
+async fn a_full_queue_returns_the_message() {
     let (ours, _theirs) = duplex(16);
     let (out, _in, _) = spawn::<_, ToMaster, ToWorker>(ours);
     let mut sent = 0;
@@ -146,21 +153,24 @@ async fn a_full_queue_gives_the_message_back() {
     };
     assert_eq!(returned, pixels(sent, 3000));
     assert!(sent as usize <= limits::BULK_QUEUE + 2, "{sent} messages were taken");
-    // Control has a queue of its own.
+    // Control messages have their own queue.
     out.try_send(ToMaster::Pong { nonce: 1 }).unwrap();
 }
 
 #[tokio::test]
-async fn a_message_beyond_its_bound_is_not_sent_and_harms_nobody() {
+async fn a_message_out_of_bounds_is_not_sent_and_the_session_continues() {
     let ((master_out, _master_in), (_worker_out, mut worker_in)) = pair(1 << 20);
     let error = master_out.send(chunk(0, limits::MAX_CHUNK_BYTES + 1)).await.unwrap_err();
-    assert!(error.to_string().contains("262145 bytes"), "{error}");
+    let SendError::Invalid(ProtocolError::Malformed { kind: Kind::AssetChunk, why }) = error else {
+        panic!("{error}");
+    };
+    assert!(why.contains("262145 bytes"), "{why}");
     master_out.send(chunk(0, limits::MAX_CHUNK_BYTES)).await.unwrap();
     assert_eq!(worker_in.recv().await.unwrap().unwrap(), chunk(0, limits::MAX_CHUNK_BYTES));
 }
 
 #[tokio::test]
-async fn aborting_ends_both_directions_at_once() {
+async fn abort_ends_both_directions_at_once() {
     let ((master_out, mut master_in), (_worker_out, mut worker_in)) = pair(16);
     master_out.send(chunk(0, 4000)).await.unwrap();
     master_out.abort();
@@ -171,7 +181,7 @@ async fn aborting_ends_both_directions_at_once() {
 }
 
 #[tokio::test]
-async fn closing_anywhere_is_an_end_or_a_named_error() {
+async fn a_close_within_an_envelope_is_an_error() {
     let bytes = wire(&ToMaster::Pong { nonce: 5 }).await;
     for cut in 0..=bytes.len() {
         let (ours, mut theirs) = duplex(1 << 16);
@@ -193,15 +203,15 @@ async fn closing_anywhere_is_an_end_or_a_named_error() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn silence_is_allowed_and_half_an_envelope_has_a_deadline() {
+async fn silence_is_unlimited_between_envelopes_and_limited_within_one() {
     let bytes = wire(&ToMaster::Pong { nonce: 5 }).await;
-    for torn_at in [1, 7, 8, 12] {
+    for cut in [1, 7, 8, 12] {
         let (ours, mut theirs) = duplex(1 << 16);
         let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
         tokio::time::sleep(Duration::from_secs(3600)).await;
         theirs.write_all(&bytes).await.unwrap();
         assert_eq!(received.recv().await.unwrap().unwrap(), ToMaster::Pong { nonce: 5 });
-        theirs.write_all(&bytes[..torn_at]).await.unwrap();
+        theirs.write_all(&bytes[..cut]).await.unwrap();
         let error = received.recv().await.unwrap().unwrap_err();
         assert!(matches!(error, ProtocolError::Deadline { .. }), "{error}");
         assert!(received.recv().await.is_none());
@@ -209,7 +219,7 @@ async fn silence_is_allowed_and_half_an_envelope_has_a_deadline() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_peer_that_does_not_read_is_given_up() {
+async fn a_peer_that_does_not_read_times_out() {
     let (ours, theirs) = duplex(16);
     let (out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
     out.send(chunk(0, 4000)).await.unwrap();
@@ -220,18 +230,20 @@ async fn a_peer_that_does_not_read_is_given_up() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn the_last_word_is_heard_though_the_writer_has_failed() {
+async fn a_disconnect_is_received_although_the_writer_has_failed() {
     let (ours, mut theirs) = duplex(1 << 16);
     let (out, mut received, _) = spawn::<_, ToMaster, ToWorker>(ours);
     theirs
-        .write_all(&wire(&ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }).await)
+        .write_all(
+            &wire(&ToWorker::Disconnect { reason: "kicked".into(), reconnect: Reconnect::Never }).await,
+        )
         .await
         .unwrap();
     drop(theirs);
     let _ = out.send(ToMaster::Drain).await;
     assert_eq!(
         received.recv().await.unwrap().unwrap(),
-        ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }
+        ToWorker::Disconnect { reason: "kicked".into(), reconnect: Reconnect::Never }
     );
 }
 
@@ -242,17 +254,17 @@ async fn after_an_error_nothing_more_is_delivered() {
     theirs.write_all(&[0, 0, 0, 0, 0x77, 0, 0, 0]).await.unwrap();
     theirs.write_all(&wire(&ToMaster::Drain).await).await.unwrap();
     let error = received.recv().await.unwrap().unwrap_err();
-    assert!(error.to_string().contains("0x77"), "{error}");
+    assert!(matches!(error, ProtocolError::UnknownKind { kind: 0x77 }), "{error}");
     assert!(received.recv().await.is_none());
 }
 
 #[tokio::test]
-async fn a_message_for_the_other_side_is_named() {
+async fn a_message_of_the_other_direction_is_refused() {
     let (ours, mut theirs) = duplex(1 << 16);
     let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
     theirs.write_all(&wire(&ToWorker::Segment(lease(1))).await).await.unwrap();
     let error = received.recv().await.unwrap().unwrap_err();
-    assert!(error.to_string().contains("a Segment message, where a message from a worker"), "{error}");
+    assert!(matches!(error, ProtocolError::Unexpected { kind: Kind::Segment, .. }), "{error}");
 }
 
 #[tokio::test]
@@ -262,7 +274,7 @@ async fn traffic_counts_whole_envelopes() {
     let mut b = b;
     out.send(ToWorker::Ping { nonce: 1 }).await.unwrap();
     out.send(chunk(0, 1000)).await.unwrap();
-    out.send(ToWorker::Goodbye { reason: "end".into(), reconnect: Reconnect::Never }).await.unwrap();
+    out.send(ToWorker::Disconnect { reason: "end".into(), reconnect: Reconnect::Never }).await.unwrap();
     let mut all = Vec::new();
     b.read_to_end(&mut all).await.unwrap();
     assert_eq!(traffic.sent_bytes(), all.len() as u64);
@@ -277,7 +289,7 @@ async fn traffic_counts_whole_envelopes() {
 }
 
 #[tokio::test]
-async fn an_inbox_that_nobody_empties_stops_the_reader() {
+async fn a_full_inbox_stops_the_reader() {
     let (ours, mut theirs) = duplex(1 << 20);
     let (_out, mut received, traffic) = spawn::<_, ToWorker, ToMaster>(ours);
     let bytes = wire(&pixels(1, limits::MAX_PIXELS_BYTES)).await;
@@ -289,7 +301,7 @@ async fn an_inbox_that_nobody_empties_stops_the_reader() {
     });
     let message = received.recv().await.unwrap().unwrap();
     assert_eq!(message, pixels(1, limits::MAX_PIXELS_BYTES));
-    // One was handed out; at most two more fit before the user takes another.
+    // One message was delivered. At most two more fit before the next one is.
     for _ in 0..1000 {
         tokio::task::yield_now().await;
     }

@@ -1,4 +1,4 @@
-//! Where the time went, as the programs tell it: sums that must be 100, and a timeline that others can read.
+//! Tests of the accounting of time: percentages that sum to 100, and a timeline in the format of trace viewers.
 
 use std::collections::BTreeMap;
 
@@ -13,6 +13,7 @@ fn render(scenes: &Scenes, args: &str) -> Running {
     Running::start(command.args(args.split_whitespace()).current_dir(scenes.path("")))
 }
 
+/// Whether these are the percentages of all parts, and sum to 100.
 fn sums_to_a_hundred(percent: &[f64]) -> bool {
     percent.len() == PARTS.len()
         && percent.iter().all(|part| (0.0..=100.0).contains(part))
@@ -24,7 +25,7 @@ fn percent(account: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn the_parts_of_every_workers_time_sum_to_a_hundred() {
+fn the_parts_of_each_workers_time_sum_to_100_percent() {
     let scenes = Scenes::new();
     let args =
         "-o f-%02d.ppm --frames 20 --local-workers 2 --threads 1 --json --fps-log log.csv --size 320x240";
@@ -36,7 +37,7 @@ fn the_parts_of_every_workers_time_sum_to_a_hundred() {
     for account in workers.iter().chain([accounting]) {
         assert!(sums_to_a_hundred(&percent(account)), "{accounting}");
     }
-    assert!(percent(accounting)[0] > 0.0, "somebody has traced: {accounting}");
+    assert!(percent(accounting)[0] > 0.0, "the workers have traced: {accounting}");
     let of_all = |field: &str| workers.iter().map(|worker| worker[field].as_u64().unwrap()).sum::<u64>();
     assert!(of_all("rows") >= 20 * 240, "{accounting}");
     assert!(of_all("pixel_bytes") > 0 && of_all("segments") >= 20, "{accounting}");
@@ -48,7 +49,7 @@ fn the_parts_of_every_workers_time_sum_to_a_hundred() {
     for line in log.lines().skip(1) {
         let columns: Vec<f64> =
             line.split(',').skip(11).take(7).map(|column| column.parse().unwrap()).collect();
-        // A frame that is complete at the moment of the one before has taken no time of its own.
+        // A frame that is complete at the same time as its predecessor has no time of its own.
         let took_nothing = columns.iter().all(|part| *part == 0.0);
         assert!(sums_to_a_hundred(&columns) || took_nothing, "{line}");
         timed += usize::from(!took_nothing);
@@ -56,7 +57,7 @@ fn the_parts_of_every_workers_time_sum_to_a_hundred() {
     assert!(timed > 0, "{log}");
 }
 
-/// The complete events of each track, in nanoseconds: where they begin and end, and what they are.
+/// Returns the complete events of each track as begin and end in nanoseconds and category.
 fn tracks(events: &[Value]) -> BTreeMap<u64, Vec<(i64, i64, String)>> {
     let mut tracks: BTreeMap<u64, Vec<(i64, i64, String)>> = BTreeMap::new();
     for event in events.iter().filter(|event| event["ph"] == "X") {
@@ -72,7 +73,7 @@ fn tracks(events: &[Value]) -> BTreeMap<u64, Vec<(i64, i64, String)>> {
     tracks
 }
 
-/// Events of a track follow each other or lie inside each other.
+/// Checks that events of a track are disjoint or nested.
 fn assert_nested(events: &[(i64, i64, String)]) {
     let mut events = events.to_vec();
     events.sort_by_key(|(from, to, kind)| (*from, -to, kind == "part"));
@@ -83,14 +84,14 @@ fn assert_nested(events: &[(i64, i64, String)]) {
         }
         assert!(
             open.last().is_none_or(|end| to <= end),
-            "{kind} from {from} to {to} leaves the one around it"
+            "{kind} from {from} to {to} overlaps the event that contains its beginning"
         );
         open.push(*to);
     }
 }
 
 #[test]
-fn a_trace_has_a_track_for_every_worker_and_its_events_nest() {
+fn a_timeline_has_a_track_per_worker_and_its_events_nest() {
     let scenes = Scenes::new();
     let args = "-o f-%02d.ppm --frames 12 --local-workers 2 --threads 1 --trace trace.json --size 320x240";
     render(&scenes, args).finish().expect_success();
@@ -106,14 +107,14 @@ fn a_trace_has_a_track_for_every_worker_and_its_events_nest() {
 }
 
 #[test]
-fn a_trace_of_an_interrupted_run_is_whole() {
+fn the_timeline_of_an_interrupted_run_is_complete() {
     for signal in ["INT", "TERM"] {
         let scenes = Scenes::new();
         let master = render(&scenes, "-o f-%07d.ppm --frames 1000000 --trace trace.json --size 32x24");
-        // Not there at first, and now and then half written.
+        // The file does not exist at first, and may be incomplete at any time.
         let written = || std::fs::read(scenes.path("trace.json")).unwrap_or_default();
         let events = || serde_json::from_slice::<Vec<Value>>(&written()).unwrap_or_default();
-        wait_until("something is traced", || events().iter().any(|event| event["cat"] == "frame"));
+        wait_until("the timeline has a frame", || events().iter().any(|event| event["cat"] == "frame"));
         master.signal(signal);
         master.finish();
         let events: Vec<Value> = serde_json::from_slice(&scenes.read("trace.json")).unwrap();
@@ -122,7 +123,7 @@ fn a_trace_of_an_interrupted_run_is_whole() {
 }
 
 #[test]
-fn a_trace_that_cannot_be_written_is_found_first() {
+fn a_timeline_that_cannot_be_written_is_refused_before_rendering() {
     let scenes = Scenes::new();
     render(&scenes, "-o a.ppm --trace missing/trace.json")
         .finish()

@@ -1,14 +1,13 @@
-//! `scripts/bench_farm.py --quick`: every experiment leaves its tables and plots, and a report that names them.
+//! Tests of `scripts/bench_farm.py --quick`: each experiment writes its tables and plots, and a report with links to them.
 
 use std::path::Path;
 use std::process::Command;
 
-use rayfarm_tests::{Outcome, Running, master, project_root};
+use rayfarm_tests::{Outcome, Running, master, project_root, require};
 
-/// Runs the script with the programs under test. `None` where there is no Python.
+/// Runs the script with the programs under test. Requires Python.
 fn bench_farm(folder: &Path, arguments: &[&str]) -> Option<Outcome> {
-    if Command::new("python3").arg("--version").output().is_err() {
-        eprintln!("skipped: python3 is not installed");
+    if !require(&["python3"]) {
         return None;
     }
     let programs = Path::new(master().get_program()).parent().unwrap().to_owned();
@@ -18,7 +17,7 @@ fn bench_farm(folder: &Path, arguments: &[&str]) -> Option<Outcome> {
     Some(Running::start(&mut command).finish())
 }
 
-/// Expects an experiment to leave these files, and a report that shows them.
+/// Runs experiments, and checks that they write these tables and plots and a report with links to them.
 fn expect_experiment(name: &str, tables: &[&str], plots: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let Some(outcome) = bench_farm(folder.path(), &["--only", name]) else { return };
@@ -67,11 +66,11 @@ fn simulated_workers() {
 }
 
 #[test]
-fn a_dry_run_calls_nothing_and_an_unknown_name_is_refused() {
+fn a_dry_run_writes_nothing_and_an_unknown_name_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let Some(outcome) = bench_farm(folder.path(), &["--dry-run"]) else { return };
     assert!(outcome.expect_success().stdout.lines().count() > 20);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     let refused = bench_farm(folder.path(), &["--only", "everything"]).unwrap();
-    refused.expect_failure(2, &["there is no everything, but segment-size"]);
+    refused.expect_failure(2, &["everything", "segment-size"]);
 }

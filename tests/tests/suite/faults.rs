@@ -1,10 +1,11 @@
-//! A frame is never lost: workers die, hang and come in the middle of a run, and every picture is the right one.
+//! Tests of faults: workers that are killed, hang or join in the middle of a run. No frame is lost, and no byte of a
+//! picture changes.
 
 use std::path::PathBuf;
 
 use rayfarm_tests::{Outcome, Running, Scenes, free_port, master, wait_until, worker};
 
-/// A `render` of some frames by workers that connect to it.
+/// A `render` of some frames by external workers.
 struct Run {
     scenes: Scenes,
     port: u16,
@@ -13,7 +14,7 @@ struct Run {
 }
 
 impl Run {
-    /// Begins to render when `workers` workers are there.
+    /// Starts a master that begins to render when `workers` workers are connected.
     fn start(frames: usize, workers: u32) -> Self {
         Self::start_on(free_port(), frames, workers)
     }
@@ -44,7 +45,7 @@ impl Run {
         self.path(self.frames - 1).exists()
     }
 
-    /// Waits for the end; all frames.
+    /// Waits for the end and returns all frames.
     fn finish(self) -> Vec<Vec<u8>> {
         let paths: Vec<_> = (0..self.frames).map(|frame| self.path(frame)).collect();
         self.master.finish().expect_success();
@@ -58,28 +59,28 @@ fn start_worker(port: u16, name: &str) -> Running {
     Running::start(&mut command)
 }
 
-/// What the frames must be: rendered by one worker that nothing happens to.
+/// Renders the expected frames, with one worker and no fault.
 fn undisturbed(frames: usize) -> Vec<Vec<u8>> {
     let run = Run::start(frames, 1);
-    let _worker = run.worker("calm");
+    let _worker = run.worker("only");
     run.finish()
 }
 
-/// Disturbs a run and compares every frame with the undisturbed ones. What happens to a worker after the last frame
-/// proves nothing, and a test cannot know how fast its machine is: where `disturbed` says that the run was over too
-/// soon, by `None`, it is done again with more frames.
-fn expect_unharmed(disturbed: impl Fn(usize) -> Option<Vec<Vec<u8>>>) {
+/// Runs with a fault and compares every frame with a run without one. A fault after the last frame tests nothing, and the
+/// speed of the machine is unknown: where `disturbed` returns `None` because the run was over first, it is called again
+/// with more frames.
+fn expect_same_frames(disturbed: impl Fn(usize) -> Option<Vec<Vec<u8>>>) {
     let tries = [100, 400, 1600, 6400].into_iter();
     let (frames, pictures) = tries
         .filter_map(|frames| Some((frames, disturbed(frames)?)))
         .next()
-        .expect("every run was over too soon");
+        .expect("every run was over before its fault");
     assert!(pictures == undisturbed(frames));
 }
 
 #[test]
-fn a_killed_worker_costs_no_frame_and_no_byte() {
-    expect_unharmed(|frames| {
+fn a_killed_worker_changes_no_frame() {
+    expect_same_frames(|frames| {
         let run = Run::start(frames, 2);
         let (victim, _other) = (run.worker("victim"), run.worker("other"));
         run.wait_for_frame(2);
@@ -89,8 +90,8 @@ fn a_killed_worker_costs_no_frame_and_no_byte() {
 }
 
 #[test]
-fn a_hung_worker_costs_no_frame_and_no_byte() {
-    expect_unharmed(|frames| {
+fn a_hung_worker_changes_no_frame() {
+    expect_same_frames(|frames| {
         let run = Run::start(frames, 2);
         let (victim, _other) = (run.worker("victim"), run.worker("other"));
         run.wait_for_frame(2);
@@ -102,38 +103,38 @@ fn a_hung_worker_costs_no_frame_and_no_byte() {
 }
 
 #[test]
-fn when_the_last_worker_dies_the_next_one_goes_on() {
-    expect_unharmed(|frames| {
+fn a_run_continues_with_a_worker_that_joins_after_the_last_one_was_killed() {
+    expect_same_frames(|frames| {
         let run = Run::start(frames, 1);
         let first = run.worker("first");
         run.wait_for_frame(3);
         first.signal("KILL");
-        let under_way = !run.is_over();
+        let is_running = !run.is_over();
         drop(first);
         let _second = run.worker("second");
-        under_way.then(|| run.finish())
+        is_running.then(|| run.finish())
     });
 }
 
 #[test]
-fn a_worker_waits_for_a_master_that_comes_later_and_is_sent_home_at_the_end() {
+fn a_worker_waits_for_a_later_master_and_ends_with_it() {
     let port = free_port();
     let mut command = worker();
     command.args(["--master", &format!("127.0.0.1:{port}"), "--threads", "1", "--once"]);
     let mut early = Running::start(&mut command);
-    early.wait_for("waiting for it");
+    early.wait_for("retrying");
     assert_eq!(Run::start_on(port, 3, 1).finish().len(), 3);
     early.finish().expect_success();
 }
 
 #[test]
-fn a_worker_serves_one_master_after_the_other_until_it_is_interrupted() {
+fn a_worker_serves_one_master_after_another_until_it_is_interrupted() {
     let port = free_port();
-    let mut worker = start_worker(port, "stays");
-    worker.wait_for("waiting for it");
+    let mut worker = start_worker(port, "persistent");
+    worker.wait_for("retrying");
     let first = Run::start_on(port, 3, 1).finish();
-    worker.wait_for("waiting for the next one");
-    // One that is killed says nothing: it is waited for likewise.
+    worker.wait_for("waiting for the next master");
+    // A killed master sends no disconnect. The worker reconnects all the same.
     let killed = Run::start_on(port, 10_000, 1);
     killed.wait_for_frame(1);
     killed.master.signal("KILL");
@@ -147,7 +148,7 @@ fn a_worker_serves_one_master_after_the_other_until_it_is_interrupted() {
 }
 
 #[test]
-fn local_workers_end_with_their_master_however_it_ends() {
+fn local_workers_end_with_their_master() {
     for name in ["KILL", "INT", "TERM"] {
         let scenes = Scenes::new();
         let mut command = master();
@@ -159,7 +160,7 @@ fn local_workers_end_with_their_master_however_it_ends() {
         assert_eq!(workers.len(), 2, "before {name}");
         master.signal(name);
         let outcome = master.finish();
-        assert_ne!(outcome.code, Some(0), "{name}: the run was not finished");
+        assert_ne!(outcome.code, Some(0), "{name}: the run is not complete");
         let alive = |id: &u32| std::path::Path::new(&format!("/proc/{id}/cmdline")).exists();
         wait_until("the local workers have ended", || !workers.iter().any(alive));
         assert!(!scenes.names().iter().any(|name| name.contains("tmp")), "{:?}", scenes.names());
@@ -171,7 +172,7 @@ fn wait_for_frame_of(scenes: &Scenes, name: &str) {
 }
 
 #[test]
-fn ctrl_c_says_how_far_the_run_came() {
+fn an_interrupted_run_reports_its_progress() {
     let scenes = Scenes::new();
     let mut command = master();
     command.arg("render").arg(scenes.path("small.toml")).arg("-o").arg(scenes.path("f-%05d.png"));

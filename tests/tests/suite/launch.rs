@@ -1,4 +1,4 @@
-//! `scripts/workers.sh` with a shell in place of ssh: a folder is a machine, and its home.
+//! Tests of `scripts/workers.sh` with a shell in place of ssh: each folder represents a machine and is its home folder.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
@@ -6,8 +6,8 @@ use std::process::Command;
 
 use rayfarm_tests::{Outcome, Running, Scenes, free_port, master, project_root, wait_until, worker};
 
-/// Takes what ssh takes. A machine that has no folder cannot be reached. What comes of copies is in $COPY; programs in the
-/// machine's folder `bin` come first.
+/// A replacement of ssh with the same arguments. A machine without a folder is unreachable. `$COPY` selects a fault of the
+/// copy. Programs in the machine's folder `bin` take precedence.
 const NOT_SSH: &str = r#"#!/bin/sh
 while [ "$1" = -p ]; do shift 2; done
 HOME=$MACHINES/$1 PATH=$MACHINES/$1/bin:$PATH
@@ -23,7 +23,7 @@ case $*$COPY in
 esac
 "#;
 
-/// A program that stays, and does not become smaller: it ends with half a megabyte of noise.
+/// Returns a script that runs until it is killed and does not compress well: it ends with half a megabyte of noise.
 fn big_program() -> Vec<u8> {
     let script = "#!/bin/sh\n[ \"$1\" = --version ] && exit\necho connected to the master\nwhile :; do sleep 0.1; done\n";
     let mut state = 1u64;
@@ -34,7 +34,7 @@ fn big_program() -> Vec<u8> {
     script.bytes().chain(noise.take(500_000)).collect()
 }
 
-/// Some machines, whose workers end with the test.
+/// Some machines. Their workers end with the test.
 struct Room {
     scenes: Scenes,
     port: u16,
@@ -61,12 +61,12 @@ impl Room {
         path
     }
 
-    /// `workers.sh ACTION hosts ARGUMENT ...`
+    /// Runs `workers.sh ACTION hosts ARGUMENT ...`.
     fn workers(&self, action: &str, arguments: &[&str]) -> Outcome {
         self.workers_with("", action, arguments)
     }
 
-    /// Likewise, with something the matter with copies.
+    /// Runs `workers.sh` with a fault of the copy.
     fn workers_with(&self, copy: &str, action: &str, arguments: &[&str]) -> Outcome {
         let mut command = Command::new(project_root().join("scripts/workers.sh"));
         command.arg(action).arg(self.path("hosts")).arg("--ssh").arg(self.path("not-ssh"));
@@ -74,13 +74,14 @@ impl Room {
         Running::start(&mut command).finish()
     }
 
+    /// Starts the worker under test on all machines.
     fn start(&self, more: &[&str]) -> Outcome {
         let program = worker().get_program().to_str().unwrap().to_owned();
         let master = format!("127.0.0.1:{}", self.port);
         self.workers("start", &[&["--master", &master, "--worker", &program], more].concat())
     }
 
-    /// Starts the big program on the machine `there`.
+    /// Starts the script of [`big_program`] on the machine `there`.
     fn start_big(&self, copy: &str, more: &[&str]) -> Outcome {
         let program = self.scenes.write("big", big_program());
         std::fs::set_permissions(&program, PermissionsExt::from_mode(0o755)).unwrap();
@@ -88,7 +89,7 @@ impl Room {
         self.workers_with(copy, "start", &[&arguments, more].concat())
     }
 
-    /// The files that were put on the machine `there`.
+    /// Returns the names of the files that were copied to the machine `there`.
     fn files_there(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.path("there/.rayfarm")).unwrap();
         let mut names: Vec<_> =
@@ -97,7 +98,7 @@ impl Room {
         names
     }
 
-    /// A master that begins to render when that number of workers is there.
+    /// Starts a master that begins to render when that number of workers is connected.
     fn master(&self, workers: &str) -> Running {
         let mut command = master();
         command
@@ -117,7 +118,7 @@ impl Drop for Room {
     }
 }
 
-/// The line about a worker.
+/// Returns the line about a worker.
 fn line<'a>(outcome: &'a Outcome, name: &str) -> &'a str {
     let found = outcome.stdout.lines().find(|line| line.split_whitespace().next() == Some(name));
     assert!(found.is_some(), "no line about {name}: {outcome:#?}");
@@ -134,7 +135,7 @@ fn workers_are_started_listed_and_stopped() {
 
     room.start(&[]).expect_success();
     let mut seen = String::new();
-    wait_until("all have joined", || {
+    wait_until("all workers are connected", || {
         seen = room.workers("status", &[]).expect_success().stdout;
         seen.matches("runs, process").count() == names.len()
     });
@@ -150,7 +151,7 @@ fn workers_are_started_listed_and_stopped() {
 }
 
 #[test]
-fn launched_workers_render_for_one_master_after_the_other() {
+fn launched_workers_render_for_one_master_after_another() {
     let room = Room::new(&["a", "b"], "a 1\nb 1\n");
     let mut master = room.master("2");
     room.start(&["--jobs", "1"]).expect_success();
@@ -159,7 +160,7 @@ fn launched_workers_render_for_one_master_after_the_other() {
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
         assert_eq!((&report["workers"], &report["threads"]), (&2.into(), &2.into()));
         wait_until("the workers wait for the next master", || {
-            room.workers("status", &[]).stdout.matches("waiting for the next one").count() == 2
+            room.workers("status", &[]).stdout.matches("waiting for the next master").count() == 2
         });
         master = room.master("2");
     }
@@ -173,7 +174,7 @@ fn launched_workers_render_for_one_master_after_the_other() {
 }
 
 #[test]
-fn a_copy_leaves_nothing_but_the_program() {
+fn a_copy_leaves_the_program_only() {
     let room = Room::new(&["there"], "there\n");
     std::fs::create_dir(room.path("there/.rayfarm")).unwrap();
     for left in [
@@ -181,7 +182,7 @@ fn a_copy_leaves_nothing_but_the_program() {
         "rayfarm-worker.0123.gzip.there.part",
         "rayfarm-worker.0123.plain.x.part",
     ] {
-        room.scenes.write(&format!("there/.rayfarm/{left}"), "half of an older program");
+        room.scenes.write(&format!("there/.rayfarm/{left}"), "a part of an older program");
     }
     let outcome = room.start_big("", &[]).expect_success();
     assert!(line(&outcome, "there").contains("copied 0.5 MB"), "{outcome:#?}");
@@ -192,7 +193,7 @@ fn a_copy_leaves_nothing_but_the_program() {
 }
 
 #[test]
-fn a_copy_that_breaks_off_goes_on_where_it_ended() {
+fn an_interrupted_copy_is_resumed() {
     let room = Room::new(&["there"], "there\n");
     let outcome = room.start_big("cut", &[]).expect_success();
     assert!(room.scenes.read("there/.rayfarm/rayfarm-worker") == big_program(), "{outcome:#?}");
@@ -200,9 +201,9 @@ fn a_copy_that_breaks_off_goes_on_where_it_ended() {
 }
 
 #[test]
-fn a_slow_copy_tells_its_progress_and_is_not_given_up() {
+fn a_slow_copy_reports_its_progress_and_is_not_aborted() {
     let room = Room::new(&["there"], "there\n");
-    // It takes eight seconds in all, and moves every second.
+    // The copy takes eight seconds and makes progress every second.
     let outcome = room.start_big("slow", &["--timeout", "4"]).expect_success();
     assert!(
         outcome.stderr.contains("there: copying, ") && outcome.stderr.contains(" % of 0.5 MB"),
@@ -212,7 +213,7 @@ fn a_slow_copy_tells_its_progress_and_is_not_given_up() {
 }
 
 #[test]
-fn a_copy_that_does_not_move_is_given_up_and_says_so() {
+fn a_copy_without_progress_is_aborted_with_a_message() {
     let room = Room::new(&["there"], "there\n");
     let outcome = room.start_big("silent", &["--timeout", "2"]);
     assert_eq!(outcome.code, Some(1), "{outcome:#?}");
@@ -221,10 +222,10 @@ fn a_copy_that_does_not_move_is_given_up_and_says_so() {
 }
 
 #[test]
-fn a_failure_is_told_in_the_words_of_what_failed() {
+fn a_failure_is_reported_with_the_message_of_the_failed_program() {
     let room = Room::new(&["there"], "there\n");
     std::fs::create_dir(room.path("there/bin")).unwrap();
-    let told = |program: &str, text: &str, words: &[&str]| {
+    let expect_failure = |program: &str, text: &str, words: &[&str]| {
         let path = room.program(&format!("there/bin/{program}"), text);
         let outcome = room.start_big("", &[]);
         assert_eq!(outcome.code, Some(1), "{outcome:#?}");
@@ -234,17 +235,17 @@ fn a_failure_is_told_in_the_words_of_what_failed() {
         std::fs::remove_file(path).unwrap();
     };
     let full = "#!/bin/sh\necho 'cat: write error: No space left on device' >&2; exit 1\n";
-    told("cat", full, &["cannot be copied: cat: write error: No space left on device"]);
-    // What gzip writes when the rest of the disk does not hold the program.
+    expect_failure("cat", full, &["cannot be copied: cat: write error: No space left on device"]);
+    // The message of gzip when the disk is full.
     let full = "#!/bin/sh\necho 'gzip: stdout: No space left on device' >&2; exit 1\n";
-    told("gzip", full, &["cannot write", "gzip: stdout: No space left on device"]);
+    expect_failure("gzip", full, &["cannot write", "gzip: stdout: No space left on device"]);
     std::fs::remove_dir_all(room.path("there/.rayfarm")).unwrap();
     room.scenes.write("there/.rayfarm", "a file");
-    told("unused", "", &["cannot make", ".rayfarm", "File exists"]);
+    expect_failure("unused", "", &["cannot make", ".rayfarm", "File exists"]);
 }
 
 #[test]
-fn a_machine_without_gzip_gets_the_program_as_it_is() {
+fn a_machine_without_gzip_receives_the_program_uncompressed() {
     let room = Room::new(&["there"], "there\n");
     let outcome = room.start_big("no-gzip", &[]).expect_success();
     assert!(line(&outcome, "there").contains("copied 0.5 MB"), "{outcome:#?}");
@@ -253,7 +254,7 @@ fn a_machine_without_gzip_gets_the_program_as_it_is() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_program_for_another_kind_of_machine_is_not_copied() {
+fn a_program_for_another_architecture_is_not_copied() {
     let room = Room::new(&["there"], "there\n");
     std::fs::create_dir(room.path("there/bin")).unwrap();
     room.program("there/bin/uname", "#!/bin/sh\n[ \"$1\" = -m ] && echo m68k || echo Linux\n");
@@ -265,7 +266,7 @@ fn a_program_for_another_kind_of_machine_is_not_copied() {
 }
 
 #[test]
-fn files_of_hosts_may_come_from_windows() {
+fn host_files_with_windows_line_ends_are_read() {
     for text in [
         "\u{feff}# the room\r\nthere 8 7120\r\nme@[fe80::1%eth0] 2\r\n",
         "there 8 7120\rme@[fe80::1%eth0] 2\r",
@@ -283,14 +284,14 @@ fn files_of_hosts_may_come_from_windows() {
     let room = Room::new(&[], "");
     room.scenes.write("hosts", b"\xff\xfet\0h\0e\0r\0e\0\n\0");
     room.start(&[]).expect_failure(2, &["UTF-16", "UTF-8"]);
-    // Whatever is wrong with a line, no control character of it reaches the terminal.
+    // The message about a wrong line has no control characters.
     room.scenes.write("hosts", "there 8 \u{1b}[2J\n");
     let outcome = room.start(&[]).expect_failure(2, &["is no port"]);
     assert!(!outcome.stderr.contains('\u{1b}'), "{outcome:#?}");
 }
 
 #[test]
-fn a_machine_that_fails_is_named_and_the_others_go_on() {
+fn a_machine_that_fails_is_reported_and_the_others_continue() {
     let room = Room::new(&["there"], "gone 1\nthere 1\n");
     let _master = room.master("9");
     let outcome = room.start(&[]);
@@ -305,7 +306,7 @@ fn a_machine_that_fails_is_named_and_the_others_go_on() {
 }
 
 #[test]
-fn a_program_of_another_kind_of_machine_is_told_of() {
+fn a_program_that_does_not_run_is_reported() {
     let room = Room::new(&["there"], "there\n");
     let program = room.program("strange", "#!/bin/sh\necho wrong kind of machine >&2\nexit 126\n");
     let outcome = room.workers("start", &["--master", "127.0.0.1:1", "--worker", program.to_str().unwrap()]);
@@ -314,7 +315,7 @@ fn a_program_of_another_kind_of_machine_is_told_of() {
 }
 
 #[test]
-fn every_word_arrives_as_it_was_given() {
+fn every_argument_arrives_unchanged() {
     let room = Room::new(&["there"], "there 3\n");
     let program = room.program("echoes", "#!/bin/sh\nfor word; do echo \"$word\" >>\"$HOME/words\"; done\n");
     let odd = ["it's", "two  words", "$(touch broken)", "; touch broken #", "\"\\", "*", ""];
@@ -330,7 +331,7 @@ fn every_word_arrives_as_it_was_given() {
 }
 
 #[test]
-fn a_dry_run_tells_what_would_be_done_and_touches_nothing() {
+fn a_dry_run_prints_the_commands_and_runs_none() {
     let room = Room::new(&["there"], "there 2 2222\n");
     let outcome = room.start(&["--dry-run"]).expect_success();
     for word in ["there: start", "'--threads' '2'", "SHA-256", "-p 2222 there"] {
@@ -340,14 +341,14 @@ fn a_dry_run_tells_what_would_be_done_and_touches_nothing() {
 }
 
 #[test]
-fn wrong_use_is_refused_before_any_machine_is_asked() {
+fn a_wrong_command_line_is_refused_before_any_connection() {
     for (hosts, word) in [
         ("there; touch broken\n", "is no [user@]host"),
         ("-oProxyCommand=touch\n", "is no [user@]host"),
         ("there many\n", "is no number of threads"),
         ("there 1 port\n", "is no port"),
         ("there 1 22 more\n", "line 1"),
-        ("# nobody\n", "names no host"),
+        ("# empty\n", "names no host"),
     ] {
         let room = Room::new(&["there"], hosts);
         room.start(&[]).expect_failure(2, &[word]);

@@ -1,4 +1,5 @@
-//! What crosses the crates: real processes, faults, bad input, a window. One program, so that it is linked once.
+//! End-to-end tests: real processes, faults, bad input, a window on a virtual screen. One program, so that it is linked
+//! once.
 
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! The same picture, whoever renders it: workers, threads and policies change no byte.
+//! Tests of the same picture: number of workers, threads and policies change no byte.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -21,16 +21,16 @@ fn render(scene: &Path, output: &Path, more: &[&str]) -> serde_json::Value {
     let outcome = Running::start(&mut command).finish().expect_success();
     let mut lines = outcome.stdout.lines();
     let report = serde_json::from_str(lines.next().unwrap()).unwrap();
-    assert_eq!(lines.next(), None, "one line of JSON and nothing else");
+    assert_eq!(lines.next(), None, "standard output has one line");
     report
 }
 
-/// The tracer in this process, without the farm.
+/// Renders a scene in this process, without the farm.
 fn traced(scene: &Path) -> RgbImage {
     traced_at(scene, |_| {})
 }
 
-/// Likewise, with another view than the scene's own.
+/// Renders a scene in this process with a changed view.
 fn traced_at(scene: &Path, change: impl FnOnce(&mut FrameView)) -> RgbImage {
     let loaded = load(scene).unwrap();
     let mut view = FrameView::of(&loaded.scene);
@@ -77,7 +77,7 @@ fn every_policy_and_segment_size_renders_the_same_bytes() {
 }
 
 #[test]
-fn packed_pixels_are_the_same_pixels_in_fewer_bytes() {
+fn compressed_pixels_are_the_same_pixels_in_fewer_bytes() {
     let scenes = Scenes::new();
     let scene = scenes.path("small.toml");
     let expected = blake3::hash(&traced(&scene).pixels).to_string();
@@ -99,7 +99,7 @@ fn packed_pixels_are_the_same_pixels_in_fewer_bytes() {
 }
 
 #[test]
-fn reduced_colors_take_two_bytes_a_pixel_and_lose_nothing_on_the_way() {
+fn reduced_colors_take_two_bytes_per_pixel_without_loss() {
     let scenes = Scenes::new();
     let scene = scenes.path("small.toml");
     let expected = traced_at(&scene, |view| view.quality.colors = ColorDepth::Reduced);
@@ -124,7 +124,7 @@ fn reduced_colors_take_two_bytes_a_pixel_and_lose_nothing_on_the_way() {
 }
 
 #[test]
-fn knobs_of_the_file_and_of_the_command_line_are_the_tracers() {
+fn knobs_of_the_scene_and_of_the_command_line_have_the_same_effect() {
     let scenes = Scenes::new();
     let scene = scenes.path("small.toml");
     let keys = "[render]\nshadows = false\nshading = \"diffuse\"\nexponent = \"fast\"\n";
@@ -148,7 +148,7 @@ fn knobs_of_the_file_and_of_the_command_line_are_the_tracers() {
 }
 
 #[test]
-fn a_smaller_scale_is_rendered_small_and_delivered_large() {
+fn a_smaller_scale_is_rendered_small_and_enlarged() {
     let scenes = Scenes::new();
     let scene = scenes.path("small.toml");
     for (scale, width, height) in [("1/2", 80, 60), ("3/4", 120, 90)] {
@@ -167,7 +167,7 @@ fn a_smaller_scale_is_rendered_small_and_delivered_large() {
 }
 
 #[test]
-fn a_compiled_model_renders_as_its_source_does() {
+fn a_compiled_model_renders_like_its_source() {
     let scenes = Scenes::new();
     let (source, compiled) = (scenes.path("bumps.obj"), scenes.path("bumps.rfm"));
     let mut compile = master();
@@ -179,7 +179,7 @@ fn a_compiled_model_renders_as_its_source_does() {
     assert_eq!(a, b);
 }
 
-/// A model with its own texture, and single triangles under a repeated one.
+/// Writes a scene with a textured model, and single triangles with a repeated texture.
 fn write_textured(scenes: &Scenes) -> PathBuf {
     for (name, side) in [("wood.png", 16), ("tile.png", 5)] {
         let pixels = (0..side * side * 3).map(|i: u32| (i.wrapping_mul(0x9e37_79b1) >> 24) as u8).collect();
@@ -204,7 +204,7 @@ fn write_textured(scenes: &Scenes) -> PathBuf {
 }
 
 #[test]
-fn textures_travel_with_the_scene() {
+fn workers_receive_the_textures_of_a_scene() {
     let scenes = Scenes::new();
     let scene = write_textured(&scenes);
     let loaded = load(&scene).unwrap();
@@ -220,7 +220,7 @@ fn textures_travel_with_the_scene() {
         assert!(rayfarm_tracer::image::load(&output).unwrap() == expected, "{workers} workers");
         assert_eq!(report["workers"], workers.parse::<u32>().unwrap());
     }
-    // The sheet shows its picture: without it another one is rendered.
+    // The texture of the model is visible: without it the picture differs.
     scenes.write("wood.mtl", "newmtl wood\nKd 0.9 1 0.8\n");
     assert!(traced(&scene) != expected);
 }
@@ -261,29 +261,29 @@ fn a_camera_move_costs_each_worker_less_than_a_kilobyte() {
         ];
         render(&scene, &output, &more)["scene_bytes"].as_u64().unwrap()
     };
-    // Enough frames in the shorter run for both workers to have fetched the scene.
+    // The shorter run has enough frames for both workers to fetch the scene.
     let (few, many) = (scene_bytes("20"), scene_bytes("100"));
-    // 80 more frames, two workers.
+    // 80 more frames and two workers.
     let per_frame_and_worker = many.saturating_sub(few) / 160;
     assert!(per_frame_and_worker > 0 && per_frame_and_worker < 1024, "{per_frame_and_worker} bytes");
 }
 
-/// The seed system's headline scene, where its mesh is at hand.
+/// A bust of 99,938 triangles, where its mesh exists, compared with a reference picture.
 #[test]
-fn workload_w1_by_one_two_and_three_workers() {
+fn a_bust_of_99938_triangles_by_one_two_and_three_workers() {
     let Some(scene) = shared("workloads/w1.toml") else { return };
     let Some(reference) = shared("workloads/reference/w1.png") else { return };
     let scenes = Scenes::new();
     for workers in ["1", "2", "3"] {
-        let name = format!("w1-by-{workers}.png");
+        let name = format!("bust-by-{workers}.png");
         render(&scene, &scenes.path(&name), &["--local-workers", workers, "--wait-for-workers", workers]);
-        assert!(scenes.read(&name) == scenes.read("w1-by-1.png"), "{workers} workers");
+        assert!(scenes.read(&name) == scenes.read("bust-by-1.png"), "{workers} workers");
     }
-    let picture = rayfarm_tracer::image::load(&scenes.path("w1-by-1.png")).unwrap();
+    let picture = rayfarm_tracer::image::load(&scenes.path("bust-by-1.png")).unwrap();
     let reference = rayfarm_tracer::image::load(&reference).unwrap();
     let off = (picture.pixels.chunks_exact(3).zip(reference.pixels.chunks_exact(3)))
         .filter(|(a, b)| a.iter().zip(b.iter()).any(|(a, b)| a.abs_diff(*b) > 2))
         .count();
-    // An independent tracer in single precision: single pixels at silhouettes and shadow edges differ.
+    // The reference is of an independent tracer in single precision. Pixels at silhouettes and shadow edges differ.
     assert!(off < 400, "{off} of 786432 pixels differ from the reference picture");
 }

@@ -1,26 +1,27 @@
-//! The window on a virtual screen: it starts, shows frames, answers keys, ends; and says so where there is no screen.
+//! Tests of the window on a virtual screen: frames, keys, end, and the message where there is no screen.
 
 use std::path::Path;
 
 use rayfarm_tests::{Running, Scenes, Screen, free_port, master, wait_until, worker};
 use rayfarm_tracer::image::{RgbImage, load};
 
-/// What the screen shows.
-fn shot(screen: &Screen, scenes: &Scenes) -> RgbImage {
+/// Takes a screenshot.
+fn screenshot(screen: &Screen, scenes: &Scenes) -> RgbImage {
     let file = scenes.path("shot.png");
-    screen.shoot(&file);
+    screen.capture(&file);
     load(&file).unwrap()
 }
 
-/// Colours that the screen shows: an empty screen or a flat window has very few.
+/// Counts the colours of a screenshot. An empty screen or a flat window has few.
 fn colors(image: &RgbImage) -> usize {
     let colors: std::collections::BTreeSet<&[u8]> = image.pixels.chunks_exact(3).collect();
     colors.len()
 }
 
+/// Waits for the window and returns its id.
 fn window_of(screen: &Screen) -> String {
     let mut found = None;
-    wait_until("the window is there", || {
+    wait_until("the window exists", || {
         found = screen.xdotool(&["search", "--name", "rayfarm"]);
         found.as_ref().is_some_and(|ids| !ids.is_empty())
     });
@@ -34,19 +35,19 @@ fn view(scene: &Path, more: &[&str]) -> std::process::Command {
 }
 
 #[test]
-fn it_shows_frames_answers_keys_and_ends() {
+fn the_window_shows_frames_handles_keys_and_ends() {
     let Some(screen) = Screen::start() else { return };
     let scenes = Scenes::new();
     let mut command = view(&scenes.path("small.toml"), &["--listen", "127.0.0.1:0"]);
-    let window = Running::start(screen.show(&mut command));
+    let window = Running::start(screen.attach(&mut command));
     let id = window_of(&screen);
-    wait_until("the window shows a picture", || colors(&shot(&screen, &scenes)) > 1000);
+    wait_until("the window shows a picture", || colors(&screenshot(&screen, &scenes)) > 1000);
 
-    let before = shot(&screen, &scenes);
+    let before = screenshot(&screen, &scenes);
     screen.xdotool(&["windowfocus", &id]);
     screen.xdotool(&["keydown", "d"]).unwrap();
-    wait_until("the picture has moved a lot", || {
-        let now = shot(&screen, &scenes);
+    wait_until("the picture has changed", || {
+        let now = screenshot(&screen, &scenes);
         let changed = now.pixels.iter().zip(&before.pixels).filter(|(a, b)| a.abs_diff(**b) > 8).count();
         changed > 60_000
     });
@@ -56,31 +57,31 @@ fn it_shows_frames_answers_keys_and_ends() {
 }
 
 #[test]
-fn closing_the_window_ends_the_program_and_its_workers() {
+fn the_program_ends_after_its_last_frame() {
     let Some(screen) = Screen::start() else { return };
     let scenes = Scenes::new();
     let mut command = view(&scenes.path("small.toml"), &["--listen", "127.0.0.1:0", "--frames", "5"]);
-    Running::start(screen.show(&mut command)).finish().expect_success();
+    Running::start(screen.attach(&mut command)).finish().expect_success();
 }
 
 #[test]
-fn without_a_worker_it_waits_and_a_worker_that_comes_fills_it() {
+fn without_a_worker_the_window_waits_for_one() {
     let Some(screen) = Screen::start() else { return };
     let scenes = Scenes::new();
     let address = format!("127.0.0.1:{}", free_port());
     let mut command = view(&scenes.path("small.toml"), &["--no-local-workers", "--listen", &address]);
-    let window = Running::start(screen.show(&mut command));
+    let window = Running::start(screen.attach(&mut command));
     let id = window_of(&screen);
-    wait_until("the window says something", || (2..1000).contains(&colors(&shot(&screen, &scenes))));
+    wait_until("the window shows a text", || (2..1000).contains(&colors(&screenshot(&screen, &scenes))));
     let _worker = Running::start(worker().args(["--master", &address]));
-    wait_until("the window shows a picture", || colors(&shot(&screen, &scenes)) > 1000);
+    wait_until("the window shows a picture", || colors(&screenshot(&screen, &scenes)) > 1000);
     screen.xdotool(&["windowfocus", &id]);
     screen.xdotool(&["key", "Escape"]).unwrap();
     window.finish().expect_success();
 }
 
 #[test]
-fn without_a_screen_it_says_what_to_run_instead() {
+fn without_a_screen_the_message_names_another_command() {
     let scenes = Scenes::new();
     let mut command = view(&scenes.path("small.toml"), &["--listen", "127.0.0.1:0"]);
     command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");

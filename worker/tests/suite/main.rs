@@ -1,4 +1,4 @@
-//! The worker against masters over sockets. One program, so that the worker is linked once.
+//! Tests of the worker with masters over sockets, as one program, so that the worker is linked once.
 
 #![allow(clippy::panic, clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! The program itself: its exit codes, its messages, how it is ended.
+//! Tests of the program: exit codes, messages, signals.
 
 use std::process::{Output, Stdio};
 use std::time::Duration;
@@ -24,7 +24,7 @@ fn stderr(output: &Output) -> String {
 }
 
 #[tokio::test]
-async fn wrong_use_is_status_2_with_what_was_expected() {
+async fn a_wrong_command_line_is_status_2_with_the_expected_form() {
     for (args, part) in [
         (&[][..], "--master"),
         (&["--master", "farm"], "expected HOST:PORT"),
@@ -41,7 +41,7 @@ async fn wrong_use_is_status_2_with_what_was_expected() {
 }
 
 #[tokio::test]
-async fn nobody_there_is_status_1_with_the_address() {
+async fn an_unreachable_master_is_status_1_with_the_address() {
     let (listener, address) = listen().await;
     drop(listener);
     let output = program(&["--master", &address, "--no-reconnect"]).output().await.unwrap();
@@ -51,7 +51,7 @@ async fn nobody_there_is_status_1_with_the_address() {
 }
 
 #[tokio::test]
-async fn the_scope_of_a_master_is_an_interface_of_this_machine() {
+async fn an_unknown_scope_is_status_1_with_the_interfaces() {
     let output = program(&["--master", "[fe80::1%nothere0]:7117", "--no-reconnect"]).output().await.unwrap();
     assert_eq!(output.status.code(), Some(1));
     let text = stderr(&output);
@@ -59,65 +59,69 @@ async fn the_scope_of_a_master_is_an_interface_of_this_machine() {
 }
 
 #[tokio::test]
-async fn a_goodbye_is_status_0() {
+async fn a_disconnect_is_status_0() {
     let (listener, address) = listen().await;
     let worker = start(&address, &["--name", "cellar"]);
     let mut link = Link::accept(&listener).await;
     assert_eq!(link.hello.name, "cellar");
     link.check_frame(&Stage::new(), 0, 0.0).await;
     link.out
-        .send(ToWorker::Goodbye { reason: "closing time".into(), reconnect: Reconnect::Never })
+        .send(ToWorker::Disconnect { reason: "end of the run".into(), reconnect: Reconnect::Never })
         .await
         .unwrap();
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
-    assert!(stderr(&output).contains("closing time"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("end of the run"), "{}", stderr(&output));
 }
 
 #[tokio::test]
-async fn a_master_that_ends_is_followed_by_the_next_one() {
+async fn a_worker_waits_for_the_next_master() {
     let (listener, address) = listen().await;
     let stage = Stage::new();
     let worker = start(&address, &[]);
-    for (number, goodbye) in
+    for (number, reconnect) in
         [Reconnect::NextMaster, Reconnect::NextMaster, Reconnect::Never].into_iter().enumerate()
     {
         let mut link = Link::accept(&listener).await;
         link.check_frame(&stage, 0, number as f64).await;
-        assert_eq!(link.asked > 0, number == 0, "what it has it keeps");
-        link.out.send(ToWorker::Goodbye { reason: "lights out".into(), reconnect: goodbye }).await.unwrap();
+        assert_eq!(link.requests > 0, number == 0, "assets are kept across masters");
+        link.out.send(ToWorker::Disconnect { reason: "end of the run".into(), reconnect }).await.unwrap();
     }
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
-    assert_eq!(stderr(&output).matches("waiting for the next one").count(), 2, "{}", stderr(&output));
+    assert_eq!(stderr(&output).matches("waiting for the next master").count(), 2, "{}", stderr(&output));
 }
 
 #[tokio::test]
-async fn with_once_it_ends_with_its_master() {
+async fn with_once_a_worker_ends_with_its_master() {
     let (listener, address) = listen().await;
     let worker = start(&address, &["--once"]);
     let mut link = Link::accept(&listener).await;
     link.check_frame(&Stage::new(), 0, 0.0).await;
-    let goodbye = ToWorker::Goodbye { reason: "lights out".into(), reconnect: Reconnect::NextMaster };
-    link.out.send(goodbye).await.unwrap();
+    let disconnect =
+        ToWorker::Disconnect { reason: "end of the run".into(), reconnect: Reconnect::NextMaster };
+    link.out.send(disconnect).await.unwrap();
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
-    assert!(stderr(&output).contains("lights out"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("end of the run"), "{}", stderr(&output));
 }
 
 #[tokio::test]
-async fn a_master_that_takes_no_worker_now_is_asked_again() {
+async fn a_temporary_refusal_is_retried() {
     let (listener, address) = listen().await;
     let worker = start(&address, &[]);
     let mut stream = listener.accept().await.unwrap().0;
-    let full = |_: &Hello| Err(Refusal::NotNow("full house".into()));
+    let full = |_: &Hello| Err(Refusal::NotNow("the farm is full".into()));
     handshake::as_master(&mut stream, full).await.unwrap_err();
     let mut link = Link::accept(&listener).await;
     link.check_frame(&Stage::new(), 0, 0.0).await;
-    link.out.send(ToWorker::Goodbye { reason: "kicked".into(), reconnect: Reconnect::Never }).await.unwrap();
+    link.out
+        .send(ToWorker::Disconnect { reason: "kicked".into(), reconnect: Reconnect::Never })
+        .await
+        .unwrap();
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
-    assert!(stderr(&output).contains("full house"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the farm is full"), "{}", stderr(&output));
 }
 
 /// Processor time that a process has used, in hundredths of a second.
@@ -130,7 +134,7 @@ fn processor_time(worker: &Child) -> u64 {
 
 #[cfg(target_os = "linux")]
 #[tokio::test]
-async fn waiting_costs_nothing_is_one_line_and_ends_at_once() {
+async fn a_waiting_worker_uses_no_processor_time_logs_one_line_and_ends_at_once() {
     let (listener, address) = listen().await;
     drop(listener);
     let worker = start(&address, &[]);
@@ -139,25 +143,25 @@ async fn waiting_costs_nothing_is_one_line_and_ends_at_once() {
     let before = processor_time(&worker);
     tokio::time::sleep(Duration::from_secs(6)).await;
     assert!(processor_time(&worker) - before <= 3, "hundredths of a second in 6 s");
-    let asked = std::time::Instant::now();
+    let signalled = std::time::Instant::now();
     signal(&worker, "-INT").await;
     let output = worker.wait_with_output().await.unwrap();
     assert_eq!(output.status.code(), Some(0));
-    assert!(asked.elapsed() < Duration::from_secs(3), "{:?}", asked.elapsed());
+    assert!(signalled.elapsed() < Duration::from_secs(3), "{:?}", signalled.elapsed());
     let text = stderr(&output);
     assert_eq!(text.matches("cannot connect to the master").count(), 1, "{text}");
-    assert!(text.contains("waiting for it"), "{text}");
+    assert!(text.contains("retrying"), "{text}");
 }
 
 #[tokio::test]
-async fn it_ends_with_its_standard_input() {
+async fn a_worker_ends_at_the_end_of_standard_input() {
     let (listener, address) = listen().await;
     let mut worker = start(&address, &["--exit-with-stdin"]);
     let mut link = Link::accept(&listener).await;
-    // Before its session it would end without a word.
+    // Before its session it would end without a disconnect.
     link.check_frame(&Stage::new(), 0, 0.0).await;
     drop(worker.stdin.take());
-    assert!(matches!(link.hear(&Stage::new()).await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(link.receive(&Stage::new()).await, Some(ToMaster::Disconnect { .. })));
     assert_eq!(worker.wait().await.unwrap().code(), Some(0));
 }
 
@@ -169,20 +173,20 @@ async fn signal(worker: &Child, name: &str) {
 
 #[cfg(unix)]
 #[tokio::test]
-async fn a_signal_drains_it_and_it_ends_with_status_0() {
+async fn a_signal_drains_a_worker_and_its_status_is_0() {
     for name in ["-TERM", "-INT"] {
         let (listener, address) = listen().await;
         let stage = Stage::new();
         let mut worker = start(&address, &[]);
         let mut link = Link::accept(&listener).await;
-        // Once it renders, it listens for signals.
+        // A worker that renders listens for signals already.
         link.check_frame(&stage, 0, 0.0).await;
         signal(&worker, name).await;
-        assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
-        // What the master had granted meanwhile is rendered.
+        assert_eq!(link.receive(&stage).await, Some(ToMaster::Drain));
+        // Leases that the master has sent meanwhile are rendered.
         link.check_frame(&stage, 1, 20.0).await;
         link.out
-            .send(ToWorker::Goodbye { reason: "all done".into(), reconnect: Reconnect::Now })
+            .send(ToWorker::Disconnect { reason: "all done".into(), reconnect: Reconnect::Now })
             .await
             .unwrap();
         assert_eq!(worker.wait().await.unwrap().code(), Some(0));
@@ -191,15 +195,15 @@ async fn a_signal_drains_it_and_it_ends_with_status_0() {
 
 #[cfg(unix)]
 #[tokio::test]
-async fn a_second_signal_ends_it_at_once_with_a_goodbye() {
+async fn a_second_signal_ends_a_worker_at_once_with_a_disconnect() {
     let (listener, address) = listen().await;
     let stage = Stage::new();
     let mut worker = start(&address, &[]);
     let mut link = Link::accept(&listener).await;
     link.check_frame(&stage, 0, 0.0).await;
     signal(&worker, "-TERM").await;
-    assert_eq!(link.hear(&stage).await, Some(ToMaster::Drain));
+    assert_eq!(link.receive(&stage).await, Some(ToMaster::Drain));
     signal(&worker, "-INT").await;
-    assert!(matches!(link.hear(&stage).await, Some(ToMaster::Goodbye { .. })));
+    assert!(matches!(link.receive(&stage).await, Some(ToMaster::Disconnect { .. })));
     assert_eq!(worker.wait().await.unwrap().code(), Some(0));
 }

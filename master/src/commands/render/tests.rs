@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rayfarm_worker::{Ending, Share, WorkerOptions};
+use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 use tokio::task::JoinHandle;
 
 use super::*;
@@ -89,7 +89,7 @@ impl Renders {
             compress: None,
             share: Share::Off,
         };
-        tokio::spawn(async { drop(rayfarm_worker::run(options, Ending::new()).await) })
+        tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) })
     }
 }
 

@@ -1,4 +1,4 @@
-//! A master on 127.0.0.1 that does what a test says, and a scene for its worker.
+//! A master on 127.0.0.1 that a test controls, and a scene for its worker.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "these are tests")]
 
 use std::ops::Range;
@@ -9,7 +9,8 @@ use glam::{DVec3, Vec2, Vec3};
 use rayfarm_protocol::pixels::unpack;
 use rayfarm_protocol::session::{self, Receiver, Sender};
 use rayfarm_protocol::{
-    AssetId, Encoding, FrameAnnounce, FrameId, Hello, Lease, ToMaster, ToWorker, Welcome, codec, handshake,
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, Lease, PixelFormat, ToMaster, ToWorker, Welcome, codec,
+    handshake,
 };
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
@@ -21,7 +22,7 @@ use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 use tokio::net::{TcpListener, TcpStream};
 
-/// A scene with everything that travels: a mesh under a texture, a sphere, a plane, a light with shadows.
+/// A scene with an asset of each kind: a textured mesh, a sphere, a plane, a light with shadows.
 pub(crate) struct Stage {
     pub(crate) body: Bytes,
     pub(crate) mesh: Bytes,
@@ -91,10 +92,10 @@ impl Stage {
         })
     }
 
-    /// These rows as this process renders them.
+    /// Renders these rows in this process.
     pub(crate) fn expected(&self, spin: f64, rows: Range<u32>) -> Vec<u8> {
         let frame = PreparedFrame::new(Arc::clone(&self.compiled), &self.view(spin)).unwrap();
-        let mut out = vec![0; rows.len() * self.view.width as usize * 3];
+        let mut out = vec![0; rows.len() * PixelFormat::SEGMENT.row_bytes(self.view.width)];
         render_rows(&frame, rows, &mut out, &|| false).unwrap();
         out
     }
@@ -128,15 +129,15 @@ pub(crate) async fn listen() -> (TcpListener, String) {
     (listener, address)
 }
 
-/// A session with a worker that connected.
+/// A session with a worker that has connected.
 pub(crate) struct Link {
     pub(crate) hello: Hello,
     pub(crate) out: Sender<ToWorker>,
     pub(crate) inbox: Receiver<ToMaster>,
-    /// Assets that were asked for.
-    pub(crate) asked: usize,
-    /// Segments that came in fewer bytes than they have pixels.
-    pub(crate) packed: usize,
+    /// Number of requested assets.
+    pub(crate) requests: usize,
+    /// Number of segments that arrived compressed.
+    pub(crate) compressed: usize,
 }
 
 impl Link {
@@ -144,17 +145,17 @@ impl Link {
         let mut stream: TcpStream = listener.accept().await.unwrap().0;
         let hello = handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
         let (out, inbox, _) = session::spawn(stream);
-        Self { hello, out, inbox, asked: 0, packed: 0 }
+        Self { hello, out, inbox, requests: 0, compressed: 0 }
     }
 
-    /// The next message that is no wish for an asset; those of the stage are sent.
-    pub(crate) async fn hear(&mut self, stage: &Stage) -> Option<ToMaster> {
+    /// Receives the next message that is no request for an asset. Serves requests before it.
+    pub(crate) async fn receive(&mut self, stage: &Stage) -> Option<ToMaster> {
         loop {
             let id = match self.inbox.recv().await?.unwrap() {
                 ToMaster::NeedAsset { id, .. } => id,
                 message => return Some(message),
             };
-            self.asked += 1;
+            self.requests += 1;
             let assets = [&stage.body, &stage.mesh, &stage.texture];
             let bytes = assets.into_iter().find(|bytes| AssetId::of(bytes) == id).unwrap().clone();
             self.out.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await.unwrap();
@@ -162,7 +163,7 @@ impl Link {
         }
     }
 
-    /// Renders a whole frame on the worker, and compares it with this process's own.
+    /// Renders a whole frame on the worker and compares it with the same frame rendered in this process.
     pub(crate) async fn check_frame(&mut self, stage: &Stage, frame: u64, spin: f64) {
         self.out.send(stage.announce(frame, spin)).await.unwrap();
         let height = stage.height();
@@ -171,24 +172,24 @@ impl Link {
             self.out.send(ToWorker::Segment(lease(frame, rows.clone()))).await.unwrap();
         }
         for _ in &segments {
-            match self.hear(stage).await {
+            match self.receive(stage).await {
                 Some(ToMaster::Pixels { header, bytes }) => {
                     let expected = stage.expected(spin, header.lease.rows().unwrap());
                     match header.encoding {
                         Encoding::Raw => assert_eq!(bytes, expected),
-                        Encoding::Narrow | Encoding::NarrowLz4 => panic!("nobody asked for fewer colours"),
+                        Encoding::Rgb565 | Encoding::Rgb565Lz4 => panic!("fewer colours were not requested"),
                         Encoding::Lz4 => {
                             let mut rows = vec![0; expected.len()];
                             unpack(&bytes, &mut rows).unwrap();
                             assert!(rows == expected && bytes.len() < rows.len());
-                            self.packed += 1;
+                            self.compressed += 1;
                         }
                     }
                     let cost = header.cost;
                     assert!(cost.primary > 0 && cost.span_ns > 0 && cost.trace_ns > 0);
-                    assert_eq!(cost.encode_ns > 0, self.packed > 0, "what is not encoded takes no time");
+                    assert_eq!(cost.encode_ns > 0, self.compressed > 0, "raw pixels take no time to encode");
                 }
-                other => panic!("pixels were expected, not {other:?}"),
+                other => panic!("expected pixels, not {other:?}"),
             }
         }
     }

@@ -1,0 +1,215 @@
+//! Announced frames of a session, and the leases that wait for them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Instant;
+
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, PixelFormat};
+
+use crate::cancel::{CancelFlag, CancelGuard};
+
+/// Most frames at a time. A master has two frames in flight. The least recently announced frame is dropped first, which
+/// need not be the oldest: while one frame is slow, newer ones may replace many of those after it.
+const MAX_FRAMES: usize = 8;
+
+/// Most leases that wait for one frame.
+const MAX_WAITING: usize = 4096;
+
+/// State of a frame.
+enum State<F> {
+    /// Its scene is being loaded.
+    Loading,
+    /// It is being prepared on a blocking thread.
+    Preparing,
+    /// Its leases can be rendered.
+    Ready(Arc<F>),
+    /// It failed, and the master has received a report.
+    Failed,
+}
+
+struct Entry<F> {
+    announce: FrameAnnounce,
+    /// Number of the frame's last announcement, in order of arrival.
+    last_announced: u64,
+    state: State<F>,
+    /// Cancels the preparation when the frame is dropped.
+    cancel: CancelGuard,
+    /// Leases that wait for the frame, with the time of their arrival.
+    waiting: Vec<(Lease, Instant)>,
+}
+
+/// Decision about a lease.
+#[derive(Debug)]
+pub(super) enum LeaseDecision<F> {
+    /// Render these rows.
+    Render(Range<u32>, Arc<F>),
+    /// Do nothing: the lease waits for its frame, is stale, or its frame has failed.
+    None,
+    /// Report to the master that the lease cannot be rendered, for this reason.
+    Refuse(String),
+}
+
+/// Announced frames by number.
+pub(super) struct FrameTable<F> {
+    frames: BTreeMap<FrameId, Entry<F>>,
+    /// Frames before this one are cancelled.
+    cancelled_before: FrameId,
+    /// Number of announcements so far.
+    announcements: u64,
+}
+
+impl<F> FrameTable<F> {
+    pub(super) fn new() -> Self {
+        Self { frames: BTreeMap::new(), cancelled_before: FrameId(0), announcements: 0 }
+    }
+
+    /// Handles an announcement. Returns whether the frame is new, and the frame that was dropped for it, if any.
+    ///
+    /// A failed frame is new when it is announced again: the master retries it on this worker. So is a cancelled one: the
+    /// master leases rows of it for verification.
+    pub(super) fn announce(&mut self, announce: FrameAnnounce) -> (bool, Option<FrameId>) {
+        let frame = announce.frame;
+        self.announcements += 1;
+        let last_announced = self.announcements;
+        let known = self.frames.get_mut(&frame).filter(|entry| !matches!(entry.state, State::Failed));
+        if let Some(entry) = known {
+            entry.last_announced = last_announced;
+            return (false, None);
+        }
+        let (state, cancel) = (State::Loading, CancelGuard::default());
+        self.frames.insert(frame, Entry { announce, last_announced, state, cancel, waiting: Vec::new() });
+        let too_many = self.frames.len() > MAX_FRAMES;
+        let least_recent = self.frames.iter().min_by_key(|(_, entry)| entry.last_announced);
+        let dropped = least_recent.filter(|_| too_many).map(|(&frame, _)| frame);
+        dropped.iter().for_each(|frame| drop(self.frames.remove(frame)));
+        (true, dropped)
+    }
+
+    /// Returns the scenes of all frames.
+    pub(super) fn scenes(&self) -> BTreeSet<AssetId> {
+        self.frames.values().map(|entry| entry.announce.scene).collect()
+    }
+
+    /// Drops all frames before a given one.
+    pub(super) fn cancel_before(&mut self, before: FrameId) {
+        self.cancelled_before = self.cancelled_before.max(before);
+        self.frames = self.frames.split_off(&self.cancelled_before);
+    }
+
+    /// Handles a loaded scene. Returns its frames, which are to be prepared now.
+    pub(super) fn scene_ready(&mut self, scene: AssetId) -> Vec<(FrameAnnounce, CancelFlag)> {
+        let waiting = self.loading(scene);
+        waiting
+            .map(|entry| {
+                entry.state = State::Preparing;
+                (entry.announce.clone(), entry.cancel.flag())
+            })
+            .collect()
+    }
+
+    /// Fails the frames of a scene that cannot be loaded, and returns them.
+    pub(super) fn scene_failed(&mut self, scene: AssetId) -> Vec<FrameId> {
+        self.loading(scene).map(|entry| entry.fail()).collect()
+    }
+
+    fn loading(&mut self, scene: AssetId) -> impl Iterator<Item = &mut Entry<F>> {
+        self.frames
+            .values_mut()
+            .filter(move |entry| entry.announce.scene == scene && matches!(entry.state, State::Loading))
+    }
+
+    /// Sets a prepared frame, and returns the leases that waited for it.
+    pub(super) fn set_ready(&mut self, frame: FrameId, ready: F) -> Vec<(Lease, Instant)> {
+        let entry = self.frames.get_mut(&frame).filter(|entry| matches!(entry.state, State::Preparing));
+        let Some(entry) = entry else { return Vec::new() };
+        entry.state = State::Ready(Arc::new(ready));
+        std::mem::take(&mut entry.waiting)
+    }
+
+    /// Fails a frame. Returns whether the master has no report about it yet.
+    pub(super) fn fail(&mut self, frame: FrameId) -> bool {
+        let entry = self.frames.get_mut(&frame);
+        entry.filter(|entry| !matches!(entry.state, State::Failed)).map(|entry| entry.fail()).is_some()
+    }
+
+    /// Decides about a lease that arrived at a given time.
+    pub(super) fn lease(&mut self, lease: Lease, arrived: Instant) -> LeaseDecision<F> {
+        let Some(entry) = self.frames.get_mut(&lease.frame) else {
+            if lease.frame < self.cancelled_before {
+                return LeaseDecision::None;
+            }
+            return LeaseDecision::Refuse(format!("{lease}: the frame is not announced"));
+        };
+        let FrameAnnounce { width, height, .. } = entry.announce;
+        let Some(rows) = lease.rows().filter(|rows| rows.end <= height) else {
+            return LeaseDecision::Refuse(format!("{lease}: the rows are outside a frame of {height} rows"));
+        };
+        if PixelFormat::SEGMENT.segment_bytes(width, lease.row_count).is_none() {
+            return LeaseDecision::Refuse(format!("{lease}: the pixels do not fit into one message"));
+        }
+        match &entry.state {
+            State::Ready(frame) => LeaseDecision::Render(rows, Arc::clone(frame)),
+            State::Failed => LeaseDecision::None,
+            State::Loading | State::Preparing if entry.waiting.len() >= MAX_WAITING => LeaseDecision::Refuse(
+                format!("more than {MAX_WAITING} leases wait for frame {}", lease.frame),
+            ),
+            State::Loading | State::Preparing => {
+                entry.waiting.push((lease, arrived));
+                LeaseDecision::None
+            }
+        }
+    }
+
+    /// Whether any lease waits for its frame.
+    pub(super) fn has_waiting_leases(&self) -> bool {
+        self.frames.values().any(|entry| !entry.waiting.is_empty())
+    }
+}
+
+impl<F> Entry<F> {
+    fn fail(&mut self) -> FrameId {
+        self.state = State::Failed;
+        self.waiting.clear();
+        self.announce.frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+
+    fn announce(frame: u64) -> FrameAnnounce {
+        let scene = AssetId([7; 32]);
+        FrameAnnounce { frame: FrameId(frame), scene, width: 8, height: 8, view: Bytes::new() }
+    }
+
+    fn is_refused(frames: &mut FrameTable<()>, frame: u64) -> bool {
+        let lease = Lease { frame: FrameId(frame), segment: 0, attempt: 0, first_row: 0, row_count: 8 };
+        matches!(frames.lease(lease, Instant::now()), LeaseDecision::Refuse(_))
+    }
+
+    #[test]
+    fn a_slow_frame_outlives_many_replaced_frames() {
+        let mut frames = FrameTable::new();
+        for newer in 6..60 {
+            // The master announces a frame again before a lease of it, where it has announced two others since.
+            frames.announce(announce(5));
+            frames.announce(announce(newer));
+            frames.announce(announce(newer + 1));
+            assert!(!is_refused(&mut frames, 5) && !is_refused(&mut frames, newer + 1), "frame {newer}");
+            assert!(frames.frames.len() <= MAX_FRAMES);
+        }
+    }
+
+    #[test]
+    fn the_least_recently_announced_frame_is_dropped() {
+        let mut frames = FrameTable::<()>::new();
+        (0..MAX_FRAMES as u64).for_each(|frame| assert!(frames.announce(announce(frame)).0));
+        assert_eq!(frames.announce(announce(0)), (false, None));
+        assert_eq!(frames.announce(announce(100)), (true, Some(FrameId(1))));
+        assert!(is_refused(&mut frames, 1) && !is_refused(&mut frames, 0));
+    }
+}
