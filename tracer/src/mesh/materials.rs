@@ -8,7 +8,8 @@
 use glam::{Vec2, Vec3};
 
 use super::{MAX_MATERIALS, MAX_TEXTURE_NAME, MeshError, NamedMaterial, OLDEST_FORMAT_VERSION, TextureFile};
-use crate::scene::{Material, Tiling, Wrap};
+use crate::material::Material;
+use crate::texture::{Tiling, Wrap};
 
 /// Longest name of a material slot, in bytes; longer ones are cut.
 const MAX_NAME: usize = 255;

@@ -4,6 +4,8 @@
 //! `rayfarm-master compile`, and travels to every worker as it is: all workers walk the same tree.
 
 mod blob;
+mod build;
+mod check;
 mod clean;
 mod compiled;
 mod fans;
@@ -20,9 +22,11 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::bvh::BuildQuality;
 use crate::cancel::Cancelled;
-use crate::scene::{Material, Tiling};
+use crate::material::Material;
+use crate::texture::Tiling;
 pub(crate) use blob::TriangleBlock;
-pub use compiled::{CompileOptions, CompiledMesh, MeshReport};
+pub use build::{CompileOptions, MeshReport};
+pub use compiled::CompiledMesh;
 pub use memory::MeshMemory;
 
 /// First bytes of a compiled mesh, in memory and on disk.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::clean::CleanMesh;
 use super::fans::{Entry, Fans, around};
 use super::{Mesh, Smoothing};
-use crate::scene::rotation::sin_cos_degrees;
+use crate::rotation::sin_cos_degrees;
 
 /// Degrees by which an angle may exceed the crease angle: a column of nine sides has nine angles of 40 degrees, rounded.
 const ROUNDING: f64 = 0.1;

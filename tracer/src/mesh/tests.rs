@@ -4,8 +4,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::Wrap;
-use crate::texture::without_repeats;
+use crate::texture::{Wrap, without_repeats};
 
 fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = vec![0; triangles.len()];
