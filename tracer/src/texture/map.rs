@@ -1,32 +1,32 @@
-//! How a texture is laid over texture coordinates and looked up.
+//! Lookup of textures: filter, wrap, scale and offset.
 
 use glam::{DVec2, Vec2};
 use serde::{Deserialize, Serialize};
 
-use crate::texture::TextureId;
+use super::TextureId;
 
 /// Largest scale and offset of a texture, in magnitude: products with texture coordinates stay finite.
 pub const MAX_TILING: f32 = 1e6;
 
-/// A texture and how it is looked up.
+/// A texture with its lookup.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TextureMap {
-    /// The picture.
+    /// Hash of the texture.
     pub texture: TextureId,
-    /// What lies between its texels.
+    /// Interpolation between texels.
     pub filter: Filter,
-    /// Where it lies, and what is around it.
+    /// Placement in texture space.
     pub tiling: Tiling,
 }
 
 impl TextureMap {
-    /// A texture that repeats once a unit.
+    /// A texture with one repeat per unit.
     pub fn new(texture: TextureId, filter: Filter) -> Self {
         Self { texture, filter, tiling: Tiling::default() }
     }
 }
 
-/// What lies between the centres of texels, at ((i + 0.5) / width, (j + 0.5) / height).
+/// Interpolation between the centres of texels, which are at ((i + 0.5) / width, (j + 0.5) / height).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Filter {
     /// The nearest texel.
@@ -35,44 +35,49 @@ pub enum Filter {
     Bilinear,
 }
 
-/// What lies outside of [0, 1] in both directions of a picture.
+impl Filter {
+    /// Each value with its word.
+    pub const WORDS: [(&'static str, Self); 2] = [("nearest", Self::Nearest), ("bilinear", Self::Bilinear)];
+}
+
+/// Texels outside of [0, 1], in both directions of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wrap {
-    /// The picture again.
+    /// The picture repeated.
     Repeat,
-    /// The nearest texel of its border.
+    /// The nearest texel of the border.
     Clamp,
-    /// The picture reflected, and then again.
+    /// The picture repeated, every second time reflected.
     Mirror,
 }
 
 impl Wrap {
-    /// The words of scene files.
+    /// Each value with its word in scene files.
     pub const WORDS: [(&str, Self); 3] =
         [("repeat", Self::Repeat), ("clamp", Self::Clamp), ("mirror", Self::Mirror)];
 }
 
-/// Where a picture lies: it is looked up at uv * `scale` + `offset`.
+/// Placement of a picture in texture space: it is looked up at uv * `scale` + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tiling {
-    /// What is around the picture.
+    /// Texels outside of the picture.
     pub wrap: Wrap,
-    /// Repeats a unit of u and of v.
+    /// Repeats per unit of u and of v.
     pub scale: Vec2,
     /// Added after scaling, in repeats.
     pub offset: Vec2,
 }
 
 impl Default for Tiling {
-    /// One repeat a unit.
+    /// One repeat per unit.
     fn default() -> Self {
         Self { wrap: Wrap::Repeat, scale: Vec2::ONE, offset: Vec2::ZERO }
     }
 }
 
 impl Tiling {
-    /// Whether texture coordinates that differ by whole numbers may see different texels. Else whole numbers may be taken off
-    /// them: see [`crate::texture::without_repeats`].
+    /// Whether texture coordinates that differ by whole numbers may see different texels. Otherwise whole
+    /// numbers may be removed from them: see [`super::without_repeats`].
     pub fn tells_repeats_apart(&self) -> bool {
         self.wrap != Wrap::Repeat || self.scale != self.scale.round()
     }
@@ -84,7 +89,7 @@ impl Tiling {
             .all(|numbers| numbers.abs().cmple(Vec2::splat(MAX_TILING)).all())
     }
 
-    /// Where texture coordinates lie in the picture: both from 0 to 1. In `f64`, for what is decided exactly.
+    /// Position in the picture, both coordinates from 0 to 1. In `f64`, for exact decisions.
     pub(crate) fn place(&self, uv: DVec2) -> DVec2 {
         let at = uv * self.scale.as_dvec2() + self.offset.as_dvec2();
         match self.wrap {
@@ -103,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn outside_of_the_picture_is_what_the_word_says() {
+    fn wraps_repeat_clamp_and_mirror() {
         let place = |wrap, x: f64| Tiling { wrap, ..Tiling::default() }.place(DVec2::new(x, 0.5)).x;
         for (x, repeat, clamp, mirror) in [
             (0.25, 0.25, 0.25, 0.25),
@@ -120,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn only_whole_repeats_may_be_taken_off() {
+    fn only_whole_repeats_may_be_removed() {
         let with = |wrap, x: f32| Tiling { wrap, scale: Vec2::new(x, 1.0), offset: Vec2::splat(0.3) };
         assert!(!with(Wrap::Repeat, 3.0).tells_repeats_apart());
         assert!(!with(Wrap::Repeat, -2.0).tells_repeats_apart());

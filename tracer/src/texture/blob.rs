@@ -1,16 +1,13 @@
-//! Pictures on surfaces.
+//! Textures as blobs of bytes.
 //!
-//! A texture is one immutable blob of bytes, named by its BLAKE3 hash, as compiled meshes are: made on the master from a
-//! picture, sent to every worker as it is. Sixteen bytes of header (magic, version, width, height, little endian), then
-//! three sRGB bytes a texel, rows from bottom to top: that is how v counts. Version 2 goes on with a byte of alpha a texel;
-//! only pictures that are transparent somewhere have it.
+//! Sixteen bytes of header (magic, version, width, height, little endian), then three sRGB bytes a texel, rows from bottom to
+//! top, which is the direction of v. Version 2 appends a byte of alpha a texel; only pictures with transparent texels have it.
 
 use std::fmt;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec2, Vec2};
-use serde::{Deserialize, Serialize};
 
+use super::{MAX_TEXELS, TextureError, TextureId};
 use crate::image::{MAX_SIDE, RgbImage};
 
 /// First bytes of a texture.
@@ -22,62 +19,10 @@ pub const FORMAT_VERSION: u16 = 1;
 /// Version of the layout of textures with alpha.
 const WITH_ALPHA: u16 = 2;
 
-/// The least alpha that is seen: what is below one half is cut out.
+/// The smallest visible alpha: texels below one half are cut out.
 pub(crate) const LEAST_ALPHA: u8 = 128;
 
-/// Most texels of one texture: 8192 x 8192, 192 MiB.
-pub const MAX_TEXELS: u64 = 1 << 26;
-
-/// Largest texture coordinate, in magnitude. A triangle over which a picture repeats more often than once a pixel shows
-/// noise in any case.
-pub const MAX_UV: f64 = 1e6;
-
-/// Largest texture coordinate once whole repeats are taken off: see [`without_repeats`].
-const MAX_STORED_UV: f32 = 2e6 + 1.0;
-
-/// The name of a texture: BLAKE3 of its bytes.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct TextureId(pub [u8; 32]);
-
-impl fmt::Display for TextureId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
-    }
-}
-
-impl fmt::Debug for TextureId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "TextureId({:02x}{:02x}{:02x}{:02x})", self.0[0], self.0[1], self.0[2], self.0[3])
-    }
-}
-
-/// Why a picture cannot be a texture, or bytes are none.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum TextureError {
-    /// More texels than a texture may have.
-    #[error(
-        "a texture of {width} x {height} texels; at most {MAX_TEXELS} (8192 x 8192) are allowed: make the picture smaller"
-    )]
-    TooLarge {
-        /// Texels in a row.
-        width: u32,
-        /// Rows.
-        height: u32,
-    },
-    /// No texel at all.
-    #[error("a texture of {width} x {height} texels; it needs at least one")]
-    Empty {
-        /// Texels in a row.
-        width: u32,
-        /// Rows.
-        height: u32,
-    },
-    /// The bytes are no texture of this version.
-    #[error("not a texture that this version reads: {0}")]
-    Format(String),
-}
-
-/// Fixed part of a texture.
+/// Fixed part of a texture's bytes.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Header {
@@ -119,7 +64,7 @@ impl Header {
     }
 }
 
-/// Refuses a size that no texture may have.
+/// Refuses a size that is empty or beyond the limits.
 pub(crate) fn check_size(width: u32, height: u32) -> Result<(), TextureError> {
     if width == 0 || height == 0 {
         return Err(TextureError::Empty { width, height });
@@ -129,12 +74,12 @@ pub(crate) fn check_size(width: u32, height: u32) -> Result<(), TextureError> {
     if too_large { Err(TextureError::TooLarge { width, height }) } else { Ok(()) }
 }
 
-/// A picture for surfaces.
+/// A picture on surfaces.
 pub struct Texture {
     bytes: Vec<u8>,
     width: u32,
     height: u32,
-    /// Where the alpha begins in `bytes`, if there is any.
+    /// Offset of the alpha in `bytes`, if there is any.
     alpha: Option<usize>,
     id: TextureId,
 }
@@ -154,7 +99,7 @@ impl Texture {
         Self::laid_out(FORMAT_VERSION, picture, &[])
     }
 
-    /// Makes a texture of a picture with a byte of alpha a pixel. Where nothing would be cut out it is the same as without.
+    /// Makes a texture of a picture with a byte of alpha per pixel. Alpha that cuts nothing out is dropped.
     ///
     /// # Errors
     /// As [`Texture::new`].
@@ -181,7 +126,7 @@ impl Texture {
         Self::from_vec(bytes)
     }
 
-    /// Takes the bytes of a texture from a peer, and checks them.
+    /// Copies and checks the bytes of a texture from a peer.
     ///
     /// # Errors
     /// Bytes that are no texture of this version, or one that is too large.
@@ -198,7 +143,7 @@ impl Texture {
         Ok(Self { bytes, width, height, alpha: (version == WITH_ALPHA).then_some(alpha), id })
     }
 
-    /// The bytes, as they are sent.
+    /// The bytes as they are sent.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -222,14 +167,14 @@ impl Texture {
     #[inline(always)]
     pub(crate) fn texel(&self, x: u32, y: u32) -> [u8; 3] {
         let first = HEADER_BYTES + 3 * (y as usize * self.width as usize + x as usize);
-        // Four bytes at once, with the one before: there is always one, if only the header's last.
+        // Four bytes at once, from the preceding byte on: for the first texel that is the last of the header.
         match self.bytes.get(first - 1..first + 3) {
             Some(&[_, r, g, b]) => [r, g, b],
             _ => [0; 3],
         }
     }
 
-    /// Whether some of it is transparent.
+    /// Whether its alpha cuts something out.
     pub fn has_alpha(&self) -> bool {
         self.alpha.is_some()
     }
@@ -242,8 +187,8 @@ impl Texture {
     }
 }
 
-/// The picture with colours for pixels that are wholly transparent: the mean of their neighbours that are not. Programs leave
-/// any colour there, and a filter would mix it into what is seen along the border.
+/// The picture with new colours for fully transparent pixels: the mean of their other neighbours. Programs write arbitrary
+/// colours there, which a filter would mix into the visible border.
 fn bleed(picture: &RgbImage, alpha: &[u8]) -> RgbImage {
     let (width, height) = (picture.width as usize, picture.height as usize);
     let mut bled = picture.clone();
@@ -269,29 +214,6 @@ fn bleed(picture: &RgbImage, alpha: &[u8]) -> RgbImage {
     bled
 }
 
-/// Texture coordinates of a triangle with whole repeats of the picture taken off, so that the least of each is in [0, 1) and
-/// `f32` keeps its digits; `None` when one is not finite or beyond [`MAX_UV`].
-pub fn without_repeats(uvs: [DVec2; 3]) -> Option<[Vec2; 3]> {
-    apart_from_repeats(uvs).map(|(uvs, _)| uvs)
-}
-
-/// As [`without_repeats`], with what was taken off: both together are the coordinates again.
-pub fn apart_from_repeats(uvs: [DVec2; 3]) -> Option<([Vec2; 3], Vec2)> {
-    let whole = uvs[0].min(uvs[1]).min(uvs[2]).floor();
-    are_usable(&uvs).then(|| (uvs.map(|uv| (uv - whole).as_vec2()), whole.as_vec2()))
-}
-
-/// Whether texture coordinates are finite and within [`MAX_UV`].
-pub fn are_usable(uvs: &[DVec2; 3]) -> bool {
-    uvs.iter().all(|uv| uv.abs().cmple(DVec2::splat(MAX_UV)).all())
-}
-
-/// Whether a texture coordinate from elsewhere is one that a loader may have made.
-pub(crate) fn is_usable(uv: Vec2) -> bool {
-    // False for NaN.
-    uv.to_array().iter().all(|c| c.abs() <= MAX_STORED_UV)
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -304,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn texels_stand_where_the_picture_has_them_bottom_row_first() {
+    fn rows_are_stored_from_the_bottom() {
         let picture = picture(5, 3);
         let texture = Texture::new(&picture).unwrap();
         for (x, y) in (0..3).flat_map(|y| (0..5).map(move |x| (x, y))) {
@@ -316,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn alpha_is_kept_where_it_cuts_and_colours_reach_past_the_border() {
+    fn alpha_is_kept_where_it_cuts_and_colours_bleed() {
         let picture = picture(4, 3);
         let mut alpha = vec![255; 12];
         alpha[5] = LEAST_ALPHA;
@@ -341,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_are_bounded_before_memory_is_taken() {
+    fn sizes_are_checked_before_memory_is_allocated() {
         let announced = |width: u32, height: u32| {
             let header = Header { magic: MAGIC, version: FORMAT_VERSION, width, height };
             Texture::from_bytes(bytemuck::bytes_of(&header)).unwrap_err()
@@ -355,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn other_bytes_are_told_apart() {
+    fn other_bytes_are_refused() {
         for (bytes, words) in [
             (&b"RFMESH"[..], "does not start with RFTEXM"),
             (b"RFTEXM", "6 bytes are too few"),
@@ -366,28 +288,9 @@ mod tests {
         }
     }
 
-    #[test]
-    fn whole_repeats_are_taken_off_and_nothing_else() {
-        let uvs = |x: f64| [DVec2::new(x, 0.25), DVec2::new(x + 1.5, -0.5), DVec2::new(x + 0.25, 0.0)];
-        let near = without_repeats(uvs(0.125)).unwrap();
-        assert_eq!(near, [Vec2::new(0.125, 1.25), Vec2::new(1.625, 0.5), Vec2::new(0.375, 1.0)]);
-        for whole in [-999_999.0, -7.0, 3.0, 999_998.0] {
-            assert_eq!(without_repeats(uvs(whole + 0.125)), Some(near));
-        }
-        assert!(near.into_iter().all(is_usable));
-        let whole = apart_from_repeats(uvs(-7.875)).unwrap();
-        assert_eq!(whole, (near, Vec2::new(-8.0, -1.0)));
-        for odd in [f64::NAN, f64::INFINITY, 1.1e6, -1e300] {
-            assert_eq!(without_repeats(uvs(odd)), None);
-        }
-        let wide = without_repeats([DVec2::splat(-1e6), DVec2::splat(1e6), DVec2::ZERO]).unwrap();
-        assert!(wide.into_iter().all(is_usable));
-        assert!(![f32::NAN, f32::INFINITY, -1e7, 1e7].into_iter().any(|c| is_usable(Vec2::new(0.5, c))));
-    }
-
     proptest! {
         #[test]
-        fn changed_bytes_are_refused_or_still_a_sound_texture(
+        fn changed_bytes_are_refused_or_a_valid_texture(
             changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..5),
             cut in 0_usize..4,
         ) {
