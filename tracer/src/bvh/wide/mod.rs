@@ -1,7 +1,8 @@
-//! Trees of sixteen children a node, over blocks of sixteen triangles: one vector operation looks at a whole node, or
-//! at a whole leaf.
+//! Trees of sixteen children per node, over blocks of sixteen triangles: one vector operation tests a whole node or a
+//! whole leaf.
 //!
-//! Made from a binary tree (see `collapse.rs`). A subtree with no more than sixteen triangles becomes a leaf: one block.
+//! They are collapsed from binary trees (`collapse.rs`). A subtree of at most sixteen triangles becomes a leaf: one
+//! block.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -20,30 +21,30 @@ const LEAF: u32 = 1 << 31;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct WideNode {
-    /// Least corners; zero where there is no child.
+    /// Lower corners; zero in lanes without a child.
     pub lo: [Lanes; 3],
-    /// Greatest corners.
+    /// Upper corners.
     pub hi: [Lanes; 3],
-    /// Index of a node, or of a block with [`LEAF`] set; zero where there is no child.
+    /// Index of a node, or of a block with [`LEAF`] set; zero in lanes without a child.
     children: [u32; WIDTH],
-    /// How many there are, from the first on.
+    /// Number of children, in the first lanes.
     pub count: u32,
     reserved: [u32; 15],
 }
 
 const _: () = assert!(size_of::<WideNode>() == 512);
 
-/// What hangs in a node.
+/// A child of a wide node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WideChild {
-    /// The node of this index.
+    /// The node with this index.
     Inner(u32),
-    /// The block of this index.
+    /// The block with this index.
     Block(u32),
 }
 
 impl WideChild {
-    /// What a child's number means: it is the index of a node, or of a block with [`LEAF`] set.
+    /// The child of a link: the index of a node, or of a block with [`LEAF`] set.
     #[inline(always)]
     pub(crate) fn of(link: u32) -> Self {
         if link & LEAF == 0 { WideChild::Inner(link) } else { WideChild::Block(link & !LEAF) }
@@ -55,20 +56,22 @@ impl WideNode {
         WideChild::of(self.children[lane])
     }
 
-    /// The number of a child: see [`WideChild::of`].
+    /// The link of a lane: see [`WideChild::of`].
     #[inline(always)]
     pub(crate) fn link(&self, lane: usize) -> u32 {
         self.children[lane]
     }
 
-    /// Which lanes have a child. The walk needs the children's cache line next anyhow; the one with their count it does not.
+    /// Mask of the lanes with a child. It reads the cache line of the links, which the traversal needs next, in place
+    /// of the one with the count.
     #[inline(always)]
     pub(crate) fn present_lanes<S: Simd>(&self, simd: S) -> mask32x16<S> {
-        // The root is nobody's child, and lanes without a child hold zero.
+        // The root is no child, and lanes without a child hold zero.
         u32x16::load_array_ref(simd, &self.children).simd_gt(u32x16::splat(simd, 0))
     }
 
-    /// Least corners of the boxes, by axis, then greatest ones; what follows is not for the eye.
+    /// Lower corners of the boxes by axis, then upper ones; the last two entries are links and the count, not
+    /// numbers.
     #[inline(always)]
     pub(crate) fn sides(&self) -> &[Lanes; 8] {
         bytemuck::cast_ref(self)
@@ -79,7 +82,7 @@ impl WideNode {
         (1_u32 << self.count.min(WIDTH as u32)) - 1
     }
 
-    /// The box of all children.
+    /// The box around all children.
     pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
         (0..self.count.min(WIDTH as u32) as usize).fold(
             (Vec3::INFINITY, Vec3::NEG_INFINITY),
@@ -106,7 +109,7 @@ impl WideNode {
     }
 }
 
-/// A wide tree, and which primitives stand in which block.
+/// A wide tree, and the primitives of each block.
 #[derive(Clone, Debug)]
 pub(crate) struct WideTree {
     pub nodes: Vec<WideNode>,
@@ -116,10 +119,10 @@ pub(crate) struct WideTree {
 }
 
 impl WideTree {
-    /// The nodes with other boxes: those of the blocks are given by their primitives.
+    /// The nodes with other boxes, from those of the primitives.
     pub(crate) fn refitted(&self, bounds_of: impl Fn(u32) -> (Vec3, Vec3)) -> Vec<WideNode> {
         let mut nodes = self.nodes.clone();
-        // Children stand behind their parents.
+        // Children are stored behind their parents.
         for index in (0..nodes.len()).rev() {
             for lane in 0..nodes[index].count as usize {
                 let bounds = match nodes[index].child(lane) {
@@ -139,22 +142,22 @@ impl WideTree {
     }
 }
 
-/// Widens a binary tree so that a ray meets as few nodes as possible. Subtrees with no more than `leaf` primitives become
-/// leaves, and so do leaves with more.
+/// Widens a binary tree so that a ray visits few nodes. Subtrees of at most `leaf` primitives become leaves, and so
+/// do leaves with more.
 pub(crate) fn widen(tree: &Tree, leaf: usize) -> WideTree {
     let sizes = subtree_sizes(&tree.nodes);
     let collapse = Collapse::new(tree, |node| sizes[node as usize] as usize <= leaf);
     widen_by(tree, leaf, &sizes, |node, emit| collapse.children(node, emit))
 }
 
-/// Widens a binary tree so that it is as shallow as possible: four of its levels become one.
+/// Widens a binary tree so that it is shallow: four of its levels become one.
 pub(crate) fn widen_evenly(tree: &Tree, leaf: usize) -> WideTree {
     let sizes = subtree_sizes(&tree.nodes);
     let is_inner = |node: u32| sizes[node as usize] as usize > leaf;
     widen_by(tree, leaf, &sizes, |node, emit| grandchildren(tree, node, WIDTH.ilog2(), &is_inner, emit))
 }
 
-/// Calls `emit(node, side)` for the nodes that number of levels below a node, or ends sooner.
+/// Calls `emit(node, side)` for the nodes `levels` levels below a node, or above where a path is shorter.
 fn grandchildren(
     tree: &Tree,
     node: u32,
@@ -173,7 +176,8 @@ fn grandchildren(
     }
 }
 
-/// Widens a binary tree. `children` calls its second argument with the parent and the side of each child of a wide node.
+/// Widens a binary tree. `children` calls its second argument with the parent and the side of each child of a wide
+/// node.
 fn widen_by(
     tree: &Tree,
     leaf: usize,
@@ -210,7 +214,7 @@ pub(super) fn half_area((lo, hi): (Vec3, Vec3)) -> f32 {
     size.x * size.y + size.y * size.z + size.z * size.x
 }
 
-/// Primitives below each node; children stand behind their parents.
+/// Number of primitives below each node; children are stored behind their parents.
 pub(super) fn subtree_sizes(nodes: &[Node]) -> Vec<u32> {
     let mut sizes = vec![0; nodes.len()];
     for (index, node) in nodes.iter().enumerate().rev() {
@@ -243,27 +247,27 @@ pub(super) fn primitives_below(tree: &Tree, child: Child) -> Vec<u32> {
     found
 }
 
-/// Why bytes are no tree.
+/// Reason why nodes are no valid tree.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error("its tree is broken at node {node}: {what}")]
 pub(crate) struct TreeError {
-    /// Where.
+    /// Index of the node.
     node: usize,
-    /// What was found.
+    /// The fault.
     what: String,
 }
 
-/// Trees come from files and peers: one pass makes sure that no walk leaves them.
+/// Checks a tree from a file or a peer, so that no traversal leaves it.
 ///
-/// Checks in O(n) that children come after their parents, that every node and block has one parent, that the depth is
+/// Checks in O(n) that children follow their parents, that every node and block has one parent, that the depth is
 /// within [`MAX_WIDE_DEPTH`], and that all bounds are finite. Returns the depth.
 ///
 /// # Errors
-/// The first node that breaks one of these.
+/// The first node that violates one of these.
 pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32, TreeError> {
     let broken = |node: usize, what: String| Err(TreeError { node, what });
     if nodes.is_empty() {
-        return broken(0, "there is no root".into());
+        return broken(0, "it has no root".into());
     }
     let mut depths = vec![0_u8; nodes.len()];
     depths[0] = 1;
@@ -272,7 +276,7 @@ pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32,
     for (index, node) in nodes.iter().enumerate() {
         let depth = depths[index];
         if depth == 0 {
-            return broken(index, "no node names it as its child".into());
+            return broken(index, "it is no node's child".into());
         }
         deepest = deepest.max(depth);
         if node.count == 0 || node.count as usize > WIDTH {
@@ -291,7 +295,7 @@ pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32,
                     if child <= index || child >= nodes.len() || depths[child] != 0 {
                         return broken(
                             index,
-                            format!("its child {child} is not one that comes after it, once"),
+                            format!("its child {child} is not a later node with one parent"),
                         );
                     }
                     if depth as usize >= MAX_WIDE_DEPTH {
@@ -301,13 +305,13 @@ pub(crate) fn validate_wide(nodes: &[WideNode], block_count: u32) -> Result<u32,
                 }
                 WideChild::Block(block) => match covered.get_mut(block as usize) {
                     Some(seen) if !*seen => *seen = true,
-                    _ => return broken(index, format!("its block {block} is not there, or has two parents")),
+                    _ => return broken(index, format!("its block {block} is missing, or has two parents")),
                 },
             }
         }
     }
     if covered.contains(&false) {
-        return broken(0, "a block hangs nowhere".into());
+        return broken(0, "a block has no parent".into());
     }
     Ok(u32::from(deepest))
 }
