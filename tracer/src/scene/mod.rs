@@ -30,7 +30,7 @@ pub use validate::{
     MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, ValidateError,
 };
 
-pub use crate::material::{MAX_EXPONENT, Material};
 pub(crate) use crate::material::is_squared;
+pub use crate::material::{MAX_EXPONENT, Material};
 pub use crate::rotation;
 pub use crate::texture::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};

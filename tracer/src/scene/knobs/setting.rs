@@ -1,7 +1,7 @@
 //! Operations on whole settings, as loops over the table of knobs.
 
-use super::{KNOBS, Quality, RenderScale, Setting, Shading};
 use super::{ColorDepth, ExponentPrecision};
+use super::{KNOBS, Quality, RenderScale, Setting, Shading};
 use crate::scene::data::SceneFeatures;
 use crate::scene::validate::MAX_SAMPLES;
 

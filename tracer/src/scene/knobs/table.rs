@@ -23,7 +23,8 @@ pub static KNOBS: &[Knob] = &[
         summary: "The share of width and height that is rendered, to be enlarged by the master.",
         form: KnobForm::Fraction,
         values: &[
-            reduced("1/4", "scale 1/4", "scale-1-4", |s| s.scale = RenderScale::Quarter).with_aliases(&["0.25"]),
+            reduced("1/4", "scale 1/4", "scale-1-4", |s| s.scale = RenderScale::Quarter)
+                .with_aliases(&["0.25"]),
             reduced("1/3", "scale 1/3", "scale-1-3", |s| s.scale = RenderScale::Third),
             reduced("1/2", "scale 1/2", "scale-1-2", |s| s.scale = RenderScale::Half).with_aliases(&["0.5"]),
             reduced("3/4", "scale 3/4", "scale-3-4", |s| s.scale = RenderScale::ThreeQuarters)

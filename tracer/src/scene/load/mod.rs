@@ -58,7 +58,11 @@ pub fn load_with(path: &Path, options: LoadOptions) -> Result<LoadedScene, Scene
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_limited(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
+pub fn load_limited(
+    path: &Path,
+    options: LoadOptions,
+    limits: LoadLimits,
+) -> Result<LoadedScene, SceneError> {
     let loaded = match Kind::of(path)? {
         Kind::Scene => scene_file::load(path, options, limits)?,
         Kind::Obj | Kind::Compiled => model::load_bare(path, options, limits)?,

@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::LoadedScene;
 use super::framing;
 use super::limits::LoadLimits;
 use super::moved;
 use super::textures::Textures;
-use super::LoadedScene;
 use crate::mesh::{CompileOptions, CompiledMesh, Mesh, MeshReport};
 use crate::scene::import::{Kind, LoadOptions, MAX_MODEL_BYTES, SceneError, Up, Uvs, bytes, load_obj};
 
@@ -51,7 +51,11 @@ pub fn compile_model_with(
 }
 
 /// Loads a model as a scene of its own, with a default camera, light and background.
-pub(super) fn load_bare(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
+pub(super) fn load_bare(
+    path: &Path,
+    options: LoadOptions,
+    limits: LoadLimits,
+) -> Result<LoadedScene, SceneError> {
     // The instance is rotated upright in place of the mesh: compiled meshes cannot be changed.
     let unturned = LoadOptions { up: None, ..options };
     let (mesh, mut warnings) = load_model(path, CompileOptions::default(), Uvs::Textured, unturned)?;

@@ -4,22 +4,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::LoadedScene;
 use super::framing;
 use super::instances::{Models, named};
 use super::limits::LoadLimits;
 use super::textures::Textures;
-use super::LoadedScene;
 use crate::mesh::CompiledMesh;
 use crate::scene::data::{Camera, Scene};
 use crate::scene::import::{LoadOptions, MAX_SCENE_BYTES, SceneError, bytes};
 use crate::scene::toml::{self, Aim, CameraText, Fault, SceneText, TextureText, TexturesText};
 
 /// Loads a scene file and everything that it names.
-pub(super) fn load(
-    path: &Path,
-    options: LoadOptions,
-    limits: LoadLimits,
-) -> Result<LoadedScene, SceneError> {
+pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
     refuse_for_scene(path, options)?;
     let content = bytes(path, MAX_SCENE_BYTES)?;
     let text = text_of(path, &content)?;

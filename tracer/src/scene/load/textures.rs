@@ -8,9 +8,7 @@ use std::sync::Arc;
 use crate::image;
 use crate::material::Material;
 use crate::mesh::{CompiledMesh, NamedMaterial, TextureFile};
-use crate::scene::import::{
-    Lookup, Missing, Wanted, Warnings, escaped, excerpt, recognised_file, shown,
-};
+use crate::scene::import::{Lookup, Missing, Wanted, Warnings, escaped, excerpt, recognised_file, shown};
 use crate::texture::{Filter, LEAST_ALPHA, Texture, TextureId, TextureMap, Tiling, check_size};
 
 /// Textures by the real paths of their picture files, and how materials look them up.
@@ -46,13 +44,7 @@ pub(super) struct Listed {
 impl Textures {
     /// No textures yet, and at most `max_bytes` of them.
     pub(super) fn new(max_bytes: u64) -> Self {
-        Self {
-            maps: Vec::new(),
-            loaded: BTreeMap::new(),
-            notes: BTreeSet::new(),
-            bytes: 0,
-            max_bytes,
-        }
+        Self { maps: Vec::new(), loaded: BTreeMap::new(), notes: BTreeSet::new(), bytes: 0, max_bytes }
     }
 
     /// Adds a picture file with its lookup to the scene's list of textures. The error is a message that names the picture.

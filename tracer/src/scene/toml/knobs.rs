@@ -47,8 +47,7 @@ fn find(knob: &'static Knob, value: Value<'_>, word: &str) -> Read<&'static Knob
 
 fn word(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
     let best_first = knob.values.iter().rev();
-    let words: Vec<(&str, &KnobValue)> =
-        best_first.filter_map(|known| Some((known.word?, known))).collect();
+    let words: Vec<(&str, &KnobValue)> = best_first.filter_map(|known| Some((known.word?, known))).collect();
     value.word(&words)
 }
 

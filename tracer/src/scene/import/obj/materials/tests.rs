@@ -59,10 +59,7 @@ fn kd_is_a_factor_of_the_texture_unless_it_is_black() {
                 newmtl c\nKd 0 0 0\nmap_Kd c.png\nnewmtl d\nKd 0 0 0\nnewmtl e\nmap_Kd -s 2\n";
     let (library, warnings) = parsed(text);
     let found = |name: &str| {
-        (
-            library[name].material.diffuse,
-            library[name].texture.as_ref().map(|texture| texture.file.as_str()),
-        )
+        (library[name].material.diffuse, library[name].texture.as_ref().map(|texture| texture.file.as_str()))
     };
     assert_eq!(found("a"), (Vec3::new(0.5, 1.0, 1.0), Some("maps/wood one.png")));
     assert_eq!(found("b"), (Vec3::ONE, Some("b.png")));
@@ -127,10 +124,7 @@ fn keywords_are_read_in_upper_and_lower_case() {
     );
     assert_eq!(red.texture.as_ref().map(|texture| &*texture.file), Some("a#b.png"));
     assert_eq!(
-        (
-            library["blue"].material.diffuse,
-            library["blue"].texture.as_ref().map(|texture| &*texture.file)
-        ),
+        (library["blue"].material.diffuse, library["blue"].texture.as_ref().map(|texture| &*texture.file)),
         (Vec3::Z, Some("c.png"))
     );
     assert_eq!(warnings, ["a.mtl:10: `map_bump` is left out: relief from pictures is not drawn"]);
@@ -176,7 +170,8 @@ fn ignored_statements_are_reported_once_per_kind_if_they_matter() {
     };
     let text: String = (0..3).map(material).collect();
     assert_eq!(parsed(&text).1, [""; 0]);
-    let odd = "bump a.png\nnorm a.png\nmap_Ks a.png\nPr 0.5\nmap_Tr a.png\nTf 1 0 0\nillum 3\nKa 1 0 0\nhello 1\n";
+    let odd =
+        "bump a.png\nnorm a.png\nmap_Ks a.png\nPr 0.5\nmap_Tr a.png\nTf 1 0 0\nillum 3\nKa 1 0 0\nhello 1\n";
     let text: String = (0..3).map(|name| format!("{}{odd}", material(name))).collect();
     let warnings = parsed(&text).1;
     for words in [

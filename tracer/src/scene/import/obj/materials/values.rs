@@ -51,7 +51,12 @@ pub(super) fn bounded(value: f64, limit: f64, line: &Line<'_>, warnings: &mut Wa
 }
 
 /// A colour with channels from 0 to 1, and one warning where it had others.
-pub(super) fn bounded_color(color: [f64; 3], keyword: &str, line: &Line<'_>, warnings: &mut Warnings) -> [f64; 3] {
+pub(super) fn bounded_color(
+    color: [f64; 3],
+    keyword: &str,
+    line: &Line<'_>,
+    warnings: &mut Warnings,
+) -> [f64; 3] {
     // More than 1 by rounding is 1.
     const ROUNDING: f64 = 1e-5;
     let largest = color.into_iter().fold(0.0, f64::max);

@@ -9,19 +9,6 @@ fn seams_of_texture_coordinates_do_not_split_vertices() {
     assert_eq!(mesh.triangles[0][0], mesh.triangles[1][0]);
 }
 
-/// A square whose first triangle may lie on another part of the picture than the second.
-const WOODEN: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl wood\n";
-const WOOD: (&str, &[u8]) = ("a.mtl", b"newmtl wood\nmap_Kd wood.png\nnewmtl red\nKd 1 0 0\n");
-
-fn wooden(faces: &str) -> (Mesh, Vec<String>) {
-    load_files(&[("a.obj", format!("{WOODEN}{faces}").as_bytes()), WOOD]).unwrap()
-}
-
-fn uvs(numbers: [f32; 6]) -> [Vec2; 3] {
-    let [a, b, c, d, e, f] = numbers;
-    [Vec2::new(a, b), Vec2::new(c, d), Vec2::new(e, f)]
-}
-
 #[test]
 fn texture_coordinates_stay_with_the_corners() {
     for faces in [
