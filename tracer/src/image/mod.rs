@@ -16,10 +16,8 @@ mod ssim;
 pub use compare::{Difference, compare};
 pub use error::ImageError;
 pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip};
-#[cfg(feature = "import")]
-pub(crate) use load::ends_early;
 #[cfg(feature = "pictures")]
-pub use load::{load, load_with_alpha, size};
+pub use load::{ends_early, load, load_with_alpha, size};
 pub(crate) use reduced::reduce_colors;
 pub use resize::{Resizer, resize};
 #[cfg(feature = "pictures")]

@@ -78,7 +78,7 @@ impl CompiledMesh {
     ///
     /// # Errors
     /// Slots with numbers out of range.
-    pub(crate) fn with_materials(&self, materials: &[NamedMaterial]) -> Result<Self, MeshError> {
+    pub fn with_materials(&self, materials: &[NamedMaterial]) -> Result<Self, MeshError> {
         let encoded = encode_materials(materials);
         let mut header = self.header;
         header.version = FORMAT_VERSION;

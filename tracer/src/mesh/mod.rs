@@ -129,8 +129,8 @@ impl NamedMaterial {
         [&self.texture, &self.cutout, &self.emission_texture].into_iter().flatten()
     }
 
-    /// Its textures, to be changed.
-    pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureFile> {
+    /// The textures, mutable.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureFile> {
         [&mut self.texture, &mut self.cutout, &mut self.emission_texture].into_iter().flatten()
     }
 }

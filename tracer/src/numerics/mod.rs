@@ -31,7 +31,9 @@ use crate::compile::{CompileError, CompiledScene};
 use crate::frame::PreparedFrame;
 use crate::mesh::CompiledMesh;
 use crate::render::render_rows;
-use crate::scene::{FrameView, LoadedScene, Scene};
+#[cfg(feature = "import")]
+use crate::scene::LoadedScene;
+use crate::scene::{FrameView, Scene};
 use crate::texture::Texture;
 
 pub use acne::acne;
@@ -145,6 +147,7 @@ pub fn run(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, CompileEr
 
 impl Subject {
     /// A subject from a loaded scene.
+    #[cfg(feature = "import")]
     pub fn new(name: impl Into<String>, loaded: LoadedScene) -> Self {
         let LoadedScene { scene, meshes, textures, .. } = loaded;
         Self { name: name.into(), scene, meshes, textures }
