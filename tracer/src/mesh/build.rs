@@ -126,7 +126,7 @@ fn block_of(triangles: &[u32], corners: &[[Vec3; 3]]) -> TriangleBlock {
     block
 }
 
-/// Sixteen entries a block, filled up with `empty`.
+/// Sixteen entries per block; lanes without a triangle are `empty`.
 fn in_lanes<T: Copy>(tree: &WideTree, items: &[T], empty: T) -> Vec<T> {
     let mut lanes = vec![empty; tree.blocks.len() * WIDTH];
     for (chunk, block) in lanes.chunks_exact_mut(WIDTH).zip(&tree.blocks) {

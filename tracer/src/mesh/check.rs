@@ -25,7 +25,7 @@ impl CompiledMesh {
         self.check_placement()?;
         let sources = self.sources().chunks_exact(WIDTH);
         if !self.blocks().iter().zip(sources).all(|(block, sources)| corners_are_within_one(block, sources)) {
-            return broken("a corner lies outside [-1, 1]".into());
+            return broken("a corner is outside [-1, 1]".into());
         }
         if let Some(slot) = self.slots().iter().find(|&&slot| slot as usize >= self.material_count()) {
             return broken(format!("a triangle names material slot {slot} of {}", self.material_count()));
