@@ -188,7 +188,7 @@ impl Subject {
 
 fn picture(frame: &PreparedFrame) -> Vec<u8> {
     let mut bytes = vec![0; frame.width() as usize * frame.height() as usize * 3];
-    let _ = render_rows(frame, 0..frame.height(), &mut bytes, &|| false); // nobody cancels it
+    let _ = render_rows(frame, 0..frame.height(), &mut bytes, &|| false); // never cancelled
     bytes
 }
 

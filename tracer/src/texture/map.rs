@@ -78,7 +78,7 @@ impl Default for Tiling {
 impl Tiling {
     /// Whether texture coordinates that differ by whole numbers may see different texels. Otherwise whole
     /// numbers may be removed from them: see [`super::without_repeats`].
-    pub fn tells_repeats_apart(&self) -> bool {
+    pub fn distinguishes_repeats(&self) -> bool {
         self.wrap != Wrap::Repeat || self.scale != self.scale.round()
     }
 
@@ -127,11 +127,11 @@ mod tests {
     #[test]
     fn only_whole_repeats_may_be_removed() {
         let with = |wrap, x: f32| Tiling { wrap, scale: Vec2::new(x, 1.0), offset: Vec2::splat(0.3) };
-        assert!(!with(Wrap::Repeat, 3.0).tells_repeats_apart());
-        assert!(!with(Wrap::Repeat, -2.0).tells_repeats_apart());
-        assert!(with(Wrap::Repeat, 1.5).tells_repeats_apart());
+        assert!(!with(Wrap::Repeat, 3.0).distinguishes_repeats());
+        assert!(!with(Wrap::Repeat, -2.0).distinguishes_repeats());
+        assert!(with(Wrap::Repeat, 1.5).distinguishes_repeats());
         assert!(
-            with(Wrap::Clamp, 1.0).tells_repeats_apart() && with(Wrap::Mirror, 1.0).tells_repeats_apart()
+            with(Wrap::Clamp, 1.0).distinguishes_repeats() && with(Wrap::Mirror, 1.0).distinguishes_repeats()
         );
     }
 }

@@ -12,11 +12,11 @@ const MAX_STORED_UV: f32 = 2e6 + 1.0;
 /// Texture coordinates of a triangle without whole repeats of the picture, so that the smallest u and v are in [0, 1) and `f32`
 /// keeps their digits; `None` when one is not finite or beyond [`MAX_UV`].
 pub fn without_repeats(uvs: [DVec2; 3]) -> Option<[Vec2; 3]> {
-    apart_from_repeats(uvs).map(|(uvs, _)| uvs)
+    split_repeats(uvs).map(|(uvs, _)| uvs)
 }
 
 /// Texture coordinates as from [`without_repeats`], and the whole repeats that were removed: their sum is the input.
-pub fn apart_from_repeats(uvs: [DVec2; 3]) -> Option<([Vec2; 3], Vec2)> {
+pub fn split_repeats(uvs: [DVec2; 3]) -> Option<([Vec2; 3], Vec2)> {
     let whole = uvs[0].min(uvs[1]).min(uvs[2]).floor();
     are_usable(&uvs).then(|| (uvs.map(|uv| (uv - whole).as_vec2()), whole.as_vec2()))
 }
@@ -45,7 +45,7 @@ mod tests {
             assert_eq!(without_repeats(uvs(whole + 0.125)), Some(near));
         }
         assert!(near.into_iter().all(is_usable));
-        let whole = apart_from_repeats(uvs(-7.875)).unwrap();
+        let whole = split_repeats(uvs(-7.875)).unwrap();
         assert_eq!(whole, (near, Vec2::new(-8.0, -1.0)));
         for odd in [f64::NAN, f64::INFINITY, 1.1e6, -1e300] {
             assert_eq!(without_repeats(uvs(odd)), None);

@@ -10,7 +10,7 @@ use crate::mesh::MeshId;
 pub enum NormalMode {
     /// Interpolated between the vertices.
     Smooth,
-    /// The geometric normal of each triangle.
+    /// Geometric normal of each triangle.
     Flat,
 }
 
@@ -19,7 +19,7 @@ pub enum NormalMode {
 pub struct Model {
     /// Hash of the compiled mesh.
     pub mesh: MeshId,
-    /// For each material slot of the mesh, an index into [`Scene::materials`].
+    /// For each material slot of the mesh, an index into [`crate::scene::Scene::materials`].
     pub materials: Vec<u32>,
     /// Shading normals.
     pub normals: NormalMode,
@@ -38,7 +38,7 @@ pub struct Sphere {
     pub center: DVec3,
     /// Radius in scene units, above zero.
     pub radius: f64,
-    /// Index into [`Scene::materials`].
+    /// Index into [`crate::scene::Scene::materials`].
     pub material: u32,
 }
 
@@ -49,7 +49,7 @@ pub struct Plane {
     pub point: DVec3,
     /// Unit normal; both sides are visible.
     pub normal: DVec3,
-    /// Index into [`Scene::materials`].
+    /// Index into [`crate::scene::Scene::materials`].
     pub material: u32,
 }
 
@@ -60,6 +60,6 @@ pub struct Triangle {
     pub vertices: [DVec3; 3],
     /// Texture coordinates of the corners, whole repeats removed as by [`crate::texture::without_repeats`].
     pub uvs: Option<[Vec2; 3]>,
-    /// Index into [`Scene::materials`].
+    /// Index into [`crate::scene::Scene::materials`].
     pub material: u32,
 }

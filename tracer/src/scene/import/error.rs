@@ -1,4 +1,4 @@
-//! What can be wrong with a scene and the files it names.
+//! Errors of scene files, models and the files that they name.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,37 +6,37 @@ use std::path::{Path, PathBuf};
 use super::printed::escaped;
 use crate::mesh::MeshError;
 
-/// Why a scene or model cannot be loaded. All of them are the input's fault and name the place.
+/// Reason why a scene or model cannot be loaded. Every variant is a fault of the input and names its place.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// A place in a scene file.
+    /// A fault at a position of a scene file.
     #[error("{}:{line}:{column}: {}", shown(path), escaped(message))]
     InScene {
         /// The scene file.
         path: PathBuf,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: usize,
-        /// Characters, counted from 1.
+        /// Column in characters, counted from 1.
         column: usize,
-        /// What is wrong, what was expected, what to do.
+        /// The fault, what was expected, and what to do.
         message: String,
     },
-    /// A line of a model file.
+    /// A fault in a line of a model file.
     #[error("{}:{line}: {}", shown(path), escaped(message))]
     InModel {
         /// The model file.
         path: PathBuf,
-        /// Counted from 1.
+        /// Line, counted from 1.
         line: usize,
-        /// What is wrong, what was expected, what to do.
+        /// The fault, what was expected, and what to do.
         message: String,
     },
-    /// A file as a whole.
+    /// A fault of a file as a whole.
     #[error("{}: {}", shown(path), escaped(message))]
     InFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong, what was expected, what to do.
+        /// The fault, what was expected, and what to do.
         message: String,
     },
     /// A file that cannot be opened or read.
@@ -44,7 +44,7 @@ pub enum SceneError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A model that cannot be compiled, or a compiled one that is broken.
@@ -52,12 +52,12 @@ pub enum SceneError {
     Mesh {
         /// The model file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the mesh.
         source: MeshError,
     },
 }
 
-/// A path as messages print it.
+/// A path for messages, with escapes.
 pub(in crate::scene) fn shown(path: &Path) -> String {
     escaped(&path.display().to_string())
 }

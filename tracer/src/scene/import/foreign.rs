@@ -1,5 +1,5 @@
-//! Files that are something else than their place asks for: archives, web pages, pointers of git-lfs, pictures, models of
-//! other programs. They are recognised by their first bytes, and a message says what they are and what to do.
+//! Recognition of files of the wrong type: archives, web pages, git-lfs pointers, pictures, models of other programs.
+//! Their first bytes identify them, and a message names the type and a remedy.
 
 use std::io::Read;
 use std::path::Path;
@@ -7,13 +7,13 @@ use std::path::Path;
 use crate::files::open_regular;
 use crate::image::READ_FORMATS;
 
-/// Bytes that are enough to recognise a file.
+/// Number of first bytes that identify a file.
 pub(in crate::scene) const HEAD: usize = 1024;
 
-/// What a file is.
+/// Type of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::scene) struct Foreign {
-    /// With its article: "a ZIP archive".
+    /// Name with its article: "a ZIP archive".
     what: &'static str,
     family: Family,
 }
@@ -24,14 +24,14 @@ enum Family {
     Page,
     Pointer,
     Picture,
-    /// A picture of a format that is not read.
+    /// A picture in a format that is not read.
     OtherPicture,
     Model,
-    /// A file of another program or purpose.
+    /// Another document, program or recording.
     Other,
 }
 
-/// What was expected in place of a foreign file.
+/// Type of file that was expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::scene) enum Wanted {
     /// A model or a scene.
@@ -44,7 +44,7 @@ pub(in crate::scene) enum Wanted {
 
 use Family::{Archive, Model, Other, OtherPicture, Page, Picture, Pointer};
 
-/// First bytes, from the first byte of the file.
+/// Magic numbers at the beginning of files.
 const MAGIC: &[(&[u8], &str, Family)] = &[
     (b"PK\x03\x04", "a ZIP archive", Archive),
     (b"PK\x05\x06", "a ZIP archive", Archive),
@@ -107,7 +107,7 @@ const MAGIC: &[(&[u8], &str, Family)] = &[
     (b"\x1aE\xdf\xa3", "a Matroska video", Other),
 ];
 
-/// Beginnings of texts, in small letters, behind blanks and a byte order mark.
+/// Beginnings of texts in lower case, after white space and a byte order mark.
 const TEXTS: &[(&str, &str, Family)] = &[
     ("<!doctype html", "a web page", Page),
     ("<html", "a web page", Page),
@@ -122,7 +122,7 @@ const TEXTS: &[(&str, &str, Family)] = &[
     ("<error", "an XML file", Other),
 ];
 
-/// What a file is, by its first bytes; `None` for what may be right and for what is not known.
+/// Type of a file by its first bytes; `None` for expected and for unknown types.
 pub(in crate::scene) fn recognised(content: &[u8]) -> Option<Foreign> {
     let head = content.get(..HEAD).unwrap_or(content);
     let by_magic = MAGIC.iter().find(|(magic, ..)| head.starts_with(magic));
@@ -132,7 +132,7 @@ pub(in crate::scene) fn recognised(content: &[u8]) -> Option<Foreign> {
     by_structure(head).or_else(|| by_text(head))
 }
 
-/// The same of a file; `None` as well where it cannot be read.
+/// Type of a file, as [`recognised`]; `None` as well if it cannot be read.
 pub(in crate::scene) fn recognised_file(path: &Path) -> Option<Foreign> {
     recognised(&head(path).ok()?)
 }
@@ -144,7 +144,7 @@ pub(in crate::scene) fn head(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// Formats that are known by more than their beginning.
+/// Formats with a magic number elsewhere.
 fn by_structure(head: &[u8]) -> Option<Foreign> {
     let at = |range: std::ops::Range<usize>| head.get(range).unwrap_or_default();
     let (what, family) = if at(257..262) == b"ustar" {
@@ -189,12 +189,12 @@ fn by_text(head: &[u8]) -> Option<Foreign> {
 }
 
 impl Foreign {
-    /// Whether it is a picture that may be read as one.
+    /// Whether it is a picture in a format that is read.
     pub(in crate::scene) fn is_picture(self) -> bool {
         self.family == Picture
     }
 
-    /// What it is, and what to do.
+    /// A message with the type and a remedy.
     pub(in crate::scene) fn refusal(self, wanted: Wanted) -> String {
         let expected = match wanted {
             Wanted::Model => "a model (.obj) or a scene (.toml)",
@@ -223,8 +223,8 @@ impl Foreign {
     }
 }
 
-/// What a text is that has no line of an OBJ file, as far as that can be seen; the beginning of a sentence.
-pub(in crate::scene) fn text_in_place_of_a_model(content: &[u8], text: &str) -> String {
+/// Description of a text without a statement of OBJ, as a clause.
+pub(in crate::scene) fn describe_other_text(content: &[u8], text: &str) -> String {
     if content.is_empty() {
         return "the file is empty".into();
     }
@@ -252,7 +252,7 @@ pub(in crate::scene) fn text_in_place_of_a_model(content: &[u8], text: &str) -> 
     what.into()
 }
 
-/// Whether the bytes cannot be the text that they were decoded to.
+/// Whether the bytes are no text, by the share of control characters after decoding.
 pub(in crate::scene) fn is_binary(content: &[u8], text: &str) -> bool {
     let sample: String = text.chars().take(4 * HEAD).collect();
     let odd = sample.chars().filter(|c| c.is_control() && !c.is_ascii_whitespace()).count();
@@ -260,7 +260,7 @@ pub(in crate::scene) fn is_binary(content: &[u8], text: &str) -> bool {
     bare || 20 * odd > sample.chars().count()
 }
 
-/// Whether a line is `[table]`, `[[table]]` or `key = value`.
+/// Whether a line is `[table]`, `[[table]]` or `key = value` of TOML.
 fn is_toml(line: &str) -> bool {
     let bare = |name: &str| {
         !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-' | b'.'))
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_in_place_of_a_model_are_named() {
+    fn texts_that_are_no_model_are_described() {
         for (content, words) in [
             (&b""[..], "the file is empty"),
             (b"\0\0\0\0", "binary data"),
@@ -381,7 +381,7 @@ mod tests {
                 "no line of this file is a statement of an OBJ file (the first is `404: Not Found`)",
             ),
         ] {
-            let message = text_in_place_of_a_model(content, &super::super::text::decoded(content));
+            let message = describe_other_text(content, &super::super::text::decoded(content));
             assert!(message.contains(words), "{message}");
         }
     }

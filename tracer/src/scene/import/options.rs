@@ -1,39 +1,40 @@
-//! What the user may say about the files that a scene names.
+//! Options for loading scenes and models.
 
 use glam::DVec3;
 
-/// How a scene and its files are read. The default is what files from elsewhere may ask for.
+/// Options for loading a scene and its files. The default is safe for untrusted files.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadOptions {
-    /// Pictures that a model's materials name may be outside of the model's folder: in folders above it (`..`), and where
-    /// links lead.
+    /// Whether pictures of a model's materials may be outside of the model's folder: in folders above it (`..`), and
+    /// behind links.
     pub allow_parent_textures: bool,
-    /// The axis of a model by itself that points up. In a scene file each `[[model]]` has its own.
+    /// Up axis of a bare model. In a scene file each `[[model]]` has its own.
     pub up: Option<Up>,
-    /// Degrees up to which faces of a model by itself are smooth, where its file has neither normals nor smoothing groups.
+    /// Crease angle in degrees of a bare model without normals and smoothing groups: faces that meet at a smaller
+    /// angle are smooth.
     pub crease_angle: Option<f64>,
-    /// Width and height of the picture that a camera is to fill, where the file has no camera; without it, the scene's own.
+    /// Width and height of the picture for a default camera; `None`: those of the scene.
     pub size: Option<(u32, u32)>,
 }
 
-/// The crease angle where none is given, in degrees.
+/// Default crease angle in degrees.
 pub const DEFAULT_CREASE_ANGLE: f64 = 40.0;
 
-/// The axis of a model's file that points up.
+/// The up axis of a model file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Up {
-    /// As in a scene.
+    /// Y, as in scenes.
     #[default]
     Y,
-    /// As CAD programs and scanners have it.
+    /// Z, as in CAD programs and scanners.
     Z,
 }
 
 impl Up {
-    /// The words of options and scene files.
+    /// Each value with its word on the command line and in scene files.
     pub const WORDS: [(&'static str, Self); 2] = [("y", Self::Y), ("z", Self::Z)];
 
-    /// Rotation and scale of an instance whose file is turned upright before both.
+    /// Rotation and scale of an instance whose mesh is first rotated upright.
     pub(in crate::scene) fn before(self, rotate: DVec3, scale: DVec3) -> (DVec3, DVec3) {
         match self {
             Self::Y => (rotate, scale),
@@ -42,7 +43,7 @@ impl Up {
         }
     }
 
-    /// A point or direction of the file, upright.
+    /// A point or direction of the file, rotated upright.
     pub(in crate::scene) fn upright(self, point: DVec3) -> DVec3 {
         match self {
             Self::Y => point,
@@ -59,7 +60,7 @@ mod tests {
     use crate::rotation;
 
     #[test]
-    fn a_file_is_turned_upright_before_its_instance_is_scaled_and_rotated() {
+    fn a_mesh_is_rotated_upright_before_its_instance_is_scaled_and_rotated() {
         let (rotate, scale) = (DVec3::new(30.0, -50.0, 200.0), DVec3::new(2.0, 3.0, -5.0));
         for up in [Up::Y, Up::Z] {
             let (turned, scaled) = up.before(rotate, scale);

@@ -1,13 +1,13 @@
-//! Words of files in messages: what a terminal would obey, and what has no glyph, is printed as an escape.
+//! Escaping of text from files in messages: control sequences and invisible characters.
 
 use rayfarm_text::printable;
 
-/// The text as [`rayfarm_text::printable`] shows it; an empty one stays empty.
+/// The text as escaped by [`rayfarm_text::printable`]; an empty one remains empty.
 pub(in crate::scene) fn escaped(text: &str) -> String {
     if text.is_empty() { String::new() } else { printable(text).into_owned() }
 }
 
-/// The beginning of a text, escaped, of at most `most` characters.
+/// The escaped beginning of a text, at most `most` characters of it.
 pub(in crate::scene) fn excerpt(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         None => escaped(text),
@@ -20,7 +20,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_terminal_would_obey_is_escaped() {
+    fn control_sequences_are_escaped() {
         for (text, printed) in [
             ("wood.png", "wood.png"),
             ("grün # 2", "grün # 2"),

@@ -1,4 +1,4 @@
-//! Reading whole files within a bound, and telling apart what they are.
+//! Reading of whole files within limits, and their types.
 
 use std::io;
 use std::path::Path;
@@ -8,14 +8,14 @@ use super::foreign::{Wanted, head, recognised};
 use crate::files::read_within;
 use crate::mesh;
 
-/// Bytes of a scene file.
+/// Largest size of a scene file in bytes.
 pub(in crate::scene) const MAX_SCENE_BYTES: u64 = 64 << 20;
-/// Bytes of a model, as text or compiled.
+/// Largest size of a model in bytes, as text or compiled.
 pub(in crate::scene) const MAX_MODEL_BYTES: u64 = 8 << 30;
-/// Bytes of a material library.
+/// Largest size of a material library in bytes.
 pub(in crate::scene) const MAX_LIBRARY_BYTES: u64 = 16 << 20;
 
-/// What a file is.
+/// Type of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::scene) enum Kind {
     /// A scene file.
@@ -27,7 +27,7 @@ pub(in crate::scene) enum Kind {
 }
 
 impl Kind {
-    /// A compiled model is known by its content, whatever its name; the others by their extension.
+    /// Type of a file: of a compiled model by its content, of others by their extension.
     pub(in crate::scene) fn of(path: &Path) -> Result<Self, SceneError> {
         let head = head(path).map_err(|source| unreadable(path, source))?;
         if head.starts_with(&mesh::MAGIC) {
@@ -59,7 +59,7 @@ fn unreadable(path: &Path, source: io::Error) -> SceneError {
     SceneError::Read { path: path.to_owned(), source }
 }
 
-/// All bytes of a file of at most `limit` bytes. A larger one is refused before any of it is read.
+/// All bytes of a file of at most `limit` bytes. A larger one is refused before it is read.
 pub(in crate::scene) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, SceneError> {
     let too_large = || SceneError::in_file(path, format!("the file is larger than {limit} bytes, the limit"));
     read_within(path, limit).map_err(|source| unreadable(path, source))?.ok_or_else(too_large)
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn compiled_models_are_known_by_content_and_others_by_name() {
+    fn compiled_models_are_recognised_by_content_and_others_by_name() {
         for (name, content, kind) in [
             ("a.toml", &b""[..], Kind::Scene),
             ("a.OBJ", b"v 0 0 0", Kind::Obj),
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_refused_with_what_is_known() {
+    fn other_files_are_refused_by_type() {
         for (name, content, words) in [
             ("a.gltf", &b"{}"[..], "glTF models are not supported yet"),
             ("a.glb", b"glTF\x02", "this is a glTF model (.glb)"),

@@ -1,20 +1,19 @@
-//! The text of files in the encodings that programs write: bytes in, UTF-8 and its lines out.
+//! Decoding of text files: from the encodings that programs write to UTF-8 and its lines.
 //!
-//! UTF-8 and UTF-16 are read with or without a byte order mark. A line that is no UTF-8 is read as Windows-1252, which
-//! gives every byte a character of its own: two names that differ in a byte stay two names, and a name means the same in
-//! a model and in its material library, whatever the encoding of their other lines.
+//! UTF-8 and UTF-16 are read with or without a byte order mark. A line that is not UTF-8 is read as Windows-1252,
+//! which maps every byte to a distinct character: names that differ in a byte remain different, and a name is the
+//! same in a model and in its material library, whatever the encoding of their other lines.
 
 use std::borrow::Cow;
 use std::ffi::OsStr;
 
-/// Bytes that are looked at to recognise UTF-16 without a byte order mark.
+/// Number of bytes that are examined to recognise UTF-16 without a byte order mark.
 const SAMPLE: usize = 4096;
 
-/// The mark that some editors put at the beginning of a text.
+/// The byte order mark.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// The text of a file, without byte order mark and without the padding that old systems put at the end. Nothing is copied
-/// when it is UTF-8.
+/// The text of a file, without byte order mark and without trailing padding of old systems. UTF-8 is not copied.
 pub(in crate::scene) fn decoded(content: &[u8]) -> Cow<'_, str> {
     match content {
         [0xff, 0xfe, text @ ..] => Cow::Owned(utf16(text, u16::from_le_bytes)),
@@ -30,26 +29,26 @@ pub(in crate::scene) fn decoded(content: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// The name of a file as [`decoded`] reads it in another file.
+/// A file name, decoded like a name in a file by [`decoded`].
 pub(in crate::scene) fn decoded_name(name: &OsStr) -> Cow<'_, str> {
     decoded(name.as_encoded_bytes())
 }
 
-/// The lines of a text, whatever ends them: `\n`, `\r\n`, `\r\r\n` or `\r`. A byte order mark at the beginning of a line
-/// is left out: it is there where files were joined.
+/// The lines of a text, with any ending: `\n`, `\r\n`, `\r\r\n` or `\r`. Byte order marks at the beginning of lines
+/// are removed: concatenated files have them.
 pub(in crate::scene) fn physical_lines(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.split('\n').flat_map(|line| line.trim_end_matches('\r').split('\r'));
     lines.map(|line| line.trim_start_matches(BYTE_ORDER_MARK))
 }
 
-/// Which byte of most code units is zero, counted as in little endian.
+/// The byte that is zero in most code units, for little endian.
 #[derive(Clone, Copy)]
 enum Zeros {
     High,
     Low,
 }
 
-/// Recognises UTF-16 whose characters are mostly ASCII, as those of all formats of text here are: every other byte is zero.
+/// Recognises UTF-16 of mostly ASCII characters, as in all formats here: every other byte is zero.
 fn zeros_of_utf16(content: &[u8]) -> Option<Zeros> {
     let sample = content.get(..SAMPLE).unwrap_or(content);
     let (pairs, _) = sample.as_chunks::<2>();
@@ -77,7 +76,7 @@ fn without_frame(text: &str) -> &str {
     text.trim_start_matches(BYTE_ORDER_MARK).trim_end_matches(['\0', '\u{1a}'])
 }
 
-/// Every line by itself as UTF-8, or as Windows-1252 where it is none.
+/// Each line as UTF-8, or as Windows-1252 if it is not.
 fn mixed(content: &[u8]) -> String {
     let mut text = String::with_capacity(content.len() + content.len() / 8);
     for line in content.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')) {
@@ -89,7 +88,7 @@ fn mixed(content: &[u8]) -> String {
     text
 }
 
-/// The character of a byte. The five bytes that Windows-1252 leaves open are the control characters of Latin-1.
+/// The character of a byte. The five undefined bytes of Windows-1252 are the control characters of Latin-1.
 fn windows_1252(byte: u8) -> char {
     const FROM_0X80: [char; 32] = [
         '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž', '\u{8f}',
@@ -134,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn every_byte_has_a_character_of_its_own() {
+    fn every_byte_maps_to_a_distinct_character() {
         let characters: BTreeSet<char> = (0..=255).map(windows_1252).collect();
         assert_eq!(characters.len(), 256);
         assert_eq!([0x41, 0x80, 0x9f, 0xa0, 0xff].map(windows_1252), ['A', '€', 'Ÿ', '\u{a0}', 'ÿ']);
@@ -149,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_end_in_every_way() {
+    fn every_line_ending_is_read() {
         let lines = |text: &str| physical_lines(text).map(str::to_owned).collect::<Vec<_>>();
         for end in ["\n", "\r\n", "\r\r\n", "\r"] {
             let text = ["a", "", "b"].join(end);
@@ -162,14 +161,14 @@ mod tests {
     }
 
     #[test]
-    fn other_bytes_are_not_taken_for_utf16() {
+    fn other_bytes_are_not_mistaken_for_utf16() {
         for content in [&b"v 1 2 3\n"[..], b"\0\0\0\0\0\0", b"ab\0\0cd\0\0ef", b"\x01\0\0\0\x02\0\0\0"] {
             assert!(zeros_of_utf16(content).is_none(), "{content:?}");
         }
     }
 
     #[test]
-    fn names_of_files_are_read_like_names_in_files() {
+    fn file_names_are_decoded_like_names_in_files() {
         assert_eq!(decoded_name(OsStr::new("grün.png")), "grün.png");
         #[cfg(unix)]
         {

@@ -1,28 +1,28 @@
-//! What a file says that was accepted although something is left out of it. Each kind is reported once, with the line of
-//! its first case and the number of them all: a broken file of a million lines gives a few warnings.
+//! Warnings about a file that was accepted with losses. Each kind is reported once, with the line of its first case
+//! and the number of cases: a broken file of a million lines gives a few warnings.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::printed::escaped;
 
-/// Kinds of warnings about one file that are reported in full.
+/// Number of kinds of warnings about one file that are reported in full.
 const MAX_KINDS: usize = 24;
 
 /// Warnings about one file.
 pub(in crate::scene) struct Warnings {
     path: PathBuf,
-    /// In the order of their first cases.
+    /// Kinds in the order of their first cases.
     kinds: Vec<Kind>,
-    /// Cases of kinds that are not reported in full.
+    /// Number of cases of other kinds.
     others: usize,
 }
 
 struct Kind {
     name: String,
-    /// Of the first case, counted from 1; `None` for the file as a whole.
+    /// Line of the first case, counted from 1; `None` for the file as a whole.
     line: Option<usize>,
-    /// Of the first case.
+    /// Message of the first case.
     message: String,
     cases: usize,
 }
@@ -32,23 +32,24 @@ impl Warnings {
         Self { path: path.to_owned(), kinds: Vec::new(), others: 0 }
     }
 
-    /// About a line, counted from 1. Further lines of the same kind are counted, whatever their message.
+    /// Warns about a line, counted from 1. Further lines of the same kind are only counted.
     pub(in crate::scene) fn once(&mut self, kind: &str, line: usize, message: impl Display) {
         self.push(kind, Some(line), message);
     }
 
-    /// About a line, counted from 1. Further lines with the same message are counted, whatever it quotes in `...`.
+    /// Warns about a line, counted from 1. Further lines with the same message, apart from quotes in `...`, are only
+    /// counted.
     pub(in crate::scene) fn at_line(&mut self, line: usize, message: impl Display) {
         let message = message.to_string();
         self.push(&without_quotes(&message), Some(line), &message);
     }
 
-    /// About the file as a whole. Further messages of the same kind are counted.
+    /// Warns about the file as a whole. Further messages of the same kind are only counted.
     pub(in crate::scene) fn once_in_file(&mut self, kind: &str, message: impl Display) {
         self.push(kind, None, message);
     }
 
-    /// About the file as a whole.
+    /// Warns about the file as a whole.
     pub(in crate::scene) fn at_file(&mut self, message: impl Display) {
         let message = message.to_string();
         self.push(&message, None, &message);
@@ -75,7 +76,7 @@ impl Warnings {
     }
 }
 
-/// A message without what it quotes.
+/// A message without its quotes.
 fn without_quotes(message: &str) -> String {
     message.split('`').step_by(2).collect()
 }
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_kinds_is_counted() {
+    fn kinds_beyond_the_limit_are_counted() {
         let mut warnings = Warnings::about(Path::new("a\n.obj"));
         for line in 1..=100 {
             warnings.at_line(line, format_args!("odd\n{line}"));

@@ -79,7 +79,7 @@ impl Models {
             }
             let wanted = match model.material.map(|material| textures.get(&material)) {
                 None => Uvs::Textured,
-                Some(Some(texts)) if texts.tell_repeats_apart() => Uvs::Whole,
+                Some(Some(texts)) if texts.distinguish_repeats() => Uvs::Whole,
                 Some(Some(_)) => Uvs::Always,
                 Some(None) => Uvs::Never,
             };

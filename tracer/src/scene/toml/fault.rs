@@ -1,20 +1,20 @@
-//! Where a scene file is wrong, and which known word was probably meant.
+//! Faults of a scene file with their places, and suggestions of known words.
 
 use toml::Spanned;
 use toml::de::DeValue;
 
 use crate::scene::import::excerpt;
 
-/// Something wrong at a place of the text.
+/// A fault at a position of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Fault {
     /// Offset into the text, in bytes.
     pub(crate) at: usize,
-    /// What is wrong, what was expected, what to do.
+    /// The fault, what was expected, and what to do.
     pub(crate) message: String,
 }
 
-/// The outcome of reading a part of the text.
+/// Result of reading a part of the text.
 pub(super) type Read<T> = Result<T, Fault>;
 
 impl Fault {
@@ -27,12 +27,12 @@ impl Fault {
     }
 }
 
-/// Keeps the fault that stands first in the text, whatever order the sections are read in.
+/// Keeps the first fault in the text, in whatever order the sections are read.
 #[derive(Default)]
 pub(super) struct FirstFault(Option<Fault>);
 
 impl FirstFault {
-    /// The value that was read, or `None` and a fault remembered.
+    /// The value; or `None`, with the fault recorded.
     pub(super) fn keep<T>(&mut self, read: Read<T>) -> Option<T> {
         match read {
             Ok(value) => Some(value),
@@ -50,7 +50,7 @@ impl FirstFault {
     }
 }
 
-/// Line and column of an offset, both counted from 1; a column is a character.
+/// Line and column of an offset, both counted from 1; columns are characters.
 pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -62,7 +62,8 @@ pub(crate) fn place(text: &str, at: usize) -> (usize, usize) {
     (line, column)
 }
 
-/// "; did you mean `color`?" where a known word is near enough, else what `otherwise` says.
+/// "; did you mean `color`?" if a known word is similar enough, otherwise the result of `otherwise` for the list of
+/// known words.
 pub(super) fn suggestion<'k>(
     word: &str,
     known: impl IntoIterator<Item = &'k str> + Clone,
@@ -77,12 +78,12 @@ pub(super) fn suggestion<'k>(
     }
 }
 
-/// Known words that a message lists at most.
+/// Largest number of known words in a message.
 const MAX_LISTED: usize = 20;
 
-/// The known word with the fewest slips, if those are at most a third of its letters (or one).
+/// The known word with the smallest edit distance, if that is at most a third of its length (or one).
 fn nearest<'k>(word: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&'k str> {
-    // A word of a thousand letters is no slip, and the distance takes quadratic time.
+    // A word of a thousand letters is no typing error, and the distance takes quadratic time.
     if word.len() > 100 {
         return None;
     }
@@ -95,7 +96,7 @@ fn nearest<'k>(word: &str, known: impl IntoIterator<Item = &'k str>) -> Option<&
         .map(|(_, k)| k)
 }
 
-/// What a message prints of text from the file.
+/// The beginning of a text from the file, escaped, for messages.
 pub(super) fn shortened(text: &str) -> String {
     const MAX_CHARS: usize = 60;
     excerpt(text, MAX_CHARS)
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn near_words_are_found_and_far_ones_are_not() {
+    fn similar_words_are_suggested_and_others_are_not() {
         let known = ["color", "position", "fov"];
         assert_eq!(nearest("colour", known), Some("color"));
         assert_eq!(nearest("Color", known), Some("color"));

@@ -159,7 +159,7 @@ mod tests {
                     KnobForm::Word | KnobForm::Fraction => format!("\"{word}\""),
                     KnobForm::Count => word.to_owned(),
                 };
-                // With several samples, so that there is something to adapt.
+                // With several samples, so that adaptive sampling is accepted.
                 let samples = if knob.key == "samples" { "" } else { "samples = 9\n" };
                 let settings = render(&format!("{samples}{} = {written}", knob.key)).unwrap();
                 assert!(known.is_of(&settings.setting()), "{} = {written}", knob.key);

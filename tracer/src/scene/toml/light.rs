@@ -1,4 +1,4 @@
-//! `[[light]]`.
+//! The tables `[[light]]`.
 
 use glam::DVec3;
 
@@ -46,7 +46,7 @@ pub(super) fn light(table: Table<'_>, reading: &mut Reading) -> Read<Light> {
         attenuation: table.read("attenuation", attenuation)?.unwrap_or(Attenuation::None),
         shadows: table.read("shadows", |value| value.boolean())?.unwrap_or(true),
     };
-    warn_of_idle_keys(table, kind, light.attenuation, reading)?;
+    warn_about_unused_keys(table, kind, light.attenuation, reading)?;
     Ok(light)
 }
 
@@ -108,8 +108,8 @@ fn refuse_extent(table: Table<'_>) -> Read<()> {
     Ok(())
 }
 
-/// Keys of the other kinds do no harm, but whoever wrote them expects something of them.
-fn warn_of_idle_keys(
+/// Warns about keys of other kinds of light: they have no effect, and are probably a mistake.
+fn warn_about_unused_keys(
     table: Table<'_>,
     kind: Kind,
     attenuation: Attenuation,

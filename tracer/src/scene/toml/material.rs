@@ -1,4 +1,4 @@
-//! `[material.NAME]`, and the names by which the other tables refer to them.
+//! The tables `[material.NAME]`, and references to them by name.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use crate::texture::{Filter, MAX_TILING, Tiling, Wrap};
 pub(super) const MATERIAL_KEYS: &[&str] =
     &["diffuse", "specular", "exponent", "reflect", "transmit", "ior", "emission", "emission_strength"];
 
-/// The exponent of a material that gives only a specular colour.
+/// Default exponent of a material of the scene file.
 const DEFAULT_EXPONENT: f32 = 50.0;
 
 const TEXTURE_KEYS: &[&str] = &["texture", "filter", "wrap", "scale", "offset"];
@@ -31,7 +31,7 @@ pub(crate) struct TextureText {
     pub(crate) tiling: Tiling,
 }
 
-/// The textures of a material; one at least.
+/// The textures of a material, at least one.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TexturesText {
     pub(crate) diffuse: Option<TextureText>,
@@ -39,9 +39,9 @@ pub(crate) struct TexturesText {
 }
 
 impl TexturesText {
-    /// Whether one of them wants the whole repeats of texture coordinates.
-    pub(crate) fn tell_repeats_apart(&self) -> bool {
-        [&self.diffuse, &self.emission].into_iter().flatten().any(|text| text.tiling.tells_repeats_apart())
+    /// Whether one of the textures needs whole repeats of texture coordinates.
+    pub(crate) fn distinguish_repeats(&self) -> bool {
+        [&self.diffuse, &self.emission].into_iter().flatten().any(|text| text.tiling.distinguishes_repeats())
     }
 }
 
@@ -71,7 +71,7 @@ pub(super) fn material(table: Table<'_>) -> Read<(Material, Option<TexturesText>
     Ok((material, any.then_some(textures)))
 }
 
-/// A colour, or white with a texture.
+/// A colour; or white, with a texture.
 fn color_or_texture(value: Value<'_>, limit: f32) -> Read<(Vec3, Option<TextureText>)> {
     if !value.table() {
         return Ok((value.color(limit)?, None));
@@ -101,22 +101,22 @@ fn refuse_bounces(table: Table<'_>) -> Read<()> {
             return Err(value.not_yet("a material that reflects or transmits", "use 0"));
         }
     }
-    // Without transmission the index of refraction changes nothing.
+    // Without transmission the index of refraction has no effect.
     table.read("ior", |value| value.number("above 0", |n| n > 0.0)).map(drop)
 }
 
-/// The scene's materials, found by name.
+/// The materials of the scene by name.
 #[derive(Default)]
 pub(super) struct Materials {
     names: BTreeMap<String, u32>,
     values: Vec<Material>,
-    /// By the index of their material.
+    /// Textures by the index of their material.
     textures: BTreeMap<u32, TexturesText>,
     neutral: Option<u32>,
 }
 
 impl Materials {
-    /// Materials of these names; their values follow by [`Materials::define`], the neutral one until then.
+    /// Materials with these names. Their values are set by [`Materials::define`], and neutral until then.
     pub(super) fn named(names: Vec<String>) -> Self {
         let values = vec![Material::NEUTRAL; names.len()];
         let names = names.into_iter().zip(0..).collect();
@@ -134,12 +134,12 @@ impl Materials {
         self.textures.contains_key(&index)
     }
 
-    /// Whether a texture of a material wants the whole repeats of texture coordinates.
-    pub(super) fn tells_repeats_apart(&self, index: u32) -> bool {
-        self.textures.get(&index).is_some_and(TexturesText::tell_repeats_apart)
+    /// Whether a texture of a material needs whole repeats of texture coordinates.
+    pub(super) fn distinguishes_repeats(&self, index: u32) -> bool {
+        self.textures.get(&index).is_some_and(TexturesText::distinguish_repeats)
     }
 
-    /// The index that the `material` of a table refers to, if it has one.
+    /// The index of the `material` of a table, if it has one.
     pub(super) fn referred(&self, table: Table<'_>) -> Read<Option<u32>> {
         table.read("material", |value| {
             let name = value.text()?;
@@ -155,12 +155,13 @@ impl Materials {
         })
     }
 
-    /// As [`Materials::referred`], and the neutral material where none is named.
+    /// The index of the `material` of a table, or of the neutral material.
     pub(super) fn referred_or_neutral(&mut self, table: Table<'_>) -> Read<u32> {
         Ok(self.referred(table)?.unwrap_or_else(|| self.neutral()))
     }
 
-    /// As [`Materials::referred_or_neutral`], for what has no texture coordinates: `instead` says what to do.
+    /// The index as in [`Materials::referred_or_neutral`], for objects without texture coordinates. `instead` is the
+    /// remedy in the message for a textured material.
     pub(super) fn referred_plain(&mut self, table: Table<'_>, instead: &str) -> Read<u32> {
         let index = self.referred_or_neutral(table)?;
         match table.get("material").filter(|_| self.has_texture(index)) {
@@ -178,7 +179,7 @@ impl Materials {
         })
     }
 
-    /// The materials, and the textures of some by their index.
+    /// The materials, and the textures by the index of their material.
     pub(super) fn into_parts(self) -> (Vec<Material>, BTreeMap<u32, TexturesText>) {
         (self.values, self.textures)
     }

@@ -1,7 +1,7 @@
-//! The scene file: TOML in, plain data with places for messages out. Nothing is opened here but the text itself.
+//! The scene file: TOML to plain data with positions for messages. No other file is opened here.
 //!
-//! The text is parsed into tables that know where each value stands, and every table is read by hand with the keys it
-//! may have. So nothing that the file says is ignored, and every complaint names line and column.
+//! The text is parsed into tables whose values have positions, and each table is read with the list of its keys. So
+//! every unknown key is a fault, and every fault has a line and a column.
 
 mod fault;
 mod knobs;
@@ -50,28 +50,28 @@ const KEYS: &[&str] = &[
     "triangle",
 ];
 
-/// What a scene file says. Models are not loaded; what is left out is left to the loader.
+/// The content of a scene file. Models are not loaded; what the file leaves open is left to the loader.
 #[derive(Clone, Debug)]
 pub(super) struct SceneText {
-    /// Zero where the file has none.
+    /// I_a; zero if absent.
     pub(super) ambient: Vec3,
     pub(super) render: RenderSettings,
     pub(super) camera: Option<CameraText>,
-    /// Black where the file has none.
+    /// Background; black if absent.
     pub(super) background: Background,
     pub(super) lights: Vec<Light>,
     pub(super) materials: Vec<Material>,
-    /// By the index of their material.
+    /// Textures by the index of their material.
     pub(super) textures: BTreeMap<u32, TexturesText>,
     pub(super) models: Vec<ModelText>,
     pub(super) spheres: Vec<Sphere>,
     pub(super) planes: Vec<Plane>,
     pub(super) triangles: Vec<Triangle>,
-    /// What was accepted although it looks unintended.
+    /// Accepted input that is probably a mistake.
     pub(super) warnings: Vec<Fault>,
 }
 
-/// What is gathered on the way through the text.
+/// Collects warnings while the text is read.
 #[derive(Default)]
 struct Reading {
     warnings: Vec<Fault>,
@@ -86,8 +86,8 @@ impl Reading {
 /// Reads a scene file's text.
 ///
 /// # Errors
-/// The fault that stands first in the text: no TOML, an unknown key, a value of the wrong type or out of range, an
-/// unknown material, a feature that is not built yet.
+/// The first fault in the text: no TOML, an unknown key, a value of the wrong type or out of range, an unknown
+/// material, an unsupported feature.
 pub(super) fn read(text: &str) -> Read<SceneText> {
     check_size(text)?;
     let document = DeTable::parse(text).map_err(|e| {
@@ -104,7 +104,7 @@ pub(super) fn read(text: &str) -> Read<SceneText> {
     scene.ok_or_else(|| top.fault("the scene file cannot be read"))
 }
 
-/// Whether the line at an offset has a back slash in double quotes up to there, or just behind.
+/// Whether the line at an offset has a back slash in double quotes, before the offset or just behind.
 fn has_escape(text: &str, at: usize) -> bool {
     let start = text.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
     let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
@@ -119,11 +119,11 @@ fn has_escape(text: &str, at: usize) -> bool {
     })
 }
 
-/// Values of a scene file, tables and lists included. The parsed text takes some hundred bytes for each.
+/// Largest number of values of a scene file, including tables and lists. Each takes some hundred bytes when parsed.
 const MAX_VALUES: usize = 1 << 24;
 
-/// Refuses a text whose parsed form would take far more memory than the text: 60 MB of `{}` take gigabytes. Every value
-/// but the first comes after one of these characters; those in strings and comments are counted as well.
+/// Refuses a text whose parsed form would take far more memory than the text: 60 MB of `{}` take gigabytes. Every
+/// value except the first follows one of these characters; those in strings and comments are counted as well.
 fn check_size(text: &str) -> Read<()> {
     let begins_value = |byte: u8| matches!(byte, b'=' | b',' | b'[' | b'{');
     let mut places = text.bytes().enumerate().filter(|(_, byte)| begins_value(*byte)).map(|(at, _)| at);
@@ -138,7 +138,7 @@ fn check_size(text: &str) -> Read<()> {
     }
 }
 
-/// Reads every section, so that the first fault of them all can be told; `None` when there was one.
+/// Reads all sections, so that the first fault in the text is found; `None` if there is one.
 fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let mut reading = Reading::default();
     let reading = &mut reading;
@@ -178,7 +178,7 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     })
 }
 
-/// Reads a table that may be absent; the outer `None` means a fault.
+/// Reads an optional table; the outer `None` means a fault.
 fn section<'t, T>(
     top: Table<'t>,
     key: &'static str,
@@ -190,7 +190,7 @@ fn section<'t, T>(
     first.keep(top.read(key, |value| read(Table::open(name, value.value, known)?)))
 }
 
-/// Reads each table of a list, of which there may be `most`; those with a fault are missing from the result.
+/// Reads each table of a list of at most `most` tables; tables with a fault are left out of the result.
 fn list<'t, T>(
     top: Table<'t>,
     key: &'static str,
@@ -207,7 +207,7 @@ fn list<'t, T>(
         .collect()
 }
 
-/// Refuses a list that is too long, before any of it is built.
+/// Refuses a list that is too long, before any entry is built.
 fn within<'t>(
     tables: Vec<&'t Spanned<DeValue<'t>>>,
     name: &str,
@@ -222,7 +222,7 @@ fn within<'t>(
     }
 }
 
-/// All names are known before a value is read, so that a fault in one material hides none in its users.
+/// Reads all materials. All names are collected first, so that a fault in one material hides none in its users.
 fn read_materials(top: Table<'_>, first: &mut FirstFault) -> Materials {
     let Some(value) = top.get("material") else { return Materials::default() };
     let Some(entries) = first.keep(material_tables(value)) else { return Materials::default() };

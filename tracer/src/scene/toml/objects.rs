@@ -1,4 +1,4 @@
-//! `[[model]]`, `[[sphere]]`, `[[plane]]`, `[[triangle]]`.
+//! The tables `[[model]]`, `[[sphere]]`, `[[plane]]` and `[[triangle]]`.
 
 use std::path::PathBuf;
 
@@ -27,17 +27,17 @@ pub(crate) struct ModelText {
     pub(crate) file: PathBuf,
     /// Offset of the file's name in the text, for messages.
     pub(crate) at: usize,
-    /// Overrides the model's own materials.
+    /// Material that replaces the model's own materials.
     pub(crate) material: Option<u32>,
     /// Offset of that material's name in the text.
     pub(crate) material_at: usize,
     pub(crate) normals: NormalMode,
-    /// Degrees, and the offset of the value in the text.
+    /// Crease angle in degrees, and the offset of its value in the text.
     pub(crate) crease_angle: Option<(f64, usize)>,
     pub(crate) translate: DVec3,
-    /// The rotation that turns the file upright goes first.
+    /// Rotation in degrees, including the one that rotates the file upright.
     pub(crate) rotate: DVec3,
-    /// Along the axes of the file.
+    /// Scale along the axes of the file.
     pub(crate) scale: DVec3,
 }
 
@@ -99,7 +99,7 @@ pub(super) fn plane(table: Table<'_>, materials: &mut Materials) -> Read<Plane> 
     })
 }
 
-/// `None` for a triangle without an area: nobody can see it.
+/// Reads a triangle; `None` for one without an area, which is invisible.
 pub(super) fn triangle(
     table: Table<'_>,
     materials: &mut Materials,
@@ -112,9 +112,9 @@ pub(super) fn triangle(
         Some(_) => materials.referred_or_neutral(table)?,
         None => materials.referred_plain(table, "add `uvs`, or use a material with a colour")?,
     };
-    // Checked when they were read: a triangle that has a texture has coordinates.
+    // Checked above: a triangle with a texture has coordinates.
     let uvs = uvs.filter(|_| materials.has_texture(material)).map(|uvs| {
-        let near = without_repeats(uvs).filter(|_| !materials.tells_repeats_apart(material));
+        let near = without_repeats(uvs).filter(|_| !materials.distinguishes_repeats(material));
         near.unwrap_or(uvs.map(|uv| uv.as_vec2()))
     });
     let [a, b, c] = vertices;

@@ -1,4 +1,4 @@
-//! A table of the scene file: it knows its keys, and refuses the others as soon as it is opened.
+//! A table of the scene file with its list of known keys.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -6,18 +6,18 @@ use toml::de::{DeTable, DeValue};
 use super::fault::{Fault, Read, shortened, suggestion};
 use super::value::Value;
 
-/// A table whose keys are all known ones.
+/// A table without unknown keys.
 #[derive(Clone, Copy)]
 pub(super) struct Table<'t> {
-    /// How messages name it: `[camera]`.
+    /// Name for messages: `[camera]`.
     name: &'t str,
-    /// Where it begins.
+    /// Offset of the table in the text.
     at: usize,
     entries: &'t DeTable<'t>,
 }
 
 impl<'t> Table<'t> {
-    /// Opens the table that a value holds.
+    /// Opens the table in a value.
     pub(super) fn open(name: &'t str, value: &'t Spanned<DeValue<'t>>, known: &[&str]) -> Read<Self> {
         match value.get_ref() {
             DeValue::Table(entries) => Self::of(name, value.span().start, entries, known),
@@ -28,7 +28,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Wraps entries, refusing the first unknown key.
+    /// Wraps entries, and refuses the first unknown key.
     pub(super) fn of(name: &'t str, at: usize, entries: &'t DeTable<'t>, known: &[&str]) -> Read<Self> {
         let unknown = entries.keys().filter(|key| !known.contains(&key.get_ref().as_ref()));
         match unknown.min_by_key(|key| key.span().start) {
@@ -51,7 +51,7 @@ impl<'t> Table<'t> {
         Fault::at(self.at, message)
     }
 
-    /// Reads a key that may be absent.
+    /// Reads an optional key.
     pub(super) fn read<T>(
         &self,
         key: &'static str,
@@ -60,7 +60,7 @@ impl<'t> Table<'t> {
         self.get(key).map(read).transpose()
     }
 
-    /// The one of several keys that is given; two of them contradict each other.
+    /// The only given one of several exclusive keys.
     pub(super) fn one_of(&self, keys: &[&'static str]) -> Read<Option<Value<'t>>> {
         let mut given: Vec<Value<'t>> = keys.iter().filter_map(|key| self.get(key)).collect();
         given.sort_by_key(Value::start);
@@ -83,7 +83,7 @@ fn unknown_key(owner: &str, key: &str, known: &[&str]) -> String {
     format!("unknown key `{key}` in {owner}{hint}")
 }
 
-/// The tables of `[[name]]`; none where the key is absent.
+/// The tables of `[[name]]`; none if the key is absent.
 pub(super) fn tables_of<'t>(value: Option<Value<'t>>) -> Read<Vec<&'t Spanned<DeValue<'t>>>> {
     let Some(value) = value else { return Ok(Vec::new()) };
     match value.value.get_ref() {

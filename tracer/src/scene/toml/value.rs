@@ -1,4 +1,4 @@
-//! A value of the scene file, read as what a key wants. Each reading says what was expected, and what is there.
+//! Typed values of the scene file. Each message has the expected and the actual value.
 
 use std::ops::RangeInclusive;
 
@@ -10,7 +10,7 @@ use super::fault::{Fault, Read, shortened, suggestion};
 use crate::scene::validate::MAX_COORDINATE;
 use crate::texture::are_usable;
 
-/// What to do about back slashes in paths.
+/// A remedy for back slashes in paths.
 pub(super) const ESCAPES: &str = "a back slash in double quotes begins an escape: write / in paths, as in \
                                   \"models/new.obj\", or put them in 'single quotes'";
 
@@ -19,14 +19,14 @@ pub(super) const ESCAPES: &str = "a back slash in double quotes begins an escape
 pub(super) struct Value<'t> {
     /// The key.
     pub(super) name: &'t str,
-    /// The table of the key, as messages name it: `[camera]`.
+    /// The table of the key, as named in messages: `[camera]`.
     pub(super) owner: &'t str,
-    /// What stands there.
+    /// The value itself.
     pub(super) value: &'t Spanned<DeValue<'t>>,
 }
 
 impl<'t> Value<'t> {
-    /// Where the value begins.
+    /// Offset of the value in the text.
     pub(super) fn start(&self) -> usize {
         self.value.span().start
     }
@@ -35,7 +35,7 @@ impl<'t> Value<'t> {
         Fault::at_value(self.value, message)
     }
 
-    /// "`fov` in [camera] must be a number, but is "wide"".
+    /// A fault such as "`fov` in [camera] must be a number, but is "wide"".
     pub(super) fn must_be(&self, expected: &str) -> Fault {
         self.must_be_at(self.value, expected)
     }
@@ -45,7 +45,7 @@ impl<'t> Value<'t> {
         Fault::at_value(culprit, format!("{self} must be {expected}, but is {actual}"))
     }
 
-    /// A feature of the format that is not built yet.
+    /// The fault of an unsupported feature of the format.
     pub(super) fn not_yet(&self, what: &str, instead: &str) -> Fault {
         let given = match self.value.get_ref() {
             DeValue::String(word) => format!(" = \"{word}\""),
@@ -58,13 +58,13 @@ impl<'t> Value<'t> {
         self.value.get_ref().is_table()
     }
 
-    /// A number inside of bounds that `expected` describes.
+    /// A number within bounds that `expected` describes.
     pub(super) fn number(&self, expected: &str, fits: impl Fn(f64) -> bool) -> Read<f64> {
         let number = finite(self.value.get_ref()).filter(|n| fits(*n));
         number.ok_or_else(|| self.must_be(&format!("a number {expected}")))
     }
 
-    /// A whole number inside of a range.
+    /// A whole number within a range.
     pub(super) fn whole(&self, expected: &str, range: RangeInclusive<u32>) -> Read<u32> {
         let number = match self.value.get_ref() {
             DeValue::Integer(i) => u32::from_str_radix(i.as_str().trim_start_matches('+'), i.radix()).ok(),
@@ -82,7 +82,8 @@ impl<'t> Value<'t> {
         self.value.get_ref().as_str().ok_or_else(|| self.must_be("a text in quotes"))
     }
 
-    /// The name of a file. A back slash in double quotes may have become a line break, a tab or the like.
+    /// The name of a file. A back slash in double quotes may have become a line break, a tab or another control
+    /// character.
     pub(super) fn file_name(&self, expected: &str) -> Read<&'t str> {
         let name = self.text()?;
         if name.is_empty() {
@@ -96,7 +97,7 @@ impl<'t> Value<'t> {
         Ok(name)
     }
 
-    /// One of a few words.
+    /// One of some words, as its value.
     pub(super) fn word<T: Copy>(&self, words: &[(&str, T)]) -> Read<T> {
         let known = words.iter().map(|(word, _)| *word);
         let text = self.value.get_ref().as_str().ok_or_else(|| {
@@ -163,7 +164,7 @@ impl<'t> Value<'t> {
         Ok(DVec3::new(coordinate(x)?, coordinate(y)?, coordinate(z)?))
     }
 
-    /// Three numbers that point somewhere, brought to unit length.
+    /// Three numbers, normalised; not zero.
     pub(super) fn direction(&self) -> Read<DVec3> {
         unit(self.vector()?).ok_or_else(|| self.must_be("a direction, not zero"))
     }
@@ -183,7 +184,8 @@ impl std::fmt::Display for Value<'_> {
     }
 }
 
-/// A vector brought to unit length; `None` for zero. Scaled by a power of two first, so that no square is lost.
+/// A normalised vector; `None` for zero. It is first scaled by a power of two, so that no square underflows or
+/// overflows.
 pub(super) fn unit(vector: DVec3) -> Option<DVec3> {
     let (_, exponent) = libm::frexp(vector.abs().max_element());
     let scaled = DVec3::from_array(vector.to_array().map(|c| libm::ldexp(c, -exponent)));
@@ -223,7 +225,7 @@ fn describe(value: &DeValue<'_>) -> String {
     }
 }
 
-/// A short array of numbers as it stands in the file.
+/// A short array of numbers as written in the file.
 fn numbers<'a, 'i: 'a>(items: impl Iterator<Item = &'a Spanned<DeValue<'i>>>) -> Option<String> {
     let items: Vec<String> = items
         .map(|item| match item.get_ref() {

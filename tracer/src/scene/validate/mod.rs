@@ -1,5 +1,5 @@
-//! Checks of a scene that comes from elsewhere: every index in range, every number finite and inside its bounds,
-//! every list bounded. A scene that passes can be compiled and traced without further questions.
+//! Checks of untrusted scenes: every index in range, every number finite and within its bounds, every list bounded. A
+//! scene that passes can be compiled and traced without further checks.
 
 use std::collections::BTreeSet;
 
@@ -13,60 +13,61 @@ use crate::material::{MAX_EXPONENT, Material};
 use crate::mesh::MeshId;
 use crate::texture::{self, TextureId, TextureMap};
 
-/// Lights of a scene.
+/// Largest number of lights.
 pub const MAX_LIGHTS: usize = 4096;
-/// Materials of a scene, those of its models' files included.
+/// Largest number of materials, including those of the models' files.
 pub const MAX_MATERIALS: usize = 1 << 18;
-/// Textures of a scene.
+/// Largest number of textures.
 pub const MAX_TEXTURES: usize = 4096;
-/// Instances of meshes in a scene.
+/// Largest number of mesh instances.
 pub const MAX_MODELS: usize = 1 << 16;
-/// Spheres of a scene.
+/// Largest number of spheres.
 pub const MAX_SPHERES: usize = 1 << 20;
-/// Infinite planes of a scene; every ray meets all of them.
+/// Largest number of infinite planes; every ray tests all of them.
 pub const MAX_PLANES: usize = 1024;
-/// Single triangles of a scene; more belong into a model.
+/// Largest number of single triangles; larger sets belong into a model.
 pub const MAX_TRIANGLES: usize = 1 << 20;
-/// Material slots of one model.
+/// Largest number of material slots of one model.
 pub const MAX_SLOTS: usize = 1 << 16;
-/// Rays per pixel.
+/// Largest number of rays per pixel.
 pub const MAX_SAMPLES: u32 = 256;
-/// Bounces of a ray.
+/// Largest number of bounces of a ray.
 pub const MAX_DEPTH: u32 = 64;
-/// Magnitude of a coordinate, radius, scale factor or degree: its square and their products stay finite in `f64`.
+/// Largest magnitude of a coordinate, radius, scale factor or degree: squares and their products stay finite in
+/// `f64`.
 pub const MAX_COORDINATE: f64 = 1e30;
-/// A light's intensity and colour: finite in `f32` after they are multiplied with a scene's attenuation.
+/// Largest channel of a light or an emission: finite in `f32` after multiplication with an attenuation.
 pub const MAX_LIGHT: f32 = 1e30;
 
-/// Why a scene cannot be drawn.
+/// Reason why a scene cannot be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValidateError {
     /// A list is longer than allowed.
     #[error("the scene has {count} {what}; {limit} are allowed")]
     TooMany {
-        /// What is listed.
+        /// The listed items.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
-        /// How many there may be.
+        /// The limit.
         limit: usize,
     },
-    /// A number is not what it must be.
+    /// A number or vector is out of bounds.
     #[error("{what} must be {expected}")]
     Unfit {
-        /// The number, as a path into the scene.
+        /// Path of the number in the scene.
         what: String,
-        /// What it must be.
+        /// The bounds.
         expected: &'static str,
     },
-    /// A material that is not there.
+    /// A material index is out of range.
     #[error("{what} names material {index}, but the scene has {count}")]
     NoSuchMaterial {
-        /// Who names it.
+        /// Path of the object with the index.
         what: String,
-        /// The index named.
+        /// The index.
         index: u32,
-        /// Materials of the scene.
+        /// Number of materials of the scene.
         count: usize,
     },
 }
@@ -74,20 +75,20 @@ pub enum ValidateError {
 type Check = Result<(), ValidateError>;
 
 impl Scene {
-    /// The compiled meshes that the scene shows.
+    /// Hashes of the meshes of all models.
     pub fn mesh_ids(&self) -> BTreeSet<MeshId> {
         self.models.iter().map(|model| model.mesh).collect()
     }
 
-    /// The textures that materials of the scene name.
+    /// Hashes of all textures.
     pub fn texture_ids(&self) -> BTreeSet<TextureId> {
         self.textures.iter().map(|map| map.texture).collect()
     }
 
-    /// Checks a scene that was not made by this program's loader, such as one from the wire.
+    /// Checks a scene from an untrusted source, such as the wire.
     ///
     /// # Errors
-    /// The first list that is too long, number that is out of bounds, or index that points nowhere.
+    /// The first list that is too long, number that is out of bounds, or index that is out of range.
     pub fn validate(&self) -> Result<(), ValidateError> {
         self.check_counts()?;
         require(is_color(self.ambient, MAX_LIGHT), || "ambient".into(), "finite and not negative")?;
@@ -154,7 +155,7 @@ impl Scene {
         require(listed, || format!("{name}.texture"), "one of the scene's textures")
     }
 
-    /// The material of something without texture coordinates.
+    /// Checks the material of an object without texture coordinates.
     fn check_plain_material(&self, index: u32, name: &str) -> Check {
         self.check_material_index(index, name)?;
         let plain = self.materials[index as usize].textures().next().is_none();
@@ -172,10 +173,10 @@ impl Scene {
 }
 
 impl FrameView {
-    /// Checks what is to be drawn of a scene, when it comes from the wire.
+    /// Checks a view from an untrusted source.
     ///
     /// # Errors
-    /// A camera that sees nothing, a size or number of samples out of bounds.
+    /// An invalid camera, a size or sample count out of bounds.
     pub fn validate(&self) -> Result<(), ValidateError> {
         check_camera(&self.camera)?;
         check_size(self.width, self.height, self.samples)?;
@@ -218,7 +219,7 @@ fn check_camera(camera: &Camera) -> Check {
     require(fault.is_none(), || "camera".into(), fault.unwrap_or_default())
 }
 
-/// What is wrong with a camera that looks along `direction`, both of any length.
+/// The fault of a camera that looks along `direction`, both vectors of any length.
 pub(in crate::scene) fn view_fault(direction: DVec3, up: DVec3) -> Option<&'static str> {
     let (Some(direction), Some(up)) = (direction.try_normalize(), up.try_normalize()) else {
         return Some("somewhere else than what it looks at, with an `up` that is not zero");
@@ -273,7 +274,7 @@ fn check_material(material: &Material, name: &str) -> Check {
     require(exponent, || format!("{name}.exponent"), "from 0 to 1e6")
 }
 
-/// Whether a pixel can be divided into that many samples: 1, 4, 9, ... 256.
+/// Whether a pixel can have this number of samples: 1, 4, 9, ... 256.
 pub(in crate::scene) fn is_sample_count(samples: u32) -> bool {
     let root = samples.isqrt();
     (1..=MAX_SAMPLES).contains(&samples) && root * root == samples

@@ -19,7 +19,7 @@ fn leaves(width: u32, height: u32, filter: Filter) -> LoadedScene {
     let mut mesh = ball(8, 12);
     let uv = |p: DVec3| DVec2::new(libm::atan2(p.z, p.x) * 0.7, p.y * 1.1);
     let uvs = mesh.triangles.iter().map(|t| t.map(|vertex| uv(mesh.positions[vertex as usize])));
-    (mesh.uvs, mesh.uv_repeats) = uvs.map(|uvs| apart_from_repeats(uvs).unwrap()).unzip();
+    (mesh.uvs, mesh.uv_repeats) = uvs.map(|uvs| split_repeats(uvs).unwrap()).unzip();
     let mesh = Arc::new(CompiledMesh::compile(&mesh).unwrap().0);
     let model = |x: f64, scale: [f64; 3], normals, materials: [u32; 2]| Model {
         mesh: mesh.id(),

@@ -18,7 +18,7 @@ use rayfarm_tracer::scene::{
     Quality, Scene, Sphere, TextureMap, Tiling, Triangle, Wrap, load,
 };
 use rayfarm_tracer::srgb;
-use rayfarm_tracer::texture::{Texture, apart_from_repeats};
+use rayfarm_tracer::texture::{Texture, split_repeats};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, Primitive, render_rows};
 
 /// A scene with its meshes and textures, as the loader gives it.
@@ -112,7 +112,7 @@ fn model(folder: &Path, obj: &str, mtl: &str, scene: &str) -> LoadedScene {
 /// Triangles of a scene as a mesh, with whole repeats apart.
 fn mesh_of(triangles: &[Triangle]) -> Arc<CompiledMesh> {
     let uvs = |triangle: &Triangle| {
-        apart_from_repeats(triangle.uvs.unwrap().map(|uv: Vec2| uv.as_dvec2())).unwrap()
+        split_repeats(triangle.uvs.unwrap().map(|uv: Vec2| uv.as_dvec2())).unwrap()
     };
     let (near, repeats): (Vec<[Vec2; 3]>, Vec<Vec2>) = triangles.iter().map(uvs).unzip();
     let mesh = Mesh {

@@ -1,6 +1,6 @@
-//! Files that a model names: its material libraries and pictures. They are looked for in the model's folder only, because
-//! a model from elsewhere must not make the program read other files; but there they are found although the name is
-//! one of another disk or system: with back slashes, in other letters, by the last parts of an absolute path.
+//! Lookup of files that a model names: its material libraries and pictures. Only the model's folder is searched,
+//! because an untrusted model must not make the program read other files. In it, files are found under names of other
+//! disks and systems as well: with back slashes, in another case, by the last parts of an absolute path.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -9,43 +9,43 @@ use std::path::{Path, PathBuf};
 
 use super::text::decoded_name;
 
-/// Entries of a folder that are looked at.
+/// Number of entries of a folder that are examined.
 const MAX_ENTRIES: usize = 1 << 16;
 
-/// Bytes of a name: no system has files with longer ones.
+/// Longest name in bytes; no system has longer ones.
 const MAX_NAME: usize = 4096;
 
-/// Parts of a name that are tried as a path inside of the folder.
+/// Number of last parts of a name that are tried as a path inside of the folder.
 const MAX_PARTS: usize = 8;
 
 /// Finds files in a model's folder and below it.
 pub(in crate::scene) struct Lookup<'p> {
     folder: &'p Path,
-    /// The folder with links followed; `None` where it cannot be read.
+    /// The folder with links resolved; `None` if it cannot be read.
     real_folder: Option<PathBuf>,
     /// Whether relative names and links may lead out of the folder.
     may_leave: bool,
-    /// Entries of folders by [`folded`] name, as far as they were wanted.
+    /// Entries of folders by [`folded`] name, listed on demand.
     listings: RefCell<BTreeMap<PathBuf, BTreeMap<String, OsString>>>,
 }
 
 /// A file that was found.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::scene) struct Found {
-    /// The way to it from the folder, with `/` between its parts.
+    /// Path from the folder, with `/` between its parts.
     pub(in crate::scene) name: String,
-    /// Where to open it.
+    /// Path to open.
     pub(in crate::scene) path: PathBuf,
-    /// Whether it is where the name says, letter by letter.
+    /// Whether it is at the named path, character for character.
     pub(in crate::scene) as_named: bool,
 }
 
-/// Why there is no file.
+/// Reason why a file was not found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::scene) enum Missing {
-    /// There is none of that name, or of its last parts.
+    /// There is no file of that name, or of its last parts.
     NotThere,
-    /// The name is an absolute path, and none of its last parts is there.
+    /// The name is an absolute path, and no file has its last parts.
     Absolute,
     /// The name leads out of the folder by `..`.
     Above,
@@ -60,7 +60,7 @@ impl<'p> Lookup<'p> {
         Self { folder, real_folder, may_leave, listings: RefCell::default() }
     }
 
-    /// The file of a name that was read in a file of the folder `inner`, which is relative to the model's.
+    /// Finds a file by a name that was read in a file of the folder `inner`, which is relative to the model's.
     pub(in crate::scene) fn find(&self, inner: &Path, name: &str) -> Result<Found, Missing> {
         let missing = match self.find_here(inner, name) {
             Ok(found) => return Ok(found),
@@ -73,7 +73,7 @@ impl<'p> Lookup<'p> {
         spellings(name).iter().find_map(last_parts).ok_or(missing)
     }
 
-    /// As [`Lookup::find`], with all parts of the name where it says.
+    /// Finds a file like [`Lookup::find`], but not by the last parts of its name.
     pub(in crate::scene) fn find_here(&self, inner: &Path, name: &str) -> Result<Found, Missing> {
         let mut missing = Missing::NotThere;
         if name.len() > MAX_NAME {
@@ -88,8 +88,8 @@ impl<'p> Lookup<'p> {
         Err(missing)
     }
 
-    /// Where to open the file of a way that was found before, by this program or another: it may have been renamed in the
-    /// case of its letters, or its name is in another encoding than it was read in.
+    /// Path to open for a path found earlier, by this program or another: the file may have been renamed in its case,
+    /// or its name may have another encoding.
     pub(in crate::scene) fn path(&self, way: &str) -> PathBuf {
         let direct = self.folder.join(way);
         if direct.exists() {
@@ -100,7 +100,7 @@ impl<'p> Lookup<'p> {
         found.map_or(direct, |found| found.path)
     }
 
-    /// The way that a name shows where no file is there; `None` where it leads out of the folder.
+    /// The named path where no file is; `None` if it leads out of the folder.
     pub(in crate::scene) fn way(&self, inner: &Path, name: &str) -> Option<String> {
         let name = Name::new(inner, &tidy(name));
         let permitted = !name.absolute && (self.may_leave || !name.leads_out());
@@ -118,7 +118,7 @@ impl<'p> Lookup<'p> {
         if self.is_permitted(&found.path) { Ok(found) } else { Err(Missing::Link) }
     }
 
-    /// Tries as many parts of the name as possible, in the folder of the file that has the name, then in the model's.
+    /// Tries as many last parts of the name as possible, in the folder `inner`, then in the model's folder.
     fn by_last_parts(&self, inner: &Path, name: &Name) -> Option<Found> {
         let parts: Vec<String> = name.parts.iter().filter(|part| *part != "..").cloned().collect();
         let inner = Name::new(inner, "").parts;
@@ -132,7 +132,7 @@ impl<'p> Lookup<'p> {
         )
     }
 
-    /// The file at the end of these parts; letters may differ in their case where there is no other.
+    /// The file at these parts. The case may differ if there is no exact match.
     fn walk(&self, parts: &[String]) -> Option<Found> {
         let mut path = self.folder.to_owned();
         let mut real_parts: Vec<String> = Vec::new();
@@ -164,7 +164,7 @@ impl<'p> Lookup<'p> {
         listing.get(&folded(name)).cloned()
     }
 
-    /// A link inside the folder may still lead out of it.
+    /// Whether links inside the folder do not lead out of it.
     fn is_permitted(&self, path: &Path) -> bool {
         self.may_leave
             || match (&self.real_folder, path.canonicalize()) {
@@ -174,7 +174,7 @@ impl<'p> Lookup<'p> {
     }
 }
 
-/// The entries of a folder; of those that differ in their case alone, the first in the order of their bytes.
+/// The entries of a folder; of those that differ in case only, the first in byte order.
 fn listing(folder: &Path) -> BTreeMap<String, OsString> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().take(MAX_ENTRIES);
@@ -187,12 +187,12 @@ fn folded(name: &str) -> String {
     name.to_lowercase()
 }
 
-/// A name as the way from the model's folder.
+/// A name as a path from the model's folder.
 #[derive(Debug, PartialEq)]
 struct Name {
-    /// It names a drive, a host, or the root of a disk: its parts are those of another folder.
+    /// Whether it names a drive, a host, or the root of a disk.
     absolute: bool,
-    /// Without `.`; `..` at the beginning only.
+    /// Parts without `.`; `..` at the beginning only.
     parts: Vec<String>,
 }
 
@@ -223,8 +223,8 @@ impl Name {
     }
 }
 
-/// What a name may mean, likeliest first: as it is; without quotes or a comment; with escaped blanks; with `%20` and the
-/// like decoded, as in addresses.
+/// Interpretations of a name, likeliest first: unchanged; without quotes or a comment; with unescaped blanks;
+/// percent-decoded.
 fn spellings(name: &str) -> Vec<String> {
     let tidy = tidy(name);
     let unescaped = tidy.replace("\\ ", " ");
@@ -238,7 +238,7 @@ fn spellings(name: &str) -> Vec<String> {
     all
 }
 
-/// The name without the quotes around it, or the comment behind it.
+/// The name without surrounding quotes, or without a trailing comment.
 pub(in crate::scene) fn tidy(name: &str) -> String {
     let name = name.trim_ascii();
     for quote in ['"', '\''] {

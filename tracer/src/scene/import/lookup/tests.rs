@@ -10,7 +10,7 @@ fn folder(files: &[&str]) -> tempfile::TempDir {
     folder
 }
 
-/// The name under which a file is found, and whether it is where its name says.
+/// The name of the file that is found, and whether it is at the named path.
 fn find(
     folder: &tempfile::TempDir,
     inner: &str,
@@ -24,7 +24,7 @@ fn find(
 }
 
 #[test]
-fn names_are_found_where_they_say() {
+fn names_are_found_at_their_path() {
     let folder = folder(&["wood.png", "maps/two words.png", "lib/oak.png", "a #1.png", "50%25.png"]);
     for (inner, name, found) in [
         ("", "wood.png", "wood.png"),
@@ -49,7 +49,7 @@ fn names_are_found_where_they_say() {
 }
 
 #[test]
-fn names_of_other_disks_and_in_other_letters_are_found_by_their_last_parts() {
+fn foreign_paths_are_found_by_their_last_parts() {
     let folder = folder(&["wood.png", "Maps/Oak.PNG", "lib/wood.png", "lib/pine.png", "grün.png"]);
     for (inner, name, found) in [
         ("", "WOOD.png", "wood.png"),
@@ -73,7 +73,7 @@ fn names_of_other_disks_and_in_other_letters_are_found_by_their_last_parts() {
 }
 
 #[test]
-fn what_is_not_there_says_why() {
+fn missing_files_have_reasons() {
     let folder = folder(&["wood.png", "maps/a.png"]);
     std::fs::write(folder.path().join("oak.png"), "x").unwrap();
     for (name, missing) in [
@@ -138,7 +138,7 @@ fn names_on_disk_may_be_in_an_old_encoding() {
 }
 
 #[test]
-fn ways_stay_inside_the_folder() {
+fn paths_remain_inside_the_folder() {
     for (inner, name, expected) in [
         ("", "wood.png", Some("wood.png")),
         ("lib", "maps\\wood.png", Some("lib/maps/wood.png")),
@@ -156,7 +156,7 @@ fn ways_stay_inside_the_folder() {
 }
 
 #[test]
-fn names_without_end_are_not_looked_for() {
+fn very_long_names_are_not_searched() {
     let folder = folder(&["wood.png"]);
     let name = format!("{}wood.png", "../".repeat(1 << 20));
     assert_eq!(find(&folder, "", &name, true), Err(Missing::NotThere));

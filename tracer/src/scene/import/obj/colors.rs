@@ -1,24 +1,24 @@
-//! Colours of vertices of an OBJ text, `v x y z r g b`. Like texture coordinates they stay with the corners of the triangles.
+//! Vertex colours of OBJ, `v x y z r g b`. Like texture coordinates they belong to the corners of triangles.
 
 use super::super::warnings::Warnings;
 use super::geometry::Geometry;
 use super::lines::Line;
 
-/// Of a vertex without a colour: more than any number of steps.
+/// Colour of a vertex without one: larger than any byte.
 const WHITE: [f32; 3] = [f32::INFINITY; 3];
 
-/// Colours as they are read, line by line.
+/// Vertex colours under construction, line by line.
 #[derive(Default)]
 pub(super) struct Colors {
-    /// Of the first vertices, as the file has them; empty while none has a colour.
+    /// Colours of the first vertices as in the file; empty before the first colour.
     vertices: Vec<[f32; 3]>,
-    /// The first line with a colour.
+    /// Number of the first line with a colour.
     first: usize,
     largest: f32,
 }
 
 impl Colors {
-    /// Takes the line of a vertex, which comes after that number of others.
+    /// Reads the colour of a vertex line; `before` is the number of earlier vertices.
     pub(super) fn vertex(&mut self, before: usize, line: &Line<'_>, warnings: &mut Warnings) {
         let Some(color) = color(line, warnings) else { return };
         if self.vertices.is_empty() {
@@ -29,7 +29,7 @@ impl Colors {
         self.largest = color.into_iter().fold(self.largest, f32::max);
     }
 
-    /// sRGB of the first vertices; others are white.
+    /// The colours as sRGB bytes of the first vertices; further vertices are white.
     pub(super) fn finish(self, warnings: &mut Warnings) -> Vec<[u8; 3]> {
         let scale = if self.largest > 1.0 { 1.0 } else { 255.0 };
         if self.largest > 1.0 {
@@ -50,7 +50,7 @@ pub(super) fn of_model(geometry: &Geometry) -> Vec<[[u8; 3]; 3]> {
     of_triangles(&geometry.colors, &triangles)
 }
 
-/// Colours of the corners of triangles, whose vertices are counted from 1; empty where all are white.
+/// Colours of the corners of triangles, with vertices counted from 1; empty where all are white.
 fn of_triangles(vertices: &[[u8; 3]], triangles: &[[u32; 3]]) -> Vec<[[u8; 3]; 3]> {
     let white = [u8::MAX; 3];
     if vertices.iter().all(|color| *color == white) {
@@ -61,7 +61,7 @@ fn of_triangles(vertices: &[[u8; 3]], triangles: &[[u32; 3]]) -> Vec<[[u8; 3]; 3
     if colors.iter().flatten().all(|color| *color == white) { Vec::new() } else { colors }
 }
 
-/// The numbers behind the position: three, or four with an alpha. One alone is a weight.
+/// The numbers behind the position: three, or four with an alpha. A single number is a weight.
 fn color(line: &Line<'_>, warnings: &mut Warnings) -> Option<[f32; 3]> {
     let mut words = line.rest().split_ascii_whitespace().skip(3);
     let words = [words.next()?, words.next()?, words.next()?];
@@ -84,7 +84,7 @@ mod tests {
     use super::super::lines::lines;
     use super::*;
 
-    /// Colours of the vertices, and what is said of them.
+    /// Colours of the vertices, and the warnings.
     fn read(text: &str) -> (Vec<[u8; 3]>, Vec<String>) {
         let mut warnings = Warnings::about(Path::new("a.obj"));
         let mut colors = Colors::default();
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_go_to_the_corners_of_the_triangles() {
+    fn colours_belong_to_the_corners_of_triangles() {
         let (colors, warnings) =
             read("v 0 0 0\nv 0 0 0 1 0 0\nv 1 0 0 0 0.5 0 1\nv 1 1 0\nv 0 1 0 0 0 1\nv 1 1 1 1\n");
         let [red, green, white, blue] = [[255, 0, 0], [0, 128, 0], [255; 3], [0, 0, 255]];
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_colour_is_white() {
+    fn invalid_colours_are_white() {
         let (colors, warnings) = read("v 0 0 0 x 0 1\nv 1 0 0 -1 0 0\nv 0 1 0 0 nan 0\nv 0 0 0 0 1 300\n");
         assert_eq!(colors, [[0; 3]; 0]);
         assert_eq!(warnings.len(), 1, "{warnings:?}");

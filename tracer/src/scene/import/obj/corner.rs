@@ -1,26 +1,26 @@
-//! Corners of faces: `v`, `v/vt`, `v//vn` or `v/vt/vn`. Negative numbers count back from the line.
+//! Corners of faces: `v`, `v/vt`, `v//vn` or `v/vt/vn`. Negative numbers count back from the current line.
 
-/// The number of what a corner does not have.
+/// Index of an absent part of a corner.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The number of what a corner names and no file can have.
+/// Index of a part that no file can have.
 const ABSENT: u32 = u32::MAX - 1;
 
-/// What a corner names, counted from 0.
+/// A corner with its parts as indices, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Corner {
     /// Index of the `v`.
     pub(super) vertex: u32,
-    /// Index of the `vt`, or [`NONE`]. It may be beyond the last one.
+    /// Index of the `vt`, or [`NONE`]. It may be out of range.
     pub(super) uv: u32,
     /// Index of the `vn`, or [`NONE`].
     pub(super) normal: u32,
 }
 
-/// Reads a corner behind `counts` vertices, texture coordinates and normals.
+/// Parses a corner, given the `counts` of vertices, texture coordinates and normals before it.
 ///
 /// # Errors
-/// No whole numbers; a vertex that cannot be. A texture coordinate or normal that cannot be is for the reader to judge.
+/// Numbers that are not whole; a vertex that cannot exist. Texture coordinates and normals are not checked.
 pub(super) fn read(corner: &str, [vertices, uvs, normals]: [usize; 3]) -> Result<Corner, String> {
     let mut parts = corner.split('/');
     let vertex = parts.next().unwrap_or_default();
@@ -38,7 +38,7 @@ pub(super) fn read(corner: &str, [vertices, uvs, normals]: [usize; 3]) -> Result
     Ok(Corner { vertex: clamped(vertex), uv: optional(uv, uvs)?, normal: optional(normal, normals)? })
 }
 
-/// A number as an index counted from 0, behind `count` of them.
+/// A number as an index counted from 0, given `count` earlier items.
 fn index(number: i64, count: usize) -> Option<usize> {
     let back = || usize::try_from(number.unsigned_abs()).ok();
     match number {
@@ -59,12 +59,12 @@ fn vertex_index(number: i64, count: usize, corner: &str) -> Result<usize, String
     })
 }
 
-/// Indices that are too large for any file stay too large.
+/// Clamps indices that are too large for any file.
 fn clamped(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(ABSENT).min(ABSENT)
 }
 
-/// The number of its vertex as the file writes it, where that is not counted back.
+/// The vertex number as written, if it is not counted back.
 pub(super) fn vertex_number(corner: &str) -> Option<usize> {
     corner.split('/').next()?.parse().ok()
 }
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_are_read_in_every_way_of_writing_them() {
+    fn corners_are_read_in_every_notation() {
         let counts = [10, 20, 30];
         let corner = |vertex, uv, normal| Ok(Corner { vertex, uv, normal });
         for (text, expected) in [

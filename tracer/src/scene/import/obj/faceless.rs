@@ -1,9 +1,9 @@
-//! What a file is that has no faces to draw.
+//! Descriptions of OBJ files without faces.
 
-use super::super::foreign::{is_binary, text_in_place_of_a_model};
+use super::super::foreign::{describe_other_text, is_binary};
 use super::lines::lines;
 
-/// Statements of an OBJ file by what they mean for one without faces.
+/// Numbers of statements in a file without faces.
 #[derive(Default)]
 struct Counts {
     vertices: usize,
@@ -14,11 +14,11 @@ struct Counts {
     others: usize,
 }
 
-/// Says what is in a file in place of faces, and what to do.
+/// A message with the content of the file and a remedy.
 pub(super) fn reason(content: &[u8], text: &str) -> String {
     let counts = Counts::of(text);
     if counts.none() || is_binary(content, text) {
-        return format!("no faces in the file: {}", text_in_place_of_a_model(content, text));
+        return format!("no faces in the file: {}", describe_other_text(content, text));
     }
     let Counts { vertices, points, lines, curves, short_faces, .. } = counts;
     let (what, advice) = if curves > 0 {
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_there_in_place_of_faces_is_counted() {
+    fn other_statements_are_counted() {
         let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
         for (text, words) in [
             (square.to_owned(), "a cloud of 4 points"),

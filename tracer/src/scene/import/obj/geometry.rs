@@ -1,6 +1,6 @@
-//! The reading of an OBJ text: every line is checked where its number is still known, and what remains is plain geometry:
-//! positions, normals and texture coordinates, the corners that name them, and polygons cut into triangles of corners.
-//! Materials are noted by name.
+//! Parsing of an OBJ text. Every line is checked while its number is known, and the result is plain geometry:
+//! positions, normals and texture coordinates, corners that refer to them, and polygons as triangles of corners.
+//! Materials are names.
 
 use std::collections::BTreeMap;
 
@@ -19,47 +19,47 @@ use crate::scene::validate::MAX_COORDINATE;
 /// A line that cannot be read.
 #[derive(Debug, PartialEq)]
 pub(super) struct LineError {
-    /// Counted from 1.
+    /// Line, counted from 1.
     pub(super) line: usize,
-    /// What is wrong and what was expected.
+    /// The fault and what was expected.
     pub(super) message: String,
 }
 
-/// What an OBJ text says.
+/// The geometry of an OBJ text.
 #[derive(Default)]
 pub(super) struct Geometry {
-    /// `v`, in the order of the file.
+    /// Positions, `v`, in the order of the file.
     pub(super) positions: Vec<DVec3>,
-    /// `vn` at unit length; zero where it is no direction.
+    /// Unit normals, `vn`; zero where one is no direction.
     pub(super) normals: Vec<Vec3>,
-    /// `vt`; NaN where it is no number.
+    /// Texture coordinates, `vt`; NaN where one is no number.
     pub(super) uvs: Vec<DVec2>,
-    /// Corners of faces. Their vertices exist, and their normals do where they have one; texture coordinates may not.
+    /// Corners of faces. Their vertices and normals are in range, texture coordinates may not be.
     pub(super) corners: Vec<Corner>,
     /// Faces as triangles, in the order of the file: indices into `corners`.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// How normals are averaged where corners have none.
+    /// Averaging of missing normals.
     pub(super) smoothing: Smoothing,
-    /// Which triangles have which material, in their order.
+    /// Runs of triangles with one material, in their order.
     pub(super) runs: Vec<MaterialRun>,
-    /// Material libraries and the lines that name them.
+    /// Material libraries with the lines that name them.
     pub(super) libraries: Vec<(usize, String)>,
     /// Colours of the first vertices: see [`Colors::finish`].
     pub(super) colors: Vec<[u8; 3]>,
 }
 
-/// Triangles in a row that share a material.
+/// Consecutive triangles with one material.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MaterialRun {
     /// The line of the `usemtl`, for messages.
     pub(super) line: usize,
     /// `None` before the first `usemtl`.
     pub(super) material: Option<String>,
-    /// The number of triangles, once polygons are cut into them.
+    /// Number of triangles after triangulation.
     pub(super) triangles: usize,
 }
 
-/// Reads an OBJ text. Where it has no smoothing groups, faces that meet at less than `crease_angle` degrees are smooth.
+/// Parses an OBJ text. Without smoothing groups, faces that meet at less than `crease_angle` degrees are smooth.
 pub(super) fn read(text: &str, crease_angle: f64, warnings: &mut Warnings) -> Result<Geometry, LineError> {
     let mut reader = Reader::default();
     for line in lines(text) {
@@ -70,9 +70,9 @@ pub(super) fn read(text: &str, crease_angle: f64, warnings: &mut Warnings) -> Re
 
 /// Corners and smoothing group of a face.
 struct Face {
-    /// Behind its last corner in [`Geometry::corners`].
+    /// Index behind its last corner in [`Geometry::corners`].
     end: usize,
-    /// 0 is none; `None` before the first `s`.
+    /// Smoothing group, 0 for none; `None` before the first `s`.
     group: Option<u32>,
 }
 
@@ -81,12 +81,12 @@ struct Reader {
     geometry: Geometry,
     colors: Colors,
     faces: Vec<Face>,
-    /// Faces of each run of [`Geometry::runs`].
+    /// Number of faces in each run of [`Geometry::runs`].
     faces_of_runs: Vec<usize>,
     group: Option<u32>,
-    /// Vertices out of bounds, by number counted from 0, with their lines.
+    /// Vertices out of bounds by index, with their lines.
     unusable: BTreeMap<u32, usize>,
-    /// The largest number of a vertex, counted from 1, and the line that has it.
+    /// The largest vertex number, counted from 1, and its line.
     largest: (usize, usize),
     skipped: BTreeMap<&'static str, (usize, usize)>,
 }
@@ -125,7 +125,7 @@ impl Reader {
         self.skipped.entry(reason).or_insert((line, 0)).1 += 1;
     }
 
-    /// `v x y z`, followed by a weight that nothing uses, or by a colour: see [`Colors`].
+    /// `v x y z`, followed by an ignored weight or by a colour: see [`Colors`].
     fn vertex(&mut self, line: &Line<'_>) -> Result<(), String> {
         let position = three_numbers(line.rest()).ok_or_else(|| expected_numbers(line))?;
         if !(position.abs().cmple(DVec3::splat(MAX_COORDINATE)).all()) {
@@ -135,7 +135,7 @@ impl Reader {
         Ok(())
     }
 
-    /// A shape is complete without its normals: one that is no direction is missing.
+    /// `vn x y z`. A normal that is no direction counts as missing, because a shape is complete without normals.
     fn normal(&mut self, line: &Line<'_>) {
         let normal = three_numbers(line.rest()).unwrap_or(DVec3::ZERO);
         self.geometry.normals.push(normal.normalize_or_zero().as_vec3());
@@ -215,12 +215,12 @@ impl Reader {
         for (reason, (line, count)) in &self.skipped {
             warnings.at_line(*line, format!("{reason} ({count} in the file)"));
         }
-        self.geometry.take_off_missing_normals(warnings);
-        self.cut_polygons(crease_angle);
+        self.geometry.remove_missing_normals(warnings);
+        self.triangulate(crease_angle);
         Ok(self.geometry)
     }
 
-    /// A vertex that is not finite is an error where a face needs it, and a curiosity where none does.
+    /// Refuses a vertex that is not finite where a face uses it; warns about unused ones.
     fn check_unusable(&self, warnings: &mut Warnings) -> Result<(), LineError> {
         let Some((_, first_line)) = self.unusable.first_key_value() else { return Ok(()) };
         let mut used = self.geometry.corners.iter().filter_map(|corner| self.unusable.get(&corner.vertex));
@@ -234,7 +234,7 @@ impl Reader {
         Ok(())
     }
 
-    fn cut_polygons(&mut self, crease_angle: f64) {
+    fn triangulate(&mut self, crease_angle: f64) {
         let Self { geometry, faces, faces_of_runs, .. } = self;
         let grouped = faces.iter().any(|face| face.group.is_some());
         let mut groups = Vec::new();
@@ -255,7 +255,7 @@ impl Reader {
                 }
                 geometry.triangles.extend(cut.iter().map(|triangle| triangle.map(|corner| first + corner)));
                 if grouped {
-                    // What comes before the first `s` is not smooth.
+                    // Faces before the first `s` are flat.
                     groups.extend(cut.iter().map(|_| face.group.unwrap_or(0)));
                 }
                 run.triangles += cut.len();
@@ -267,13 +267,13 @@ impl Reader {
 }
 
 impl Geometry {
-    /// Vertices, texture coordinates and normals so far.
+    /// Numbers of vertices, texture coordinates and normals so far.
     fn counts(&self) -> [usize; 3] {
         [self.positions.len(), self.uvs.len(), self.normals.len()]
     }
 
-    /// Takes normals off corners that name one which is not there or no direction; they are averaged instead.
-    fn take_off_missing_normals(&mut self, warnings: &mut Warnings) {
+    /// Removes normals that are out of range or no direction from corners; they are averaged instead.
+    fn remove_missing_normals(&mut self, warnings: &mut Warnings) {
         let (mut absent, mut unusable, mut without) = (0, 0, 0);
         for corner in &mut self.corners {
             match self.normals.get(corner.normal as usize) {

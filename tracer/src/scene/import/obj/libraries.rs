@@ -1,4 +1,4 @@
-//! The material libraries of a model: which files its `mtllib` lines name, and what becomes of those that are not there.
+//! The material libraries of a model: the files that its `mtllib` lines name, and substitutes for missing ones.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,16 +15,16 @@ use super::materials::{self, Library};
 use super::picture::Place;
 use super::slots::find;
 
-/// Libraries of one model that are read.
+/// Largest number of libraries of one model.
 const MAX_LIBRARIES: usize = 1024;
 
-/// Bytes of all libraries of one model.
+/// Largest size of all libraries of one model, in bytes.
 const MAX_TOTAL_BYTES: u64 = 4 * MAX_LIBRARY_BYTES;
 
-/// Words of a line that are tried as one name with blanks in it.
+/// Largest number of words in a name with blanks.
 const MAX_WORDS: usize = 16;
 
-/// Reads all libraries that a model names, each once. With their materials come warnings about what is in them.
+/// Reads all libraries that a model names, each once. Returns their materials and the warnings about their contents.
 pub(super) fn read(
     model: &Path,
     lines: &[(usize, String)],
@@ -34,7 +34,7 @@ pub(super) fn read(
 ) -> (Library, Vec<String>) {
     let folder = model.parent().unwrap_or(Path::new(""));
     let mut reader = Reader {
-        // Libraries are never read from elsewhere.
+        // Libraries outside of the folder are never read.
         files: Lookup::new(folder, false),
         pictures: Lookup::new(folder, options.allow_parent_textures),
         known: BTreeSet::new(),
@@ -62,12 +62,12 @@ pub(super) fn read(
 struct Reader<'p> {
     files: Lookup<'p>,
     pictures: Lookup<'p>,
-    /// Those that have been read.
+    /// Paths of the libraries that have been read.
     known: BTreeSet<PathBuf>,
     bytes: u64,
     library: Library,
     messages: Vec<String>,
-    /// Libraries that are not there, with the lines that name them.
+    /// Missing libraries, with the lines that name them.
     missing: Vec<(usize, String, Missing)>,
 }
 
@@ -116,7 +116,7 @@ impl Reader<'_> {
         Ok((materials, about.into_messages()))
     }
 
-    /// Reports what is missing, unless a library that is named like the model has it.
+    /// Reports missing libraries, unless a library with the model's name defines their materials.
     fn finish(
         mut self,
         model: &Path,
@@ -142,7 +142,7 @@ impl Reader<'_> {
             let message = missing_message(&excerpt(name, 100), *reason);
             warnings.once(&message, *line, &message);
         }
-        // Where a library is missing, its materials need no warnings of their own.
+        // A missing library is reported already, and its materials are not reported again.
         if self.missing.is_empty() || instead.is_some() {
             warn_of_unknown(runs, &self.library, warnings);
         }
@@ -153,7 +153,8 @@ impl Reader<'_> {
         unknown(runs, &self.library).next().is_none()
     }
 
-    /// Adds the library beside the model that has its name (`chair.mtl` for `chair.obj`), if it defines what is missing.
+    /// Adds the library in the model's folder with its name (`chair.mtl` for `chair.obj`), if it defines missing
+    /// materials.
     fn named_like(&mut self, model: &Path, runs: &[MaterialRun]) -> Option<String> {
         let name = format!("{}.mtl", model.file_stem()?.to_str()?);
         let found = self.files.find_here(Path::new(""), &name).ok()?;
@@ -191,7 +192,7 @@ fn unknown<'r>(runs: &'r [MaterialRun], library: &Library) -> impl Iterator<Item
     named.filter(move |(name, _)| seen.insert(*name) && find(library, name).is_none())
 }
 
-/// One warning for all of them.
+/// Reports all undefined materials in one warning.
 fn warn_of_unknown(runs: &[MaterialRun], library: &Library, warnings: &mut Warnings) {
     const LISTED: usize = 5;
     let mut rest = unknown(runs, library).peekable();
@@ -209,8 +210,8 @@ fn warn_of_unknown(runs: &[MaterialRun], library: &Library, warnings: &mut Warni
     );
 }
 
-/// The names on an `mtllib` line. They may have blanks in them, so the longest name of a file that is there counts;
-/// where there is none, a name ends in `.mtl`. A `#` in the place of a name begins a comment.
+/// The names on an `mtllib` line. Names may contain blanks, so the longest name of an existing file counts; where
+/// there is none, a name ends with `.mtl`. A `#` in place of a name begins a comment.
 fn split(text: &str, is_there: impl Fn(&str) -> bool) -> Vec<&str> {
     let mut names = Vec::new();
     let mut rest = text.trim_ascii();
@@ -236,7 +237,7 @@ fn split(text: &str, is_there: impl Fn(&str) -> bool) -> Vec<&str> {
     names
 }
 
-/// Where the first words end.
+/// Offsets of the ends of the first words.
 fn word_ends(text: &str) -> Vec<usize> {
     let bytes = text.as_bytes();
     let ends = (1..=bytes.len()).filter(|end| {
@@ -246,7 +247,7 @@ fn word_ends(text: &str) -> Vec<usize> {
     ends.take(MAX_WORDS).collect()
 }
 
-/// Where the name of a file that is not there ends: behind `.mtl`, before a comment, or with the text.
+/// Offset of the end of a missing file's name: behind `.mtl`, before a comment, or the end of the text.
 fn end_of_missing(text: &str, ends: &[usize]) -> usize {
     let is_library = |end: &&usize| {
         let tail = text.as_bytes().get(end.saturating_sub(4)..**end);
@@ -262,7 +263,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_on_a_line_are_told_apart_by_what_is_there() {
+    fn names_on_a_line_are_separated_by_existing_files() {
         let there = ["my mats.mtl", "other.mtl", "a #1.mtl", "plain", "two words", "my\\ mats.mtl"];
         for (text, names) in [
             ("other.mtl", &["other.mtl"][..]),
@@ -287,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_of_many_words_takes_few_looks() {
+    fn a_line_of_many_words_takes_few_lookups() {
         let looks = std::cell::Cell::new(0);
         let is_there = |_: &str| {
             looks.set(looks.get() + 1);

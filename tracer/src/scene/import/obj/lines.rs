@@ -1,4 +1,4 @@
-//! The logical lines of an OBJ or MTL text: comments gone, continuations joined, numbered as in the file.
+//! The logical lines of an OBJ or MTL text: without comments, with joined continuations, numbered as in the file.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use super::numbers::is_in_a_number;
 pub(super) struct Line<'t> {
     /// Number of the first physical line, counted from 1.
     pub(super) number: usize,
-    /// Trimmed, not empty.
+    /// Text without surrounding blanks, not empty.
     pub(super) text: Cow<'t, str>,
 }
 
@@ -19,7 +19,7 @@ impl Line<'_> {
         keyword(&self.text)
     }
 
-    /// What follows the keyword.
+    /// The text behind the keyword.
     pub(super) fn rest(&self) -> &str {
         self.text.get(self.keyword().len()..).unwrap_or_default().trim_ascii_start()
     }
@@ -29,7 +29,7 @@ fn keyword(text: &str) -> &str {
     text.split_ascii_whitespace().next().unwrap_or_default()
 }
 
-/// Whether the rest of such a line is a name: names may hold `#`, and paths may end in a backslash.
+/// Whether the rest of a line with this keyword is a name: names may contain `#`, and paths may end in a backslash.
 fn holds_a_name(keyword: &str) -> bool {
     const NAMED: [&str; 10] =
         ["o", "g", "usemtl", "mtllib", "newmtl", "bump", "disp", "decal", "norm", "refl"];
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_and_blank_lines_are_gone_and_numbers_stay() {
+    fn comments_and_blank_lines_are_removed_and_numbers_kept() {
         let text = "# head\\\n\nv 1 2 3 # first\r\n  f 1 2 3#x\n#\n\tv 4\t5 6  ";
         assert_eq!(read(text), owned(&[(3, "v 1 2 3"), (4, "f 1 2 3"), (6, "v 4\t5 6")]));
     }
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_none_are_no_comments() {
+    fn special_numbers_are_no_comments() {
         let text = "vn -1.#IND 0 1.#QNAN # odd\nv 1.# 2\nv 1.#x\nvn 0 0 1.#INF#";
         let expected = [(1, "vn -1.#IND 0 1.#QNAN"), (2, "v 1."), (3, "v 1."), (4, "vn 0 0 1.#INF")];
         assert_eq!(read(text), owned(&expected));

@@ -1,7 +1,7 @@
-//! Wavefront OBJ with its material libraries: a text in, a [`Mesh`] out.
+//! Import of Wavefront OBJ with its material libraries.
 //!
-//! One reading checks every line and keeps what is geometry ([`geometry`]), polygons cut into triangles ([`polygon`]);
-//! corners become vertices ([`vertices`]), and materials follow the order of the triangles ([`slots`]).
+//! One pass checks every line and collects the geometry ([`geometry`]), with polygons triangulated ([`polygon`]);
+//! corners become vertices ([`vertices`]), and materials become slots in the order of the triangles ([`slots`]).
 
 mod colors;
 mod corner;
@@ -37,25 +37,25 @@ use materials::Library;
 use slots::{assign_materials, find};
 use uvs::TriangleUvs;
 
-/// When a mesh is to carry the texture coordinates that its file gives.
+/// Which texture coordinates of its file a mesh gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::scene) enum Uvs {
-    /// No texture is laid on it.
+    /// None: no material has a texture.
     Never,
-    /// Where a material of its own has a texture.
+    /// Those of triangles whose own material has a texture.
     Textured,
-    /// Whenever there are any: somebody else's texture may be laid on it.
+    /// All: a material of the scene with a texture may be assigned.
     Always,
-    /// As `Always`, with whole repeats for textures that tell them apart.
+    /// All, with whole repeats for textures that distinguish them.
     Whole,
 }
 
-/// Reads a model. With it come warnings about what was left out. Where it has neither normals nor smoothing groups, faces
-/// that meet at the crease angle at most are smooth.
+/// Reads a model. Returns the mesh and warnings about ignored parts. In a file with neither normals nor smoothing
+/// groups, faces that meet at the crease angle at most are smooth.
 ///
 /// # Errors
-/// A file that cannot be read, a line that is no OBJ, an index that points nowhere, a used vertex that is not finite,
-/// a file without faces.
+/// A file that cannot be read, an invalid line, an index out of range, a used vertex that is not finite, a file
+/// without faces.
 pub(in crate::scene) fn load(
     path: &Path,
     wanted: Uvs,
@@ -65,7 +65,7 @@ pub(in crate::scene) fn load(
     let mut warnings = Warnings::about(path);
     let text = decoded(&content);
     let failed = |fault: geometry::LineError| {
-        // What a line of it should be says nothing where it is no text at all.
+        // The expected form of a line is no help where the file is not text.
         if is_binary(&content, &text) {
             return SceneError::in_file(path, faceless::reason(&content, &text));
         }
@@ -83,14 +83,14 @@ pub(in crate::scene) fn load(
     let uvs = wanted_uvs(wanted, &geometry, &library, &mut warnings);
     let mut mesh = vertices::mesh(&geometry);
     mesh.colors = colors::of_model(&geometry);
-    // Colours of vertices are factors: where there are some they are what is seen.
+    // Vertex colours are factors of the diffuse colour, so the neutral material is white with them.
     let diffuse = if mesh.colors.is_empty() { Material::NEUTRAL.diffuse } else { Vec3::ONE };
     let neutral = NamedMaterial::plain("neutral", Material { diffuse, ..Material::NEUTRAL });
     assign_materials(path, &mut mesh, &geometry.runs, &library, &neutral, uvs.as_deref())?;
     let uvs = uvs.into_iter().flatten().map(Option::unwrap_or_default);
     (mesh.uvs, mesh.uv_repeats) = uvs.unzip();
     let textures = || mesh.materials.iter().flat_map(NamedMaterial::textures);
-    let told_apart = wanted == Uvs::Whole || textures().any(|texture| texture.tiling.tells_repeats_apart());
+    let told_apart = wanted == Uvs::Whole || textures().any(|texture| texture.tiling.distinguishes_repeats());
     if !told_apart || mesh.uv_repeats.iter().all(|repeats| *repeats == Vec2::ZERO) {
         mesh.uv_repeats = Vec::new();
     }
@@ -99,7 +99,7 @@ pub(in crate::scene) fn load(
     Ok((mesh, all))
 }
 
-/// Texture coordinates of each triangle, where they are wanted and there are any.
+/// Texture coordinates of each triangle, if requested and present.
 fn wanted_uvs(
     wanted: Uvs,
     geometry: &Geometry,

@@ -1,8 +1,9 @@
-//! Numbers as programs write them, those that are none among them.
+//! Numbers as programs write them, including infinities and NaN.
 
 use glam::DVec3;
 
-/// A number. What C libraries write for infinity and for no number is read too: `inf`, `nan(ind)`, `-1.#IND`, `1.#QNAN00`.
+/// Parses a number, including the spellings of C libraries for infinity and NaN: `inf`, `nan(ind)`, `-1.#IND`,
+/// `1.#QNAN00`.
 pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| not_finite(word))
 }
@@ -22,13 +23,14 @@ fn not_finite(word: &str) -> Option<f64> {
     begins_with(unsigned, "nan(").then_some(f64::NAN)
 }
 
-/// Whether a `#` at this place of a line belongs to a number that Microsoft's library wrote, and begins no comment.
+/// Whether a `#` at this offset belongs to a number in Microsoft's spelling, and begins no comment.
 pub(super) fn is_in_a_number(line: &str, hash: usize) -> bool {
     let (before, after) = line.split_at(hash);
     before.ends_with("1.") && begins_like_microsofts(after.get(1..).unwrap_or_default())
 }
 
-/// Whether a text goes on as `1.#` does: `1.#IND`, `1.#QNAN`, `1.#SNAN`, `1.#INF`, each perhaps with digits behind it.
+/// Whether a text continues `1.#` in Microsoft's spelling: `1.#IND`, `1.#QNAN`, `1.#SNAN`, `1.#INF`, optionally with
+/// digits.
 fn begins_like_microsofts(text: &str) -> bool {
     ["IND", "QNAN", "SNAN", "INF"].iter().any(|kind| begins_with(text, kind))
 }
@@ -69,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn three_are_three() {
+    fn three_numbers_are_required() {
         assert_eq!(three_numbers("1 2\t3 4"), Some(DVec3::new(1.0, 2.0, 3.0)));
         assert_eq!((three_numbers("1 2"), three_numbers("1 2 x")), (None, None));
     }

@@ -1,4 +1,4 @@
-//! The picture that `map_Kd` and its like name, and their options.
+//! Picture names and options of statements such as `map_Kd`.
 
 use std::path::Path;
 
@@ -10,18 +10,18 @@ use super::tiling::{TextureOption, tiling, warn_of_others};
 use crate::mesh::MAX_TEXTURE_NAME;
 use crate::texture::Tiling;
 
-/// Where a material library is.
+/// Location of a material library.
 pub(super) struct Place<'p> {
-    /// Finds pictures in the model's folder.
+    /// Lookup of pictures in the model's folder.
     pub(super) pictures: &'p Lookup<'p>,
-    /// The library's folder inside of it.
+    /// Folder of the library, relative to the model's.
     pub(super) inner: &'p Path,
 }
 
-/// Characters of a name that a message shows.
+/// Characters of a name in a message.
 const MAX_SHOWN: usize = 200;
 
-/// Options of texture statements, and how many words follow each at most.
+/// Options of texture statements, with the largest number of words of each.
 const OPTIONS: &[(&str, usize)] = &[
     ("-blendu", 1),
     ("-blendv", 1),
@@ -39,8 +39,8 @@ const OPTIONS: &[(&str, usize)] = &[
     ("-type", 1),
 ];
 
-/// The picture's file, relative to the model's folder, with `/` between its parts, and how it lies. The error says why it is
-/// not used.
+/// The picture's file, relative to the model's folder, with `/` between its parts, and its tiling. The error is the
+/// reason why it is not used.
 pub(super) fn picture(
     line: &Line<'_>,
     place: &Place<'_>,
@@ -77,7 +77,7 @@ fn note_other_place(line: usize, name: &str, found: &Found, warnings: &mut Warni
     }
 }
 
-/// The way to a picture that is not there, to be reported when it is wanted; or why it is not looked for.
+/// The named path of a missing picture, to be reported when it is used; or the reason why it is not searched.
 fn way_to_missing(name: &str, missing: Missing, place: &Place<'_>) -> Result<String, String> {
     let shown = excerpt(name, MAX_SHOWN);
     match missing {
@@ -96,7 +96,7 @@ fn way_to_missing(name: &str, missing: Missing, place: &Place<'_>) -> Result<Str
     }
 }
 
-/// The file name, which may hold spaces, and the options before it.
+/// The file name, which may contain blanks, and the options before it.
 fn split_options(rest: &str) -> (&str, Vec<TextureOption<'_>>) {
     let mut rest = rest.trim();
     let mut given = Vec::new();
@@ -104,7 +104,7 @@ fn split_options(rest: &str) -> (&str, Vec<TextureOption<'_>>) {
         let mut words = Vec::new();
         rest = after_word(rest);
         for index in 0..*most {
-            // The second and third number of a vector may be left out.
+            // The second and third number of a vector are optional.
             let number = first_word(rest).parse::<f64>().is_ok();
             if !number && (*most == 3 || index > 0) {
                 break;
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn options_are_read_and_names_may_hold_spaces() {
+    fn options_are_read_and_names_may_contain_blanks() {
         for (text, name, options) in [
             ("wood.png", "wood.png", &[][..]),
             ("  two words.png ", "two words.png", &[]),

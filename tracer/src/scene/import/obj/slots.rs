@@ -1,4 +1,4 @@
-//! Which triangle has which material.
+//! Assignment of material slots to triangles.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,15 +9,15 @@ use super::materials::{Library, plain_name};
 use super::uvs::TriangleUvs;
 use crate::mesh::{Mesh, NamedMaterial};
 
-/// The material of a name; some writers put a comment behind it.
+/// The material with a name; some programs write a comment behind names.
 pub(super) fn find<'l>(library: &'l Library, name: &str) -> Option<&'l NamedMaterial> {
     let name = plain_name(name);
     let bare = || name.split_once(" #").and_then(|(bare, _)| library.get(&*plain_name(bare)));
     library.get(&*name).or_else(bare)
 }
 
-/// Gives every triangle its slot; a slot for each material that triangles use, in the order of their first use. Where a
-/// material has textures, triangles without texture coordinates have a slot of their own: the same without them.
+/// Assigns a slot to every triangle: one slot per used material, in the order of first use. A material with textures
+/// has a second slot, without them, for triangles without texture coordinates.
 pub(super) fn assign_materials(
     path: &Path,
     mesh: &mut Mesh,
@@ -31,7 +31,7 @@ pub(super) fn assign_materials(
     for run in runs.iter().filter(|run| run.triangles > 0) {
         let name = run.material.as_deref();
         let material = name.and_then(|name| find(library, name)).unwrap_or(neutral);
-        // Without the texture, and with it: looked up once a run.
+        // Slots without and with the texture, looked up once per run.
         let mut found = [None; 2];
         for _ in 0..run.triangles {
             let has_uvs = uvs.is_some_and(|uvs| uvs.get(triangle).is_some_and(Option::is_some));
@@ -48,7 +48,7 @@ pub(super) fn assign_materials(
     Ok(())
 }
 
-/// Slots by the name of their material, `None` before the first `usemtl`, and whether they keep its texture.
+/// Slots by the name of their material (`None` before the first `usemtl`) and whether they have its textures.
 struct Slots<'r> {
     path: &'r Path,
     known: BTreeMap<(Option<&'r str>, bool), u16>,

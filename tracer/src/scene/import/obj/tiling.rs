@@ -1,4 +1,4 @@
-//! The options of a texture statement: those that say where the picture lies, and a word about the others.
+//! Options of texture statements: tiling, and warnings about the others.
 
 use glam::Vec2;
 
@@ -6,10 +6,10 @@ use super::super::warnings::Warnings;
 use super::lines::Line;
 use crate::texture::{MAX_TILING, Tiling, Wrap};
 
-/// An option and the words that belong to it.
+/// An option and its words.
 pub(super) type TextureOption<'t> = (&'static str, Vec<&'t str>);
 
-/// Options that are not drawn, with words that change nothing.
+/// Unsupported options, with the words that change nothing.
 const NOT_DRAWN: &[(&str, &[&str])] = &[
     ("-blendu", &["on"]),
     ("-blendv", &["on"]),
@@ -24,7 +24,7 @@ const NOT_DRAWN: &[(&str, &[&str])] = &[
     ("-type", &[]),
 ];
 
-/// Where the options lay the picture. The last of each kind counts; what is no number is the default.
+/// The tiling of the options. The last one of each kind counts; invalid numbers are defaults.
 pub(super) fn tiling(options: &[TextureOption<'_>]) -> Tiling {
     let mut tiling = Tiling::default();
     for (option, words) in options {
@@ -38,7 +38,7 @@ pub(super) fn tiling(options: &[TextureOption<'_>]) -> Tiling {
     tiling
 }
 
-/// Warns of options that would change the picture and are not drawn, once for each of them.
+/// Warns about unsupported options that would change the picture, once for each.
 pub(super) fn warn_of_others(options: &[TextureOption<'_>], line: &Line<'_>, warnings: &mut Warnings) {
     for (option, words) in options {
         let usual = NOT_DRAWN.iter().find(|(known, _)| known == option);
@@ -49,7 +49,7 @@ pub(super) fn warn_of_others(options: &[TextureOption<'_>], line: &Line<'_>, war
     }
 }
 
-/// The first two numbers; others keep their default.
+/// The first two numbers; missing ones are defaults.
 fn pair(words: &[&str], default: Vec2) -> Vec2 {
     let number = |index: usize, default: f32| {
         let number = words.get(index).and_then(|word| word.parse::<f32>().ok());
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_picture_lies_where_its_options_say() {
+    fn options_set_the_tiling() {
         let laid = |options: &[TextureOption<'_>]| tiling(options);
         assert_eq!(laid(&[]), Tiling::default());
         let moved = laid(&[("-s", vec!["3", "2", "1"]), ("-o", vec!["0.5"]), ("-mm", vec!["0", "1"])]);
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_change_nothing_are_known() {
+    fn words_without_effect_are_recognised() {
         assert!(says_the_same(&["0", "1.0"], &["0", "1"]) && says_the_same(&["ON"], &["on"]));
         assert!(says_the_same(&[], &["1"]) && says_the_same(&["0"], &["0", "0", "0"]));
         assert!(!says_the_same(&["0.5"], &["1"]) && !says_the_same(&["m"], &[]));

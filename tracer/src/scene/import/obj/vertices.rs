@@ -1,4 +1,4 @@
-//! Vertices of the mesh: what differs in position or normal is two of them.
+//! Vertices of the mesh: one for each pair of position and normal.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -9,8 +9,8 @@ use super::corner::NONE;
 use super::geometry::Geometry;
 use crate::mesh::Mesh;
 
-/// The mesh without its materials. Vertices are in the order of their first use; a normal is zero where the mesh is to
-/// average it.
+/// The mesh without its materials. Vertices are in the order of their first use; a normal is zero where it is to be
+/// averaged.
 pub(super) fn mesh(geometry: &Geometry) -> Mesh {
     let mut vertices =
         Vertices { with_normals: geometry.corners.iter().any(|c| c.normal != NONE), ..Vertices::default() };
@@ -33,7 +33,7 @@ struct Vertices {
     normals: Vec<Vec3>,
     /// Without normals: the vertex of each position of the file, or [`NONE`].
     numbers: Vec<u32>,
-    /// With normals: the vertex of each pair that was met.
+    /// With normals: the vertex of each pair of position and normal.
     pairs: HashMap<(u32, u32), u32>,
 }
 

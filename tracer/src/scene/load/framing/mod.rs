@@ -1,5 +1,5 @@
-//! The look of a scene whose file does not say: a camera that shows all of it, a light above the camera's shoulder, a
-//! neutral background.
+//! Default camera, light and background of a scene whose file has none: the camera shows the whole scene, and the
+//! light is above the camera's shoulder.
 
 use std::sync::Arc;
 
@@ -15,23 +15,23 @@ use crate::scene::data::{
 };
 use crate::scene::import::Up;
 
-/// Lower and upper corner of a box along the axes.
+/// Lower and upper corner of an axis-aligned box.
 pub(super) type Bounds = (DVec3, DVec3);
 
-/// Vertical field of view of a camera that the file does not have.
+/// Vertical field of view of the default camera in degrees.
 const FOV: f64 = 45.0;
-/// From the middle of what is shown towards the camera: from the front, from the right and from above.
+/// Direction from the centre of the scene towards the camera: from the front, the right and above.
 const TOWARDS_CAMERA: DVec3 = DVec3::new(0.6, 0.35, 1.0);
-/// The share of the picture's width or height, whichever is reached first, that is filled.
+/// Share of the picture's width or height that is filled, whichever is reached first.
 const FILLED: f64 = 0.9;
-/// Least distance of the camera from what it shows, as a share of that one's size.
+/// Least distance of the camera from the geometry, as a share of the geometry's radius.
 const NEAREST: f64 = 0.05;
-/// The light's place, in distances from the camera to what it looks at: to the left of the camera and above it.
+/// Offset of the light to the left of the camera and above it, in distances from the camera to its look-at point.
 const SHOULDER: (f64, f64) = (0.35, 0.5);
 const AMBIENT: Vec3 = Vec3::splat(0.1);
 const BACKGROUND: Background = Background::Color(Vec3::splat(0.2));
 
-/// A model by itself, as it fills a picture of `size`; without one, the picture that a scene has.
+/// A model as a scene of its own, framed for a picture of `size`, or of the default size.
 pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) -> Scene {
     let materials: Vec<Material> = mesh.materials().into_iter().map(|slot| slot.material).collect();
     let normals = if mesh.has_normals() { NormalMode::Smooth } else { NormalMode::Flat };
@@ -60,7 +60,7 @@ pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) 
     }
 }
 
-/// A camera whose picture the box fills as far as it can. Without bounds it sees a cube of two units around the origin.
+/// A camera whose picture the box fills. Without bounds it shows a cube of two units around the origin.
 pub(super) fn camera_showing(bounds: Option<Bounds>, size: (u32, u32)) -> Camera {
     let bounds = bounds.unwrap_or((-DVec3::ONE, DVec3::ONE));
     let frame = Frame::of(bounds, size);
@@ -68,7 +68,7 @@ pub(super) fn camera_showing(bounds: Option<Bounds>, size: (u32, u32)) -> Camera
     frame.camera(reach.unwrap_or(Reach::NOTHING))
 }
 
-/// A camera whose picture the mesh fills as far as it can.
+/// A camera whose picture the mesh fills.
 fn camera_showing_mesh(mesh: &CompiledMesh, rotate: DVec3, size: (u32, u32)) -> Camera {
     let turn = rotation::of_model(rotate);
     let frame = Frame::of(around(corners_of(mesh.bounds()).map(|corner| turn * corner)), size);
@@ -76,22 +76,22 @@ fn camera_showing_mesh(mesh: &CompiledMesh, rotate: DVec3, size: (u32, u32)) -> 
     let reach_of = |block: &TriangleBlock| {
         let lanes = (0..WIDTH).flat_map(|lane| block.corners(lane));
         let corners = lanes.map(|corner| frame.reach(turn * (center + corner.as_dvec3() * scale)));
-        // Lanes without a triangle are no numbers, and reach nowhere.
+        // Lanes without a triangle are NaN, which `max` ignores.
         corners.fold(Reach::NOTHING, Reach::max)
     };
     let reach = mesh.blocks().par_iter().map(reach_of).reduce(|| Reach::NOTHING, Reach::max);
     frame.camera(reach)
 }
 
-/// The directions of a picture around the middle of what it shows.
+/// Axes and slopes of a picture around the centre of the geometry.
 struct Frame {
     center: DVec3,
-    /// Half of the diagonal of what is shown.
+    /// Half of the diagonal of the geometry's bounds.
     radius: f64,
     right: DVec3,
     up: DVec3,
     forward: DVec3,
-    /// How far to the side things may be, a unit ahead of the camera.
+    /// Half width of the filled part of the picture, at unit distance.
     slope_x: f64,
     slope_y: f64,
 }
@@ -113,8 +113,8 @@ impl Frame {
         }
     }
 
-    /// How far a point reaches beyond the planes through the middle that are parallel to the picture's sides, which are
-    /// apart from the picture's edges by what is not to be filled.
+    /// Extent of a point beyond the planes through the centre that are parallel to the sides of the filled part of
+    /// the view frustum.
     fn reach(&self, point: DVec3) -> Reach {
         let to = point - self.center;
         let (x, y, ahead) = (to.dot(self.right), to.dot(self.up), to.dot(self.forward));
@@ -122,7 +122,7 @@ impl Frame {
         Reach { right: x - side_x, left: -x - side_x, top: y - side_y, bottom: -y - side_y, nearest: -ahead }
     }
 
-    /// The nearest camera that has all within these planes: two of them, left and right or top and bottom, touch it.
+    /// The nearest camera whose filled part contains everything within these planes. Two opposite planes touch it.
     fn camera(&self, reach: Reach) -> Camera {
         let from_x = (reach.left + reach.right) / (2.0 * self.slope_x);
         let from_y = (reach.top + reach.bottom) / (2.0 * self.slope_y);
@@ -133,14 +133,14 @@ impl Frame {
     }
 }
 
-/// See [`Frame::reach`].
+/// Extents of geometry: see [`Frame::reach`].
 #[derive(Clone, Copy)]
 struct Reach {
     right: f64,
     left: f64,
     top: f64,
     bottom: f64,
-    /// Towards the camera.
+    /// Extent towards the camera.
     nearest: f64,
 }
 
@@ -164,7 +164,7 @@ impl Reach {
     }
 }
 
-/// A white point light above the camera's shoulder, as far as what the camera looks at asks for.
+/// A white point light above the camera's shoulder, at a distance in proportion to that of the look-at point.
 pub(super) fn default_light(camera: &Camera) -> Light {
     let forward = camera.look_at - camera.position;
     let distance = forward.length();
@@ -181,19 +181,19 @@ pub(super) fn default_light(camera: &Camera) -> Light {
     }
 }
 
-/// The point on a camera's axis that is nearest to the middle of the scene, so that orbits go round the scene. One
-/// unit ahead where nothing finite is there, and as far as the scene's middle where that lies behind the camera.
+/// The point on a camera's axis nearest to the centre of the scene, so that orbits are around the scene. Without
+/// bounds it is one unit ahead; for a centre behind the camera it is at the centre's distance.
 pub(super) fn point_on_axis(position: DVec3, direction: DVec3, bounds: Option<Bounds>) -> DVec3 {
     let Some((lower, upper)) = bounds else { return position + direction };
     let to_center = lower * 0.5 + upper * 0.5 - position;
     let ahead = to_center.dot(direction);
     let fallback = if to_center == DVec3::ZERO { 1.0 } else { to_center.length() };
-    // Nearly sideways is no better than behind: the point would fall onto the camera.
+    // Nearly sideways is treated like behind: the point would nearly coincide with the camera.
     let usable = ahead > fallback / 1024.0;
     position + direction * if usable { ahead } else { fallback }
 }
 
-/// World bounds of everything finite; `None` when there is nothing.
+/// World bounds of all finite geometry; `None` if there is none.
 pub(super) fn bounds(scene: &Scene, meshes: &[Arc<CompiledMesh>]) -> Option<Bounds> {
     let of_mesh = |id: MeshId| meshes.iter().find(|mesh| mesh.id() == id).map(|mesh| mesh.bounds());
     let models = scene.models.iter().filter_map(|model| Some(of_model(model, of_mesh(model.mesh)?)));

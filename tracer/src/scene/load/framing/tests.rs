@@ -14,7 +14,7 @@ fn box_mesh(lower: DVec3, upper: DVec3) -> CompiledMesh {
     CompiledMesh::compile(&mesh).unwrap().0
 }
 
-/// Where a point lies in the picture: inside when both are within [-1, 1] and it is in front.
+/// Position of a point in the picture: inside if both are within [-1, 1] and it is in front.
 fn projected(camera: &Camera, aspect: f64, point: DVec3) -> Option<(f64, f64)> {
     let forward = (camera.look_at - camera.position).normalize();
     let right = forward.cross(camera.up).normalize();
@@ -24,7 +24,7 @@ fn projected(camera: &Camera, aspect: f64, point: DVec3) -> Option<(f64, f64)> {
     (half > 0.0).then(|| (to.dot(right) / (half * aspect), to.dot(up) / half))
 }
 
-/// The share of width and height between the outermost of some points, and the middle between them.
+/// Shares of width and height that some points span, and the middle of the span.
 fn filled(camera: &Camera, (width, height): (u32, u32), points: &[DVec3]) -> [(f64, f64); 2] {
     let aspect = f64::from(width) / f64::from(height);
     let places: Vec<_> = points.iter().map(|point| projected(camera, aspect, *point).unwrap()).collect();
@@ -36,7 +36,7 @@ fn filled(camera: &Camera, (width, height): (u32, u32), points: &[DVec3]) -> [(f
     [span(|place| place.0), span(|place| place.1)]
 }
 
-/// How far ahead of the camera the nearest of some points is.
+/// Distance of the nearest of some points along the view direction.
 fn nearest(camera: &Camera, points: &[DVec3]) -> f64 {
     let forward = (camera.look_at - camera.position).normalize();
     points.iter().map(|point| (*point - camera.position).dot(forward)).fold(f64::INFINITY, f64::min)
@@ -74,7 +74,7 @@ fn a_bare_model_fills_nine_tenths_of_every_picture() {
             let [(width, x), (height, y)] = filled(&scene.camera, size, &upright);
             // Far from the origin the camera has as many digits as the model.
             let fill = width.max(height);
-            // Seen from its end, or in a strip of a picture, a long model has the camera as near as it may be before that.
+            // Seen from its end, or in a narrow picture, a long model limits the camera by its nearest point.
             let is_at_least_distance =
                 nearest(&scene.camera, &upright) < 1.001 * NEAREST * half_diagonal(lower, upper);
             let is_filled = (fill - 0.9).abs() < 1e-6 || is_at_least_distance && fill < 0.9;
@@ -127,7 +127,7 @@ fn the_point_on_the_axis_is_the_one_nearest_to_the_middle() {
     let at = |bounds| point_on_axis(DVec3::ZERO, DVec3::NEG_Z, bounds);
     assert_eq!(at(None), DVec3::NEG_Z);
     assert_eq!(at(middle_at(DVec3::new(3.0, 4.0, -7.0))), DVec3::new(0.0, 0.0, -7.0));
-    // Behind, sideways, and here.
+    // Behind, sideways, and at the camera.
     assert_eq!(at(middle_at(DVec3::new(0.0, 0.0, 5.0))), DVec3::NEG_Z * 5.0);
     assert_eq!(at(middle_at(DVec3::new(3.0, 4.0, 0.0))), DVec3::NEG_Z * 5.0);
     assert_eq!(at(middle_at(DVec3::new(3.0, 4.0, -1e-9))), DVec3::NEG_Z * 5.0);

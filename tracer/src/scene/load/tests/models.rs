@@ -66,7 +66,7 @@ fn models_that_name_one_file_share_it() {
     assert_eq!(diffuse(copy), Material::NEUTRAL.diffuse);
     assert_eq!(own.materials, again.materials);
     assert_eq!(scene.mesh_ids(), meshes.iter().map(|mesh| mesh.id()).collect());
-    // A mesh that is only drawn flat carries no normals.
+    // A mesh with flat instances only has no normals.
     let with_normals = |model: &Model| meshes.iter().find(|m| m.id() == model.mesh).unwrap().has_normals();
     assert!(with_normals(own) && !with_normals(copy));
 }
@@ -144,12 +144,12 @@ fn a_z_up_model_is_upright_from_its_file_and_compiled() {
         let (from, to) = (folder.path("a.obj"), folder.path(""));
         compile_model_with(&from, &to, CompileOptions::default(), options).unwrap().0
     };
-    let standing = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 6.0, 1.0));
-    assert_eq!(bounds("a.obj", up), standing);
-    std::fs::write(folder.path("lying.rfm"), compile(LoadOptions::default()).bytes()).unwrap();
-    assert_eq!(bounds("lying.rfm", up), standing);
-    std::fs::write(folder.path("standing.rfm"), compile(up).bytes()).unwrap();
-    assert_eq!(bounds("standing.rfm", LoadOptions::default()), standing);
+    let upright = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 6.0, 1.0));
+    assert_eq!(bounds("a.obj", up), upright);
+    std::fs::write(folder.path("z_up.rfm"), compile(LoadOptions::default()).bytes()).unwrap();
+    assert_eq!(bounds("z_up.rfm", up), upright);
+    std::fs::write(folder.path("y_up.rfm"), compile(up).bytes()).unwrap();
+    assert_eq!(bounds("y_up.rfm", LoadOptions::default()), upright);
 }
 
 #[test]
@@ -199,12 +199,12 @@ fn compiled_models_find_their_textures_from_other_folders() {
     assert_eq!(mesh.materials()[0].texture, Some(TextureFile::new("../../m/maps/wood.png")));
     std::fs::write(folder.path("out/deep/b.rfm"), mesh.bytes()).unwrap();
     assert_eq!(own("s.toml"), own("m/a.obj"));
-    // A compiled one can be moved by compiling it again.
+    // A compiled model can be moved by compiling it again.
     let (again, _) =
         compile_model(&folder.path("out/deep/b.rfm"), &folder.path("m"), CompileOptions::default()).unwrap();
     std::fs::write(folder.path("m/c.rfm"), again.bytes()).unwrap();
     assert_eq!(own("m/c.rfm"), own("m/a.obj"));
-    // Texture coordinates are kept for a texture that only the scene will give.
+    // Texture coordinates are kept for textures that only a scene assigns.
     let (bare, _) =
         compile_model(&folder.path("m/bare.obj"), &folder.path("m"), CompileOptions::default()).unwrap();
     assert!(mesh.has_uvs() && !bare.has_uvs());

@@ -63,7 +63,7 @@ fn pictures_outside_the_models_folder_need_an_option() {
     let compiled =
         compile_model_with(&folder.path("m/a.obj"), &folder.path("m"), CompileOptions::default(), allowed);
     assert_eq!(compiled.unwrap().0.materials()[0].texture.as_ref().unwrap().file, "../tile.png");
-    // What is not there is reported as such.
+    // A missing picture is reported as such.
     let folder = naming("../none.png");
     let LoadedScene { warnings, .. } = load_with(&folder.path("m/a.obj"), allowed).unwrap();
     assert!(warnings.len() == 1 && warnings[0].contains("cannot read"), "{warnings:?}");

@@ -1,4 +1,4 @@
-//! Every class of fault, with its place and the words that help.
+//! Complete scenes, defaults, warnings, and arbitrary texts.
 
 mod faults;
 mod textures;
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::scene::{Attenuation, Filter, LightKind, NormalMode, Tiling, Wrap};
 
-/// A scene with one of everything, as the format's page shows it.
+/// A scene with one object of every kind, as on the format's page.
 const WHOLE: &str = r#"
 ambient = [0.05, 0.05, 0.05]
 [render]
@@ -77,7 +77,7 @@ fn models_have_an_up_axis_and_a_crease_angle() {
                 [[model]]\nfile = \"a.obj\"\nnormals = \"flat\"\ncrease_angle = 25\n";
     let scene = read(text).unwrap();
     let [z, y, flat] = &scene.models[..] else { panic!("three models") };
-    // The file is turned before all else: about x, so that its z is what the scene calls y.
+    // The file is rotated first, about x, so that its z axis becomes the scene's y axis.
     assert_eq!((z.rotate, z.scale), (DVec3::new(-80.0, 20.0, 30.0), DVec3::new(1.0, 3.0, 2.0)));
     assert_eq!((z.crease_angle, y.crease_angle), (None, Some((25.0, text.find("25").unwrap()))));
     assert_eq!((y.rotate, y.scale), (DVec3::ZERO, DVec3::ONE));
@@ -113,7 +113,7 @@ fn a_whole_scene_is_read() {
     assert_eq!(scene.models[1].material, None);
     assert_eq!(scene.models[1].scale, DVec3::splat(0.5));
     assert_eq!(scene.planes[0].normal, DVec3::new(0.0, 0.6, 0.8));
-    // The plane names no material: the neutral one follows those of the file.
+    // The plane has no material: the neutral one follows those of the file.
     assert_eq!(scene.planes[0].material, 1);
     assert_eq!(scene.materials[1], Material::NEUTRAL);
     assert_eq!(scene.triangles[0].vertices[1], DVec3::X);
@@ -135,14 +135,14 @@ fn absent_keys_have_defaults() {
     assert!(read("").unwrap().camera.is_none());
 }
 
-/// Reads a faulty text: "line:column: message".
+/// The message for a faulty text: "line:column: message".
 fn fault(text: &str) -> String {
     let fault = read(text).expect_err(text);
     let (line, column) = place(text, fault.at);
     format!("{line}:{column}: {}", fault.message)
 }
 
-/// Asserts the place of the fault and that its message has all the words.
+/// Asserts the position of the fault and that its message contains all words.
 fn assert_faults(cases: &[(&str, &str, &[&str])]) {
     for (text, place, words) in cases {
         let message = fault(text);
@@ -193,11 +193,11 @@ fn rotations_turn_the_camera_and_its_up() {
     assert_eq!(camera("[90, 0, 0]"), (DVec3::Y, DVec3::Z));
     assert_eq!(camera("[0, 90, 0]"), (DVec3::NEG_X, DVec3::Y));
     assert_eq!(camera("[0, 0, 90]"), (DVec3::NEG_Z, DVec3::NEG_X));
-    // Rolled and pitched first, then yawed: down to the left of the start, the head lies towards +Z.
+    // Rolled and pitched first, then yawed: down to the left of the start, with the up direction towards +Z.
     assert_eq!(camera("[-90, 90, 90]"), (DVec3::NEG_Y, DVec3::Z));
 }
 
-/// Pieces that reach deep into the reader when they meet by chance.
+/// Pieces of scene files that reach deep into the parser in some combinations.
 fn piece() -> impl Strategy<Value = String> {
     prop_oneof![
         prop::sample::select(KEYS).prop_map(|key| format!("[{key}]\n")),

@@ -32,7 +32,7 @@ fn textures_and_texture_coordinates_are_read() {
     assert_eq!(scene.materials[wood as usize].diffuse, Vec3::ONE);
     let uvs = [Vec2::new(0.75, 0.0), Vec2::new(9.0, 1.5), Vec2::new(1.0, 2.0)];
     assert_eq!(scene.triangles[0].uvs, Some(uvs));
-    // Nothing asks for them there.
+    // Texture coordinates without a texture are dropped.
     assert_eq!(scene.triangles[1].uvs, None);
     assert_eq!(place(&text, scene.models[0].material_at), (17, 12));
 }
@@ -56,7 +56,7 @@ fn emission_and_tiling_are_read() {
     let tiling = scene.textures[&tiles].diffuse.as_ref().unwrap().tiling;
     let expected = Tiling { wrap: Wrap::Mirror, scale: Vec2::new(3.0, -0.5), offset: Vec2::new(0.5, 1.0) };
     assert_eq!(tiling, expected);
-    // A picture that is mirrored tells whole repeats apart.
+    // A mirrored picture distinguishes whole repeats.
     assert_eq!(scene.triangles[0].uvs.unwrap()[0], Vec2::new(-7.25, 3.0));
     assert_eq!(scene.triangles[1].uvs.unwrap()[0], Vec2::new(0.75, 0.0));
 }

@@ -127,7 +127,7 @@ fn define(library: &mut Library, head: &Head, material: tobj::Material, warnings
     }
 }
 
-/// Whether `Ka` asks for another colour in ambient light than in other light. A grey `Ka` is a default of many programs.
+/// Whether `Ka` means another colour in ambient light than in other light. A grey `Ka` is a default of many programs.
 fn has_ambient_color(material: &tobj::Material) -> bool {
     let Some(ambient) = material.ambient else { return false };
     ambient.iter().any(|channel| *channel != ambient[0]) && material.diffuse != Some(ambient)

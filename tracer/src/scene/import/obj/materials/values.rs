@@ -23,7 +23,7 @@ pub(super) fn color(line: &Line<'_>) -> Result<[f64; 3], String> {
     }
 }
 
-/// The last word of a line as a number.
+/// The final word of a line as a number.
 pub(super) fn number(line: &Line<'_>) -> Result<f64, String> {
     // `d -halo 0.5` has a word in between.
     let word = line.rest().split_ascii_whitespace().last().unwrap_or_default();

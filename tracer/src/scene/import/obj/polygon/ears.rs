@@ -1,15 +1,15 @@
-//! Ear clipping: three neighbours of the outline whose triangle is inside are cut off, round after round. A round cuts off
-//! every second corner at most, so that no corner gets more than its share of slivers.
+//! Ear clipping: in each round, triangles of three adjacent corners that are inside of the outline are cut off. A
+//! round cuts off every second corner at most, which distributes slivers over the corners.
 
 use glam::DVec2;
 
 use super::grid::Grid;
 use super::{halve, turn};
 
-/// Looks at corners and cells a corner of the polygon, before what is left is cut without looking.
+/// Corners and cells that may be examined per corner of the polygon, before the rest is cut without tests.
 const WORK_PER_CORNER: u64 = 2000;
 
-/// What a triangle must be like to be cut off. Where none is left, the next will do.
+/// Conditions for cutting off a triangle, from strict to none; the next one applies when no ear is left.
 #[derive(Clone, Copy, PartialEq)]
 enum Demand {
     /// It has an area, the outline does not touch it from inside, and its neighbours are outside.
@@ -18,7 +18,7 @@ enum Demand {
     Touching,
     /// The outline may cross it.
     Crossed,
-    /// Any: its orientation is the wrong one.
+    /// None: the orientation of the polygon is wrong.
     Any,
 }
 
@@ -32,16 +32,16 @@ impl Demand {
     }
 }
 
-/// A polygon that loses its ears.
+/// A polygon whose ears are clipped.
 pub(super) struct Ears<'p> {
     points: &'p [DVec2],
     next: Vec<u32>,
     previous: Vec<u32>,
-    /// Corners that do not turn to the left: only they can be inside of an ear.
+    /// Whether each corner is reflex: only reflex corners can be inside of an ear.
     reflex: Vec<bool>,
-    /// The reflex ones by place.
+    /// Reflex corners in a grid.
     grid: Grid,
-    /// Corners whose neighbour was cut off in this round.
+    /// Whether a neighbour of each corner was cut off in this round.
     is_touched: Vec<bool>,
     remaining: usize,
     /// A corner that is not cut off.
@@ -51,7 +51,7 @@ pub(super) struct Ears<'p> {
 }
 
 impl<'p> Ears<'p> {
-    /// Of the polygon whose corners `ring` lists, counterclockwise.
+    /// The polygon with the corners of `ring`, counterclockwise.
     pub(super) fn new(points: &'p [DVec2], ring: &[u32]) -> Self {
         let mut next: Vec<u32> = (0..points.len() as u32).collect();
         let mut previous = next.clone();
@@ -79,7 +79,7 @@ impl<'p> Ears<'p> {
         ears
     }
 
-    /// Cuts it into triangles.
+    /// Triangulates the polygon.
     pub(super) fn cut(mut self, triangles: &mut Vec<[u32; 3]>) {
         let mut demand = Demand::Clean;
         let mut candidates = self.ring();
@@ -97,8 +97,8 @@ impl<'p> Ears<'p> {
         halve(self.ring(), triangles);
     }
 
-    /// Cuts off those of the candidates that are ears. Returns the neighbours of what was cut off, which may be ears now:
-    /// their turn is the next round, and all other corners are what they were.
+    /// Cuts off the ears among the candidates. Returns the neighbours of cut corners, which may be ears in the next
+    /// round; all other corners are unchanged.
     fn cut_round(&mut self, candidates: &[u32], demand: Demand, triangles: &mut Vec<[u32; 3]>) -> Vec<u32> {
         let mut touched = Vec::new();
         for &corner in candidates {
@@ -156,8 +156,8 @@ impl<'p> Ears<'p> {
         }
     }
 
-    /// Whether the new edge leaves both its ends to the inside. Corners in the same place, as bridges to holes make them,
-    /// share the directions around it, so that nothing else need be asked about them.
+    /// Whether the new edge leaves both its ends towards the inside. Corners at one position, as at bridges to holes,
+    /// share the directions around it, so that no further test is needed for them.
     fn is_inside_at_its_ends(&self, before: u32, corner: u32, after: u32) -> bool {
         let [a, b, c] = [before, corner, after].map(|corner| self.at(corner));
         let (ahead, behind) = (self.at(self.before(before)), self.at(self.after(after)));

@@ -1,14 +1,14 @@
-//! Points by place: those in and around a triangle are found without looking at all of them.
+//! A grid over points: finds those in and near a triangle without testing all of them.
 
 use glam::{DVec2, UVec2};
 
-/// Points a cell, on average.
+/// Points per cell on average.
 const POINTS_PER_CELL: usize = 2;
 
-/// Share of a cell by which rounding may move a point to the next one.
+/// Share of a cell by which rounding may move a point into a neighbouring cell.
 const MARGIN: f64 = 1e-6;
 
-/// Least width and height of a grid, as a share of the larger one: points may be in one line.
+/// Least width and height of a grid, as a share of the larger one: points may be collinear.
 const LEAST_EXTENT: f64 = 1e-9;
 
 /// Points in rows of cells.
@@ -17,13 +17,13 @@ pub(super) struct Grid {
     lowest: DVec2,
     cells_per_unit: DVec2,
     size: UVec2,
-    /// Where the points of each cell begin, and how many are left of them.
+    /// Offset of each cell's points, and their remaining number.
     cells: Vec<(u32, u32)>,
     points: Vec<u32>,
 }
 
 impl Grid {
-    /// Of some of the points, which `chosen` lists.
+    /// A grid over the points that `chosen` lists.
     pub(super) fn of(points: &[DVec2], chosen: &[u32]) -> Self {
         if chosen.is_empty() {
             return Self::default();
@@ -36,7 +36,7 @@ impl Grid {
         let extent = highest - lowest;
         let extent = extent.max(DVec2::splat(LEAST_EXTENT * extent.max_element().max(f64::MIN_POSITIVE)));
         let wanted = (chosen.len() / POINTS_PER_CELL).max(1) as f64;
-        // As square as they can be, and not more in a row than points.
+        // Cells as square as possible, and at most as many per row as points.
         let columns = (wanted * extent.x / extent.y).sqrt().clamp(1.0, wanted).floor();
         let rows = (wanted / columns).clamp(1.0, wanted).floor();
         let size = UVec2::new(columns as u32, rows as u32);
@@ -51,7 +51,7 @@ impl Grid {
         grid
     }
 
-    /// Counts the points of each cell, then puts them into place.
+    /// Counting sort of the points by cell.
     fn fill(&mut self, points: &[DVec2], chosen: &[u32]) {
         let cell_of: Vec<usize> = chosen
             .iter()
@@ -74,8 +74,8 @@ impl Grid {
         }
     }
 
-    /// Whether one of the points in the cells that a triangle covers is found. Those that are no longer wanted leave
-    /// the grid. Cells and points that were looked at are added to `work`.
+    /// Whether a point in the cells of a triangle matches. Obsolete points are removed from the grid. Examined cells
+    /// and points are added to `work`.
     pub(super) fn any(
         &mut self,
         triangle: [DVec2; 3],
@@ -114,12 +114,12 @@ impl Grid {
         false
     }
 
-    /// In cells from the grid's lowest corner.
+    /// Coordinates in cells from the grid's lower corner.
     fn place(&self, point: DVec2) -> DVec2 {
         (point - self.lowest) * self.cells_per_unit
     }
 
-    // Conversions saturate, so that what is outside counts to the outermost cells.
+    // Conversions saturate, so that points outside are in the outermost cells.
     fn column(&self, x: f64) -> u32 {
         (x as u32).min(self.size.x - 1)
     }
@@ -133,7 +133,7 @@ impl Grid {
     }
 }
 
-/// The part of a row that a triangle covers.
+/// The part of a row that a triangle overlaps.
 fn span(triangle: [DVec2; 3], row: f64) -> Option<(f64, f64)> {
     let (low, high) = (row - MARGIN, row + 1.0 + MARGIN);
     let mut span: Option<(f64, f64)> = None;

@@ -1,8 +1,9 @@
-//! Polygons as triangles inside of them, whatever their shape: concave ones, holes that a bridge of two equal edges joins
-//! to the outline, corners in one line or in one place, polygons that are not flat, outlines that cross themselves.
+//! Triangulation of polygons of any shape: concave ones, holes connected to the outline by a bridge of two equal
+//! edges, collinear and coincident corners, non-planar polygons, self-intersecting outlines.
 //!
-//! The polygon is seen along its Newell normal, where its area is largest. A triangle of three neighbours is cut off where
-//! it is inside ([`ears`]), so that the signed area of all triangles is that of the polygon in every case.
+//! The polygon is projected along its Newell normal, where its area is largest. Triangles of three adjacent corners
+//! are cut off where they are inside ([`ears`]), so that the signed area of all triangles is always that of the
+//! polygon.
 
 mod ears;
 mod grid;
@@ -13,17 +14,17 @@ use glam::{DVec2, DVec3};
 
 use ears::Ears;
 
-/// Convex polygons of up to this number of corners are fans around their first corner. Fans of more make slivers that
-/// share a corner, which no tree can tell apart: larger ones are halved again and again.
+/// Convex polygons of up to this number of corners are fans around their first corner. Larger fans have slivers with
+/// a common corner, which no tree can separate: larger polygons are halved recursively.
 const MOST_FANNED: usize = 8;
 
 /// Error of a projected coordinate, as a share of the polygon's size.
 const ROUNDING: f64 = 1e-15;
 
-/// Share of the sum of areas that the Newell normal has at least, where the polygon has a side that can be looked at.
+/// Least Newell normal, as a share of the sum of areas, of a polygon with a visible side.
 const LEAST_AREA: f64 = 1e-12;
 
-/// Cuts a polygon of three corners or more into triangles, which name its corners. There is at least one.
+/// Triangulates a polygon of three corners or more. Triangles are indices of its corners; there is at least one.
 pub(super) fn cut(points: &[DVec3], triangles: &mut Vec<[u32; 3]>) {
     let first = triangles.len();
     let ring = distinct(points);
@@ -35,14 +36,14 @@ pub(super) fn cut(points: &[DVec3], triangles: &mut Vec<[u32; 3]>) {
             }
             Ears::new(&flat, &ring).cut(triangles);
         }
-        // All in one line, or two halves that cancel out.
+        // Collinear, or two halves that cancel out.
         _ if points.len() <= MOST_FANNED => fan(points.len(), triangles),
         _ => halve(ring, triangles),
     }
     drop_without_area(points, first, triangles);
 }
 
-/// Corners that are not in the place of the corner before.
+/// Corners that do not coincide with the previous corner.
 fn distinct(points: &[DVec3]) -> Vec<u32> {
     let Some(mut last) = points.last() else { return Vec::new() };
     let mut ring = Vec::with_capacity(points.len());
@@ -55,7 +56,8 @@ fn distinct(points: &[DVec3]) -> Vec<u32> {
     ring
 }
 
-/// The polygon seen along its Newell normal, counterclockwise, scaled to about one. `None` where it has no area to be seen.
+/// The polygon projected along its Newell normal, counterclockwise, scaled to about one. `None` without a visible
+/// area.
 fn projected(points: &[DVec3]) -> Option<Vec<DVec2>> {
     let origin = *points.first()?;
     let size = points.iter().fold(DVec3::ZERO, |size, point| size.max((point - origin).abs())).max_element();
@@ -74,7 +76,7 @@ fn projected(points: &[DVec3]) -> Option<Vec<DVec2>> {
     if !(normal.length() > LEAST_AREA * areas) {
         return None;
     }
-    // Along the normal onto the plane of the two other axes: what lies in such a plane stays as it is.
+    // Along the normal onto the plane of the two other axes, which leaves coordinates in such a plane unchanged.
     let axis = normal.abs().max_position();
     let (mut x, mut y) = ((axis + 1) % 3, (axis + 2) % 3);
     if normal[axis] < 0.0 {
@@ -85,7 +87,7 @@ fn projected(points: &[DVec3]) -> Option<Vec<DVec2>> {
     Some(near.iter().map(seen).collect())
 }
 
-/// Twice the area of a triangle, positive where it turns to the left, and zero where rounding might decide.
+/// Twice the area of a triangle, positive for a left turn, and zero where rounding might decide.
 fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     let (to_b, to_c) = (b - a, c - a);
     let turn = to_b.perp_dot(to_c);
@@ -93,7 +95,7 @@ fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     if turn.abs() <= error { 0.0 } else { turn }
 }
 
-/// Whether all corners turn to the left.
+/// Whether all corners are left turns.
 fn is_convex(flat: &[DVec2]) -> bool {
     let n = flat.len();
     (0..n).all(|i| turn(flat[i], flat[(i + 1) % n], flat[(i + 2) % n]) > 0.0)
@@ -103,7 +105,7 @@ fn fan(corners: usize, triangles: &mut Vec<[u32; 3]>) {
     triangles.extend((2..corners as u32).map(|corner| [0, corner - 1, corner]));
 }
 
-/// Cuts off every second corner, until nothing is left.
+/// Cuts off every second corner, repeatedly, until nothing is left.
 fn halve(mut ring: Vec<u32>, triangles: &mut Vec<[u32; 3]>) {
     while ring.len() > 3 {
         let mut kept = Vec::with_capacity(ring.len() / 2 + 1);
@@ -122,7 +124,7 @@ fn halve(mut ring: Vec<u32>, triangles: &mut Vec<[u32; 3]>) {
     }
 }
 
-/// Leaves out triangles without an area, which come of corners in one line; one of them stays where there is nothing else.
+/// Drops triangles without an area, which collinear corners cause; keeps one if there is no other.
 fn drop_without_area(points: &[DVec3], first: usize, triangles: &mut Vec<[u32; 3]>) {
     let has_area = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|corner| points[corner as usize]);

@@ -24,7 +24,8 @@ fn areas(points: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
     triangles.iter().map(|triangle| area_of(&triangle.map(|corner| points[corner as usize]))).collect()
 }
 
-/// Triangles of the polygon's own orientation whose areas are together its area: so none is outside, and no two overlap.
+/// Checks that triangles have the polygon's orientation and areas that sum up to its area: so none is outside, and no
+/// two overlap.
 fn assert_fills(points: &[DVec3], name: &str) {
     let triangles = cut_up(points);
     let (area, areas) = (area_of(points), areas(points, &triangles));
@@ -33,7 +34,7 @@ fn assert_fills(points: &[DVec3], name: &str) {
     assert!(areas.iter().all(|triangle| triangle.dot(area) > 0.0), "{name}: {triangles:?}");
 }
 
-/// In another plane, and with another first corner.
+/// The polygon in another plane, with another first corner.
 fn assert_fills_everywhere(corners: &[(f64, f64)], name: &str) {
     let planes = [
         [DVec3::X, DVec3::Y],
@@ -55,10 +56,10 @@ fn assert_fills_everywhere(corners: &[(f64, f64)], name: &str) {
 
 const U: [(f64, f64); 8] = [(0., 0.), (3., 0.), (3., 3.), (2., 3.), (2., 1.), (1., 1.), (1., 3.), (0., 3.)];
 const DART: [(f64, f64); 4] = [(2., -1.), (0., 2.), (-2., -1.), (0., 0.4)];
-/// A wall, a bridge to its window, the window the other way round, and the bridge back.
+/// A wall, a bridge to its window, the window with inverted winding, and the bridge back.
 const WINDOW: [(f64, f64); 10] =
     [(0., 0.), (4., 0.), (4., 3.), (0., 3.), (0., 0.), (1., 1.), (1., 2.), (3., 2.), (3., 1.), (1., 1.)];
-/// Two windows, whose bridges leave from one corner.
+/// Two windows with bridges from one corner.
 const TWO_WINDOWS: [(f64, f64); 16] = [
     (0., 0.),
     (9., 0.),
@@ -100,7 +101,7 @@ fn concave_polygons_are_filled_and_nothing_else() {
 fn small_convex_polygons_are_fans() {
     let pentagon = flat(&[(0., 0.), (2., 0.), (3., 1.), (2., 2.), (0., 2.)]);
     assert_eq!(cut_up(&pentagon), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
-    // A quad that is bent along its other diagonal stays as it is.
+    // A quad that is bent along its other diagonal keeps its diagonal.
     let mut bent = flat(&[(0., 0.), (1., 0.), (1., 1.), (0., 1.)]);
     bent[1].z = 0.5;
     assert_eq!(cut_up(&bent), [[0, 1, 2], [0, 2, 3]]);
@@ -155,7 +156,7 @@ fn outlines_that_cross_themselves_keep_their_area() {
     }
 }
 
-/// Numbers from 0 to 1 that are the same every time.
+/// Deterministic pseudo-random numbers from 0 to 1.
 fn chance(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {

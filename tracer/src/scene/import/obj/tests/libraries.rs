@@ -35,7 +35,7 @@ fn libraries_are_found_in_the_folder_of_the_model_only() {
         warnings[0].starts_with("a.obj:1: the material library `other.mtl` is not in the model's folder"),
         "{warnings:?}"
     );
-    // What names another place is found in the model's folder, with a note.
+    // A path to another folder is found in the model's folder, with a warning.
     for other in ["../b.mtl", "/etc/b.mtl", "C:\\b.mtl", "B.MTL", "x/b.mtl"] {
         let (found, warnings) = red(other, "b.mtl");
         assert!(found, "{other}: {warnings:?}");

@@ -1,4 +1,4 @@
-//! Models as people write them, models that are broken, and models made by chance.
+//! Models in all common notations, broken models, and arbitrary models.
 
 mod libraries;
 mod normals;
@@ -49,7 +49,7 @@ fn square_corners() -> Vec<[DVec3; 3]> {
     vec![[a, b, c], [a, c, d]]
 }
 
-/// A square whose first triangle may lie on another part of the picture than the second.
+/// A square whose first triangle has a variable position in the picture.
 const WOODEN: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl wood\n";
 const WOOD: (&str, &[u8]) = ("a.mtl", b"newmtl wood\nmap_Kd wood.png\nnewmtl red\nKd 1 0 0\n");
 

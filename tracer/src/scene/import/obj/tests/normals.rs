@@ -1,4 +1,4 @@
-//! Normals as files give them, do not give them, and half give them: at the corners of the compiled mesh.
+//! Normals at the corners of compiled meshes, where the file has all, some or none of them.
 
 use glam::Vec3;
 
@@ -61,7 +61,7 @@ fn a_group_is_smooth_over_any_angle() {
     let (mesh, _) = compiled(&format!("{CUBE}s 1\n{}", SIDES.concat()));
     for (face, corners) in corners_of(&mesh) {
         for (place, normal) in corners {
-            // Between the three sides that meet there, and not one of them.
+            // The average of the three sides at that corner, and not the normal of one of them.
             assert!(normal.dot(place.normalize()) > 0.9 && normal.dot(face) < 0.9, "{place} {normal}");
         }
     }
@@ -136,12 +136,12 @@ fn two_sides_of_a_wall_do_not_cancel_out() {
     for smoothing in ["", "s 1\n"] {
         let text = format!("{house}{smoothing}f 1 2 3 4\nf 4 3 2 1\nf 5 1 4 6\nf 6 4 1 5\n");
         let (mesh, _) = compiled(&text);
-        // The other diagonal: no triangle is there twice.
+        // The other diagonal: no triangle is duplicated.
         assert_eq!(mesh.triangle_count(), 8);
         for (face, corners) in corners_of(&mesh) {
             for (place, normal) in corners {
                 assert!((normal.length() - 1.0).abs() < 1e-6, "{normal} at {place}");
-                // A group is smooth around the corner of the house, but each side keeps to its own.
+                // A group is smooth around the corner of the building, but each side has its own normals.
                 let least = if smoothing.is_empty() { 0.999 } else { 0.4 };
                 assert!(normal.dot(face) > least, "{smoothing:?}: {normal} on {face} at {place}");
             }
@@ -151,13 +151,13 @@ fn two_sides_of_a_wall_do_not_cancel_out() {
 
 #[test]
 fn a_face_with_its_corners_the_wrong_way_round_is_smooth_with_its_neighbours() {
-    // A gentle ridge, whose second half is turned round.
+    // A low ridge whose second half has the opposite winding.
     let ridge = "v 0 0 0\nv 1 0.1 0\nv 2 0 0\nv 0 0 1\nv 1 0.1 1\nv 2 0 1\n";
     let (mesh, _) = compiled(&format!("{ridge}f 1 4 5 2\nf 2 3 6 5\n"));
     for (face, corners) in corners_of(&mesh) {
         for (place, normal) in corners {
             assert!(normal.dot(face) > 0.99, "{normal} on {face}");
-            // Upright on the ridge, whichever side the face shows.
+            // Vertical on the ridge, whichever side the face shows.
             if place.x.abs() < 0.1 {
                 assert!(normal.y.abs() > 0.999, "{normal} at {place}");
             }

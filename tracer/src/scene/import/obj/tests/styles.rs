@@ -1,4 +1,4 @@
-//! One model in many styles of writing, and arbitrary statements.
+//! One model in many styles of notation, and arbitrary statements.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn polygons() -> impl Strategy<Value = Polygons> {
     })
 }
 
-/// How a writer might write it down.
+/// A style of notation.
 #[derive(Clone, Copy, Debug)]
 struct Style {
     negative: bool,
@@ -108,7 +108,7 @@ proptest! {
     }
 }
 
-/// Statements of both languages, sound and unsound.
+/// Statements of OBJ and MTL, valid and invalid.
 fn statement() -> impl Strategy<Value = String> {
     let number =
         || prop_oneof!["-?[0-9]{1,3}", Just("nan".to_owned()), Just("1e39".to_owned()), Just("x".to_owned())];

@@ -29,18 +29,18 @@ fn texture_coordinates_stay_with_the_corners() {
 }
 
 #[test]
-fn texture_coordinates_are_read_only_where_they_are_wanted() {
+fn texture_coordinates_are_read_only_where_they_are_requested() {
     let text = format!("{WOODEN}usemtl red\nvt 0 0\nf 1/1 2/1 3/1\n");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
     std::fs::write(&path, &text).unwrap();
     std::fs::write(folder.path().join(WOOD.0), WOOD.1).unwrap();
-    for (wanted, count) in [(Uvs::Never, 0), (Uvs::Textured, 0), (Uvs::Always, 1)] {
-        assert_eq!(load(&path, wanted, LoadOptions::default()).unwrap().0.uvs.len(), count, "{wanted:?}");
+    for (requested, count) in [(Uvs::Never, 0), (Uvs::Textured, 0), (Uvs::Always, 1)] {
+        assert_eq!(load(&path, requested, LoadOptions::default()).unwrap().0.uvs.len(), count, "{requested:?}");
     }
     std::fs::write(&path, text.replace("usemtl red", "usemtl wood")).unwrap();
-    for (wanted, count) in [(Uvs::Never, 0), (Uvs::Textured, 1), (Uvs::Always, 1)] {
-        assert_eq!(load(&path, wanted, LoadOptions::default()).unwrap().0.uvs.len(), count, "{wanted:?}");
+    for (requested, count) in [(Uvs::Never, 0), (Uvs::Textured, 1), (Uvs::Always, 1)] {
+        assert_eq!(load(&path, requested, LoadOptions::default()).unwrap().0.uvs.len(), count, "{requested:?}");
     }
 }
 
