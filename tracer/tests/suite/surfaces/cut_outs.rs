@@ -6,7 +6,7 @@ fn disc(x: f64, y: f64) -> bool {
     (x - 0.5).hypot(y - 0.5) < 0.4
 }
 
-/// Leaves over a floor: of the scene file, of a smooth mesh and of one in two slots, of which one is whole.
+/// Leaves over a floor: of the scene file, of a smooth mesh and of one with two slots, one of them without holes.
 fn leaves(width: u32, height: u32, filter: Filter) -> LoadedScene {
     let texture = holes(24, disc);
     let mut scene = empty(width, height);
@@ -61,7 +61,7 @@ fn cut_outs_and_their_shadows_match_the_oracle() {
     }
 }
 
-/// The same without its holes.
+/// The same scene without holes.
 fn solid(leaves: &LoadedScene) -> LoadedScene {
     let mut scene = leaves.scene.clone();
     scene.materials.iter_mut().for_each(|material| material.cutout = None);
@@ -91,7 +91,7 @@ fn single_rays_pass_holes_like_tiles() {
         assert!(t(hit) >= t(solid));
         through += usize::from(t(hit) > t(solid));
         assert_eq!(with.any_hit(eye, direction, f64::INFINITY), hit.is_some());
-        // What lies behind a hole is found again from there.
+        // A surface behind a hole is hit again from the hole on.
         if let Some(hit) = hit {
             let short = with.closest_hit(eye, direction, hit.t * (1.0 - 1e-9));
             assert_eq!(short.map(|hit| hit.primitive), None);
@@ -105,7 +105,7 @@ fn single_rays_pass_holes_like_tiles() {
 fn a_leaf_is_a_green_disc_on_nothing_and_its_shadow_has_its_shape() {
     let folder = tempfile::tempdir().unwrap();
     let inside = |x: u32, y: u32| (f64::from(x) - 31.5).hypot(f64::from(y) - 31.5) < 28.0;
-    // Transparent black around, as programs write it.
+    // Surrounded by transparent black, as programs write it.
     let leaf =
         RgbaImage::from_fn(64, 64, |x, y| if inside(x, y) { Rgba([40, 160, 40, 255]) } else { Rgba([0; 4]) });
     leaf.save(folder.path().join("leaf.png")).unwrap();

@@ -1,5 +1,4 @@
-//! What surfaces show beside reflected light, from the file to the pixel: colours as they are, light of their own, colours of
-//! vertices, textures that lie elsewhere, and holes.
+//! Surface features from the file to the pixel: unlit materials, emission, vertex colours, tiling, and cut-outs.
 
 mod cut_outs;
 
@@ -21,7 +20,7 @@ use rayfarm_tracer::srgb;
 use rayfarm_tracer::texture::{Texture, split_repeats};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, Primitive, render_rows};
 
-/// A scene with its meshes and textures, as the loader gives it.
+/// A scene with its meshes and textures, as the loader returns it.
 fn loaded(scene: Scene, meshes: Vec<Arc<CompiledMesh>>, textures: Vec<Arc<Texture>>) -> LoadedScene {
     LoadedScene { scene, meshes, mesh_files: vec![], textures, warnings: vec![] }
 }
@@ -36,7 +35,7 @@ fn frame(loaded: &LoadedScene, view: &FrameView) -> PreparedFrame {
     PreparedFrame::new(Arc::new(compiled), view).unwrap()
 }
 
-/// Pixels that differ from the oracle's by more than a step.
+/// Number of pixels that differ from the oracle's by more than a step.
 fn off(loaded: &LoadedScene, view: &FrameView) -> usize {
     let picture = rendered(loaded, view);
     let expected = Oracle::new(&loaded.scene, &loaded.meshes, &loaded.textures, view).render();
@@ -44,7 +43,7 @@ fn off(loaded: &LoadedScene, view: &FrameView) -> usize {
     pairs.filter(|(a, b)| a.iter().zip(b.iter()).any(|(a, b)| a.abs_diff(*b) > 1)).count()
 }
 
-/// Every level of SIMD, every cut, and adaptive frames as well, give the same bytes.
+/// Asserts the same bytes for every level of SIMD, every division into rows, and adaptive frames as well.
 fn assert_the_same_everywhere(what: &str, loaded: &LoadedScene, view: &FrameView) {
     let copy = LoadedScene {
         scene: loaded.scene.clone(),
@@ -82,13 +81,13 @@ fn square(place: impl Fn(f64, f64) -> DVec3, uvs: [[f32; 2]; 4], material: u32) 
 
 const WHOLE: [[f32; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
-/// A picture without order whose alpha is above one half where `solid` says so, both from 0 to 1.
+/// A pseudo-random picture whose alpha is above one half where `solid` is true, both coordinates from 0 to 1.
 fn holes(side: u32, solid: impl Fn(f64, f64) -> bool) -> Arc<Texture> {
     let noise = |i: u32| (i.wrapping_mul(0x9e37_79b1).rotate_left(13).wrapping_mul(0x85eb_ca6b) >> 24) as u8;
     let pixels = (0..side * side * 3).map(noise).collect();
     let share = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
     let alpha = (0..side * side).map(|i| {
-        // Not only all or nothing: what lies between is found by the filter.
+        // Intermediate alpha as well, for the filter.
         let strength = 90 + noise(i) / 4;
         if solid(share(i % side), 1.0 - share(i / side)) { 255 - strength } else { strength }
     });
@@ -111,9 +110,8 @@ fn model(folder: &Path, obj: &str, mtl: &str, scene: &str) -> LoadedScene {
 
 /// Triangles of a scene as a mesh, with whole repeats apart.
 fn mesh_of(triangles: &[Triangle]) -> Arc<CompiledMesh> {
-    let uvs = |triangle: &Triangle| {
-        split_repeats(triangle.uvs.unwrap().map(|uv: Vec2| uv.as_dvec2())).unwrap()
-    };
+    let uvs =
+        |triangle: &Triangle| split_repeats(triangle.uvs.unwrap().map(|uv: Vec2| uv.as_dvec2())).unwrap();
     let (near, repeats): (Vec<[Vec2; 3]>, Vec<Vec2>) = triangles.iter().map(uvs).unzip();
     let mesh = Mesh {
         positions: triangles.iter().flat_map(|triangle| triangle.vertices).collect(),
@@ -136,7 +134,7 @@ fn illum_0_is_unlit_and_ke_emits_on_the_front() {
     let folder = tempfile::tempdir().unwrap();
     let text = "newmtl flat\nKd 0.8 0.1 0.1\nKs 1 1 1\nillum 0\nnewmtl lamp\nKd 0 0 0\nKe 1 0.6 0.1\n\
                 newmtl both\nKd 0.25 0.5 0.25\nKe 0.25 0 0\nillum 0\n";
-    // Three stripes beside each other; the second lamp shows its back.
+    // Three adjacent stripes; the second lamp shows its back.
     let strip = |x: i32| format!("v {x} -1 0\nv {} -1 0\nv {} 1 0\nv {x} 1 0\n", x + 1, x + 1);
     let obj = format!(
         "{}{}{}{}usemtl flat\nf 1 2 3 4\nusemtl lamp\nf 5 6 7 8\nf 12 11 10 9\nusemtl both\nf 13 14 15 16\n",
@@ -183,7 +181,7 @@ fn emission_takes_textures_on_every_shape_and_lights_nothing() {
         rotate: DVec3::new(10.0, 20.0, 30.0),
         scale: scale.into(),
     };
-    // From inside nothing glows; a mirrored one keeps its front outside.
+    // Nothing emits towards the inside; a mirrored sphere keeps its front outside.
     scene.models = vec![
         model(-1.0, [0.4; 3], NormalMode::Flat, [3, 1]),
         model(0.0, [-0.4, 0.4, 0.4], NormalMode::Smooth, [4, 5]),
@@ -204,7 +202,7 @@ fn a_cube_with_the_corners_of_rgb_shows_them() {
     (loaded.scene.ambient, loaded.scene.lights) = (Vec3::ONE, vec![]);
     let view = FrameView { width: 200, height: 200, ..FrameView::of(&loaded.scene) };
     let picture = rendered(&loaded, &view);
-    // The front face, z = 1, at 4 from the eye.
+    // The front face, z = 1, at 4 from the camera.
     let at = |x: f64, y: f64| {
         let scale = 100.0 / (4.0 * libm::tan(15_f64.to_radians()));
         picture.pixel((100.0 + x * scale) as u32, (100.0 - y * scale) as u32).unwrap()
@@ -221,7 +219,7 @@ fn a_cube_with_the_corners_of_rgb_shows_them() {
     }
     assert_eq!(off(&loaded, &view), 0);
     assert_the_same_everywhere("a cube of colours", &loaded, &view);
-    // The same in whole numbers up to 255, which is said.
+    // The same in whole numbers up to 255, with a warning.
     let bytes: String = CUBE
         .lines()
         .map(|line| {
@@ -286,7 +284,7 @@ fn options_scale_and_offset_a_texture() {
     let view = FrameView { width: 240, height: 240, ..FrameView::of(&loaded.scene) };
     let picture = rendered(&loaded, &view);
     let scale = 120.0 / (5.0 * libm::tan(15_f64.to_radians()));
-    // Six by six texels fill the square: the middle of each.
+    // Six by six texels fill the square: the centre of each.
     for (i, j) in (0..6).flat_map(|j| (0..6).map(move |i| (i, j))) {
         let place = |index: u32| (f64::from(index) + 0.5) / 3.0 - 1.0;
         let (x, y) = (120.0 + place(i) * scale, 120.0 - place(j) * scale);
@@ -314,7 +312,7 @@ fn every_wrap_scale_and_offset_matches_the_oracle() {
                 ));
                 scene.ambient = Vec3::ONE;
                 let triangles = loaded(scene.clone(), vec![], vec![Arc::clone(&picture)]);
-                // The same as a mesh, whose whole repeats are kept apart.
+                // The same as a mesh, with its whole repeats.
                 let mesh = mesh_of(&scene.triangles);
                 let model = Model {
                     mesh: mesh.id(),
