@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 pub use blob::{FORMAT_VERSION, MAGIC, Texture};
 pub use map::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};
-pub use uv::{MAX_UV, split_repeats, are_usable, without_repeats};
+pub use uv::{MAX_UV, are_usable, split_repeats, without_repeats};
 
 pub(crate) use blob::LEAST_ALPHA;
 #[cfg(feature = "import")]

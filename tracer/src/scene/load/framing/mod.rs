@@ -63,28 +63,28 @@ pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) 
 /// A camera whose picture the box fills. Without bounds it shows a cube of two units around the origin.
 pub(super) fn camera_showing(bounds: Option<Bounds>, size: (u32, u32)) -> Camera {
     let bounds = bounds.unwrap_or((-DVec3::ONE, DVec3::ONE));
-    let frame = Frame::of(bounds, size);
-    let reach = corners_of(bounds).map(|corner| frame.reach(corner)).reduce(Reach::max);
-    frame.camera(reach.unwrap_or(Reach::NOTHING))
+    let axes = Axes::of(bounds, size);
+    let reach = corners_of(bounds).map(|corner| axes.reach(corner)).reduce(Reach::max);
+    axes.camera(reach.unwrap_or(Reach::NOTHING))
 }
 
 /// A camera whose picture the mesh fills.
 fn camera_showing_mesh(mesh: &CompiledMesh, rotate: DVec3, size: (u32, u32)) -> Camera {
     let turn = rotation::of_model(rotate);
-    let frame = Frame::of(around(corners_of(mesh.bounds()).map(|corner| turn * corner)), size);
+    let axes = Axes::of(around(corners_of(mesh.bounds()).map(|corner| turn * corner)), size);
     let (center, scale) = (mesh.center(), libm::exp2(f64::from(mesh.exponent())));
     let reach_of = |block: &TriangleBlock| {
         let lanes = (0..WIDTH).flat_map(|lane| block.corners(lane));
-        let corners = lanes.map(|corner| frame.reach(turn * (center + corner.as_dvec3() * scale)));
+        let corners = lanes.map(|corner| axes.reach(turn * (center + corner.as_dvec3() * scale)));
         // Lanes without a triangle are NaN, which `max` ignores.
         corners.fold(Reach::NOTHING, Reach::max)
     };
     let reach = mesh.blocks().par_iter().map(reach_of).reduce(|| Reach::NOTHING, Reach::max);
-    frame.camera(reach)
+    axes.camera(reach)
 }
 
 /// Axes and slopes of a picture around the centre of the geometry.
-struct Frame {
+struct Axes {
     center: DVec3,
     /// Half of the diagonal of the geometry's bounds.
     radius: f64,
@@ -96,7 +96,7 @@ struct Frame {
     slope_y: f64,
 }
 
-impl Frame {
+impl Axes {
     fn of((lower, upper): Bounds, (width, height): (u32, u32)) -> Self {
         let forward = -TOWARDS_CAMERA.normalize();
         let right = forward.cross(DVec3::Y).normalize();
@@ -133,7 +133,7 @@ impl Frame {
     }
 }
 
-/// Extents of geometry: see [`Frame::reach`].
+/// Extents of geometry: see [`Axes::reach`].
 #[derive(Clone, Copy)]
 struct Reach {
     right: f64,

@@ -36,11 +36,19 @@ fn texture_coordinates_are_read_only_where_they_are_requested() {
     std::fs::write(&path, &text).unwrap();
     std::fs::write(folder.path().join(WOOD.0), WOOD.1).unwrap();
     for (requested, count) in [(Uvs::Never, 0), (Uvs::Textured, 0), (Uvs::Always, 1)] {
-        assert_eq!(load(&path, requested, LoadOptions::default()).unwrap().0.uvs.len(), count, "{requested:?}");
+        assert_eq!(
+            load(&path, requested, LoadOptions::default()).unwrap().0.uvs.len(),
+            count,
+            "{requested:?}"
+        );
     }
     std::fs::write(&path, text.replace("usemtl red", "usemtl wood")).unwrap();
     for (requested, count) in [(Uvs::Never, 0), (Uvs::Textured, 1), (Uvs::Always, 1)] {
-        assert_eq!(load(&path, requested, LoadOptions::default()).unwrap().0.uvs.len(), count, "{requested:?}");
+        assert_eq!(
+            load(&path, requested, LoadOptions::default()).unwrap().0.uvs.len(),
+            count,
+            "{requested:?}"
+        );
     }
 }
 
