@@ -161,7 +161,7 @@ fn with_model(mesh: &CompiledMesh, width: u32, height: u32) -> Scene {
 
 #[test]
 fn slivers_duplicates_and_unused_vertices_match_the_oracle() {
-    let (mesh, report) = CompiledMesh::compile(&disfigured()).unwrap();
+    let (mesh, report) = CompiledMesh::compile(&degenerate()).unwrap();
     assert_eq!((report.dropped_duplicate, report.dropped_not_finite), (30, 0));
     // Slivers thinner than the digits of the mesh are dropped as well.
     assert!((80..110).contains(&report.dropped_degenerate), "{report:?}");

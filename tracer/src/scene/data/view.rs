@@ -121,3 +121,39 @@ impl FrameView {
         Self { width: scale.of(self.width), height: scale.of(self.height), samples, quality, ..*self }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera =
+        Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 };
+
+    #[test]
+    fn settings_round_trip() {
+        let settings = RenderSettings { samples: 9, scale: RenderScale::Third, ..RenderSettings::default() };
+        assert_eq!(RenderSettings::default().with_setting(settings.setting()), settings);
+        let setting =
+            Setting { quality: Quality { adaptive: true, ..Quality::default() }, ..settings.setting() };
+        assert_eq!(settings.with_setting(setting).setting(), setting);
+    }
+
+    #[test]
+    fn a_view_has_the_size_samples_and_knobs_of_its_setting() {
+        let view = FrameView {
+            camera: CAMERA,
+            width: 101,
+            height: 60,
+            samples: 1,
+            spin: 5.0,
+            quality: Quality::default(),
+        };
+        let quality = Quality { adaptive: true, ..Quality::default() };
+        let setting = Setting { samples: 4, scale: RenderScale::Half, quality };
+        let rendered = view.at(&setting);
+        assert_eq!(rendered, FrameView { width: 51, height: 30, samples: 4, quality, ..view });
+        assert!(rendered.is_adaptive() && !view.is_adaptive());
+        assert!(!FrameView { samples: 1, ..rendered }.is_adaptive());
+        assert_eq!(rendered.setting(RenderScale::Half), setting);
+    }
+}
