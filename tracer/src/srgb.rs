@@ -1,4 +1,4 @@
-//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] rounds one colour exactly; [`encode_lanes`] encodes sixteen
+//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] rounds one colour exactly; `encode_lanes` encodes sixteen
 //! colours at once by a polynomial, exactly except within 10^-4 of a step around a threshold. Pictures use the
 //! second, the oracle and its tests the first.
 //!

@@ -96,7 +96,7 @@ impl Models {
         text: &ModelText,
         materials: &mut Vec<Material>,
         textures: &BTreeMap<u32, TexturesText>,
-        complain: &impl Fn(Fault) -> SceneError,
+        locate: &impl Fn(Fault) -> SceneError,
     ) -> Result<Model, SceneError> {
         let real = self.paths.get(&text.file).unwrap_or(&text.file).clone();
         let crease_angle = text.crease_angle.map(|(degrees, _)| degrees);
@@ -113,7 +113,7 @@ impl Models {
                     Some((_, at)) if Kind::of(&path)? == Kind::Compiled => {
                         let message = "`crease_angle` in [[model]] has no effect: a compiled model has its normals; \
                                        give --crease-angle to `rayfarm-master compile`";
-                        self.warnings.push(complain(Fault { at, message: message.into() }).to_string());
+                        self.warnings.push(locate(Fault { at, message: message.into() }).to_string());
                         None
                     }
                     _ => crease_angle,
@@ -127,7 +127,7 @@ impl Models {
         self.slots += loaded.mesh.material_count();
         if self.slots > self.limits.material_slots {
             let most_slots = self.limits.material_slots;
-            return Err(complain(Fault {
+            return Err(locate(Fault {
                 at: text.at,
                 message: format!(
                     "the models up to here have {} materials in all, each counted once for each instance; \
@@ -138,7 +138,7 @@ impl Models {
         }
         let slots = match text.material {
             Some(material) if textures.contains_key(&material) && !loaded.mesh.has_uvs() => {
-                return Err(complain(without_uvs(text)));
+                return Err(locate(without_uvs(text)));
             }
             Some(material) => vec![material; loaded.mesh.material_count()],
             None => loaded.own_materials(

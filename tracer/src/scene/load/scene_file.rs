@@ -19,14 +19,14 @@ pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Res
     refuse_for_scene(path, options)?;
     let content = bytes(path, MAX_SCENE_BYTES)?;
     let text = text_of(path, &content)?;
-    let complain = |fault: Fault| {
+    let locate = |fault: Fault| {
         let (line, column) = toml::place(text, fault.at);
         SceneError::InScene { path: path.to_owned(), line, column, message: fault.message }
     };
-    let read = toml::read(text).map_err(complain)?;
-    let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| complain(w).to_string()).collect();
-    let mut models = Models::open(path, &read.models, &read.textures, options, limits).map_err(complain)?;
-    let mut loaded = assemble(path, read, &mut models, &complain)?;
+    let read = toml::read(text).map_err(locate)?;
+    let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| locate(w).to_string()).collect();
+    let mut models = Models::open(path, &read.models, &read.textures, options, limits).map_err(locate)?;
+    let mut loaded = assemble(path, read, &mut models, &locate)?;
     warnings.append(&mut models.warnings);
     loaded.warnings = warnings;
     Ok(loaded)
@@ -63,7 +63,7 @@ fn assemble(
     path: &Path,
     text: SceneText,
     models: &mut Models,
-    complain: &impl Fn(Fault) -> SceneError,
+    locate: &impl Fn(Fault) -> SceneError,
 ) -> Result<LoadedScene, SceneError> {
     let size = (text.render.width, text.render.height);
     let mut scene = Scene {
@@ -80,10 +80,10 @@ fn assemble(
         triangles: text.triangles,
     };
     for model in &text.models {
-        let instance = models.instance(model, &mut scene.materials, &text.textures, complain)?;
+        let instance = models.instance(model, &mut scene.materials, &text.textures, locate)?;
         scene.models.push(instance);
     }
-    load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(complain)?;
+    load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(locate)?;
     let (maps, textures, notes) = models.textures.take_parts();
     scene.textures = maps;
     models.warnings.extend(notes);
