@@ -1,7 +1,7 @@
 //! What is wanted to be seen, and how faithfully: the knobs as commands, window and reports know them.
 
 use rayfarm_tracer::image::{self, ImageError, RgbImage};
-use rayfarm_tracer::scene::quality::word_of;
+use rayfarm_tracer::scene::knobs::word_of;
 use rayfarm_tracer::scene::{
     ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
 };

@@ -1,8 +1,8 @@
-//! How long trees take over patterns, compared with as many triangles or spheres at random places.
+//! Build times of trees over patterns, compared with the same number of triangles or spheres at random positions.
 //!
-//! Prints a line for each pattern: its kind, its name, milliseconds (the least of three), and how many times as long as
-//! the random one of its kind that is, separated by tabs. `--count N` sets how many there are, a million otherwise; names
-//! of patterns limit it to those. Ends with status 1 where one takes more than twice as long.
+//! Prints a line per pattern, separated by tabs: its kind, its name, milliseconds (the least of three), and the ratio
+//! to the random pattern of its kind. `--count N` sets the number of primitives (default: a million); names of
+//! patterns select these. Ends with status 1 where a ratio is above two.
 
 mod common;
 
@@ -14,13 +14,13 @@ use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::{BuildQuality, CompileOptions, CompiledMesh, Mesh, NamedMaterial};
 use rayfarm_tracer::scene::{Background, Camera, Material, RenderSettings, Scene, Sphere};
 
-/// Times as long as the random one.
+/// Largest accepted ratio to the random pattern.
 const LIMIT: f64 = 2.0;
 
-/// The name of what the others are compared with.
+/// Name of the pattern with which the others are compared.
 const RANDOM: &str = "random";
 
-/// Corners of a triangle: of which, and how many there are.
+/// Corners of a triangle, from its index and the number of triangles.
 type Corners = fn(usize, usize) -> [DVec3; 3];
 
 const MESHES: [(&str, Corners); 11] = [
@@ -49,7 +49,7 @@ const MESHES: [(&str, Corners); 11] = [
     ("same triangle", |_, _| small(DVec3::ZERO, 1.0)),
 ];
 
-/// Centre and radius of a sphere: of which, and how many there are.
+/// Centre and radius of a sphere, from its index and the number of spheres.
 type Ball = fn(usize, usize) -> (DVec3, f64);
 
 const SPHERES: [(&str, Ball); 6] = [
@@ -64,7 +64,7 @@ const SPHERES: [(&str, Ball); 6] = [
     ("inside each other", |i, n| (DVec3::ZERO, (i + 1) as f64 / n as f64)),
 ];
 
-/// Points in a cube that look random.
+/// Pseudo-random points in a cube.
 fn scattered(index: usize) -> DVec3 {
     let number = |salt: u64| {
         let mixed = (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(salt as u32 * 21);
@@ -106,7 +106,7 @@ fn main() {
     }
 }
 
-/// How many there are, and the names of patterns. Cargo adds `--bench`.
+/// The number of primitives and the names of patterns. Cargo adds `--bench`.
 fn arguments() -> (usize, Vec<String>) {
     let (mut count, mut names) = (1_000_000, Vec::new());
     let mut given = std::env::args().skip(1).filter(|argument| argument != "--bench");
@@ -125,7 +125,7 @@ fn arguments() -> (usize, Vec<String>) {
     (count, names)
 }
 
-/// The least of three times: what else the machine does adds to the others.
+/// The least of three times: other load of the machine only adds to a time.
 fn least(mut work: impl FnMut()) -> Duration {
     let mut timed = || {
         let started = Instant::now();

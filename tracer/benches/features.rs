@@ -1,4 +1,4 @@
-//! What each feature costs, and that one which is not asked for costs nothing: one scene, varied, on one thread.
+//! Cost of each feature, and that unused features cost nothing: variants of one scene, on one thread.
 
 mod common;
 
@@ -14,7 +14,7 @@ fn features(criterion: &mut Criterion) {
         let mut pixels = common::room_for(&frame);
         let counts = common::render(&pool, &frame, &mut pixels);
         group.throughput(Throughput::Elements(common::rays(counts)));
-        group.bench_function(BenchmarkId::new(variant.name, variant.beside), |bencher| {
+        group.bench_function(BenchmarkId::new(variant.name, variant.baseline), |bencher| {
             bencher.iter(|| common::render(&pool, &frame, &mut pixels));
         });
     }

@@ -1,4 +1,5 @@
-//! Whole frames: every scene at hand, at 1 and 4 samples, on 1 and 2 threads. Rays count with their shadow rays.
+//! Whole frames: every available scene, at 1 and 4 samples, on 1 and 2 threads. Shadow rays are included in the ray
+//! counts.
 
 mod common;
 

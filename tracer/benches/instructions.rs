@@ -1,9 +1,9 @@
-//! Renders one small frame of each scene, one after the other: for valgrind's callgrind to count.
+//! One small frame of each scene, one after the other, for valgrind's callgrind.
 //!
-//! Prints a line for each: its name, what it stands beside (variants of one scene only) and its rays, separated by tabs.
-//! `counted_frame` is what to count, and where to begin anew:
-//! `valgrind --tool=callgrind --toggle-collect='*counted_frame' --dump-after='*counted_frame'`. Valgrind knows no AVX-512 and
-//! hides it from the program, which then takes AVX2 by itself; the level is told on standard error.
+//! Prints a line per frame, separated by tabs: its name, the variant with which it is compared (variants of one scene
+//! only), and its rays. Count the instructions of `counted_frame`, with a dump after each: `valgrind --tool=callgrind
+//! --toggle-collect='*counted_frame' --dump-after='*counted_frame'`. Valgrind does not support AVX-512 and hides it
+//! from the program, which then uses AVX2; the level is printed on standard error.
 
 mod common;
 
@@ -11,7 +11,7 @@ use common::variants::VARIANTS;
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::{PreparedFrame, RayCounts, render_rows, simd_level};
 
-/// Pixels: a frame takes about fifty times as long as without valgrind.
+/// Side in pixels: with valgrind a frame takes about fifty times as long.
 const SIZE: (u32, u32) = (320, 240);
 
 fn main() {
@@ -26,19 +26,19 @@ fn main() {
         }
     }
     for variant in &VARIANTS {
-        count(variant.name, variant.beside, &variant.prepare(width, height));
+        count(variant.name, variant.baseline, &variant.prepare(width, height));
     }
 }
 
-fn count(name: &str, beside: &str, frame: &PreparedFrame) {
+fn count(name: &str, baseline: &str, frame: &PreparedFrame) {
     let mut pixels = common::room_for(frame);
-    println!("{name}\t{beside}\t{}", common::rays(counted_frame(frame, &mut pixels)));
+    println!("{name}\t{baseline}\t{}", common::rays(counted_frame(frame, &mut pixels)));
 }
 
-/// Its name is what callgrind looks for.
+/// Counted by callgrind, which finds it by its name.
 #[inline(never)]
 fn counted_frame(frame: &PreparedFrame, pixels: &mut [u8]) -> RayCounts {
-    // Nothing cancels it.
+    // Never cancelled.
     render_rows(frame, 0..frame.height(), pixels, &never).unwrap_or_default()
 }
 

@@ -1,8 +1,9 @@
-//! Where the time of a frame goes, stage by stage, on one thread.
+//! Time of a frame by stage, on one thread.
 //!
-//! Prints a line for each scene, number of samples and stage: names, samples, milliseconds, separated by tabs. The stage
-//! `whole` is the same frame without a clock: what the clock itself costs is the sum of the others less that. All are
-//! medians, the two kinds of frames in turn. `--frames N` sets how many; names of scenes limit it to those.
+//! Prints a line per scene, sample count and stage, separated by tabs: names, samples, milliseconds. The stage
+//! `whole` is the same frame without a clock: the overhead of the clock is the sum of the other stages minus `whole`.
+//! All times are medians, with the two kinds of frames in turn. `--frames N` sets their number; names of scenes
+//! select these.
 
 mod common;
 
@@ -28,7 +29,7 @@ fn main() {
     }
 }
 
-/// Frames to render, and the names of scenes. Cargo adds `--bench`.
+/// The number of frames and the names of scenes. Cargo adds `--bench`.
 fn arguments() -> (usize, Vec<String>) {
     let mut frames = 15;
     let mut names = Vec::new();
@@ -48,7 +49,7 @@ fn arguments() -> (usize, Vec<String>) {
     (frames, names)
 }
 
-/// The time that each stage takes, told by a clock that is read when a tile comes to the next.
+/// Accumulated time of each stage. The clock is read at every stage change.
 struct Clock {
     times: [Duration; Stage::ALL.len()],
     stage: Stage,
@@ -69,13 +70,13 @@ impl Watch for Clock {
     }
 }
 
-/// Milliseconds of each stage, and of the whole frame without a clock.
+/// Medians in milliseconds of each stage, and of the whole frame without a clock.
 fn median_times(frame: &PreparedFrame, frames: usize) -> Vec<(String, f64)> {
     let mut pixels = common::room_for(frame);
     let rows = 0..frame.height();
     let mut stages = vec![Vec::new(); Stage::ALL.len()];
     let mut wholes = Vec::new();
-    // The first of each warms up.
+    // The first one of each kind is a warm-up.
     for round in 0..=frames {
         let mut clock = Clock::started();
         let watched = render_rows_watched(frame, rows.clone(), &mut pixels, &|| false, &mut clock);
@@ -97,7 +98,7 @@ fn median_times(frame: &PreparedFrame, frames: usize) -> Vec<(String, f64)> {
     medians
 }
 
-/// In milliseconds.
+/// A duration in milliseconds.
 fn median(mut times: Vec<Duration>) -> f64 {
     times.sort_unstable();
     times[times.len() / 2].as_secs_f64() * 1e3

@@ -1,9 +1,9 @@
 //! Times single rays: random ones, from within the bounds of a scene's models in all directions.
 //!
-//! `cargo run --release --example single_rays -p rayfarm-tracer -- SCENE --rays N --seed S` prints one line of JSON: how
-//! many rays there were, how many hit, the mean distance of the hits in world units, and nanoseconds per ray for the
-//! closest hit and for any hit, on one thread. Only the scene's models are traced. Rays come from a fixed generator, so
-//! that another tracer can be given the same.
+//! `cargo run --release --example single_rays -p rayfarm-tracer -- SCENE --rays N --seed S` prints one line of JSON:
+//! the number of rays, the number of hits, the mean distance of the hits in world units, and nanoseconds per ray for
+//! the closest hit and for any hit, on one thread. Only the scene's models are traced. Rays come from a fixed
+//! generator, so that another tracer can trace the same.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -15,7 +15,7 @@ use glam::DVec3;
 use rayfarm_tracer::scene::{self, FrameView};
 use rayfarm_tracer::{CompiledScene, PreparedFrame};
 
-/// Each measurement is the median of so many.
+/// Number of runs per measurement, of which the median counts.
 const REPEATS: usize = 7;
 
 const USAGE: &str = "usage: single_rays SCENE [--rays N] [--seed S]";
@@ -48,7 +48,7 @@ fn closest(frame: &PreparedFrame, ray: &Ray) -> Option<f64> {
     frame.closest_hit(ray.origin, ray.direction, f64::INFINITY).map(|hit| hit.t)
 }
 
-/// The scene's models and nothing else, as it stands.
+/// The scene with its models only.
 fn models_only(path: &Path) -> Result<PreparedFrame, Box<dyn Error>> {
     let mut loaded = scene::load(path)?;
     loaded.scene.triangles.clear();
@@ -59,7 +59,7 @@ fn models_only(path: &Path) -> Result<PreparedFrame, Box<dyn Error>> {
     Ok(PreparedFrame::new(compiled, &view)?)
 }
 
-/// Median time of a ray, in nanoseconds.
+/// Median time per ray, in nanoseconds.
 fn median_ns(rays: &[Ray], trace: impl Fn(&Ray) -> bool) -> f64 {
     let mut times: Vec<f64> = (0..REPEATS)
         .map(|_| {
@@ -89,7 +89,7 @@ impl SplitMix {
         (self.next() >> 40) as f32 / (1_u32 << 24) as f32
     }
 
-    /// Starts uniformly in a box and goes uniformly in all directions.
+    /// Uniform origins in a box, uniform directions.
     fn ray(&mut self, (lo, hi): (DVec3, DVec3)) -> Ray {
         let mut origin = lo;
         for axis in 0..3 {

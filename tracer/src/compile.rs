@@ -10,9 +10,7 @@ use crate::bvh::WIDTH;
 use crate::bvh::{self, BuildQuality};
 use crate::cancel::{Cancelled, IsCancelled, go_on, never};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{
-    Material, Model, NormalMode, Quality, Scene, Shading, TextureMap, ValidateError, rotation,
-};
+use crate::scene::{Material, Model, NormalMode, Scene, SceneFeatures, TextureMap, ValidateError, rotation};
 use crate::texture::{Texture, TextureId};
 
 /// Why a scene cannot be traced.
@@ -61,6 +59,7 @@ pub struct CompiledScene {
     /// Over all finite items; its boxes are those of no frame in particular.
     tree: bvh::WideTree,
     bounds: Option<(DVec3, DVec3)>,
+    features: SceneFeatures,
 }
 
 /// What the materials of a model want of its mesh.
@@ -80,57 +79,6 @@ pub(crate) enum Item {
     Model(usize),
     Sphere(usize),
     Triangle(usize),
-}
-
-/// What the scene asks for: the rest is not computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Features {
-    /// Something wears a material with a specular colour: directions to the viewer are needed.
-    pub specular: bool,
-    /// Something wears a material with a texture.
-    pub textured: bool,
-    /// Something wears a material that takes the colours of vertices.
-    pub vertex_colors: bool,
-    /// Something wears a material that emits light.
-    pub emissive: bool,
-    /// Something wears a material that no light changes.
-    pub unlit: bool,
-    /// Something wears a material that is cut out by alpha.
-    pub cut_out: bool,
-    /// A model with interpolated normals: they differ from the geometric ones.
-    pub smooth: bool,
-}
-
-impl Features {
-    pub(crate) fn of(scene: &Scene) -> Self {
-        let any = |asks: fn(&Material) -> bool| {
-            worn(scene).any(|index| scene.materials.get(index as usize).is_some_and(asks))
-        };
-        Self {
-            specular: any(Material::is_specular),
-            textured: any(|material| material.texture.is_some() || material.emission_texture.is_some()),
-            vertex_colors: any(|material| material.vertex_colors),
-            emissive: any(Material::is_emissive),
-            unlit: any(|material| material.unlit),
-            cut_out: any(|material| material.cutout.is_some()),
-            smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
-        }
-    }
-
-    /// What is left of them at this quality.
-    #[must_use]
-    pub fn at(self, quality: &Quality) -> Self {
-        Self { specular: self.specular && quality.shading == Shading::Full, ..self }
-    }
-}
-
-/// Indices of the materials that something in the scene wears.
-fn worn(scene: &Scene) -> impl Iterator<Item = u32> {
-    let on_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
-    on_models
-        .chain(scene.spheres.iter().map(|sphere| sphere.material))
-        .chain(scene.planes.iter().map(|plane| plane.material))
-        .chain(scene.triangles.iter().map(|triangle| triangle.material))
 }
 
 /// Which item indices are which.
@@ -208,7 +156,8 @@ impl CompiledScene {
             items.range().map(|index| world_bounds(&scene, &meshes, items.get(index))).collect();
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default, cancelled)?;
-        Ok(Self { scene, meshes, coverings, textures, tree, bounds })
+        let features = SceneFeatures::of(&scene);
+        Ok(Self { scene, meshes, coverings, textures, tree, bounds, features })
     }
 
     /// What was compiled.
@@ -227,9 +176,9 @@ impl CompiledScene {
         self.bounds
     }
 
-    /// What the scene asks for, and so what is computed.
-    pub fn features(&self) -> Features {
-        Features::of(&self.scene)
+    /// Features that the scene uses at full quality.
+    pub fn features(&self) -> SceneFeatures {
+        self.features
     }
 
     /// Bytes of the tree over the scene's own items, which every frame copies with its own boxes.

@@ -1,4 +1,4 @@
-//! Files: only regular ones are read, and a written one appears whole or not at all.
+//! Reading of regular files within limits, and atomic writing.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -6,15 +6,15 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Opens a regular file for reading, also behind links.
+/// Opens a regular file for reading; links are followed.
 ///
 /// # Errors
-/// What the system says; a folder, pipe, socket or device, which is refused before it is opened: opening a pipe waits
-/// for a writer, and opening a device may have effects.
+/// Errors of the operating system; a folder, pipe, socket or device, which is refused before it is opened: opening a
+/// pipe waits for a writer, and opening a device may have effects.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     require_regular(&fs::metadata(path)?)?;
     let file = File::open(path)?;
-    // The name may have been given to something else meanwhile.
+    // The name may refer to another file by now.
     require_regular(&file.metadata()?)?;
     Ok(file)
 }
@@ -37,14 +37,14 @@ fn require_regular(metadata: &fs::Metadata) -> io::Result<()> {
 /// As [`open_regular`]; too little memory.
 pub fn read_within(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
     let file = open_regular(path)?;
-    // Room for all of it at once: a compiled model may have hundreds of megabytes.
+    // Memory for all of it at once: a compiled model may have hundreds of megabytes.
     let announced = file.metadata()?.len();
     if announced > limit {
         return Ok(None);
     }
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(usize::try_from(announced).unwrap_or(usize::MAX))?;
-    // A file that grows meanwhile is counted as it is read, and one of a pseudo file system announces nothing.
+    // A file may grow while it is read, and a pseudo file system announces no sizes.
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= limit))
 }
@@ -52,9 +52,9 @@ pub fn read_within(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
 /// Writes a file under a new temporary name in the same folder and renames it.
 ///
 /// # Errors
-/// What the system says. The file that was there before is then still there, and nothing else is left.
+/// Errors of the operating system. An existing file is then unchanged, and no temporary file is left.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let (temporary, mut file) = Temporary::create_beside(path)?;
+    let (temporary, mut file) = Temporary::create_next_to(path)?;
     file.write_all(bytes)?;
     file.sync_all()?;
     // Closed before it is renamed: Windows does not rename open files.
@@ -62,14 +62,14 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     temporary.rename_to(path)
 }
 
-/// A new file that is removed unless it is renamed.
+/// A new file that is removed when dropped unless it was renamed.
 pub(crate) struct Temporary {
     path: Option<PathBuf>,
 }
 
 impl Temporary {
-    /// Creates a file that did not exist, in the folder of `target`. A link of that name is not followed.
-    pub(crate) fn create_beside(target: &Path) -> io::Result<(Self, File)> {
+    /// Creates a new file in the folder of `target`. An existing link of that name is not followed.
+    pub(crate) fn create_next_to(target: &Path) -> io::Result<(Self, File)> {
         // Process and counter make the name unique, so that no two writers share a temporary file.
         static COUNTER: AtomicU32 = AtomicU32::new(0);
         loop {
@@ -80,14 +80,14 @@ impl Temporary {
             let path = target.with_file_name(name);
             match OpenOptions::new().write(true).create_new(true).open(&path) {
                 Ok(file) => return Ok((Self { path: Some(path) }, file)),
-                // Left by a killed process that had this number: in containers numbers are reused soon.
+                // Left by a killed process with this id: in containers ids are reused soon.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists && serial < u32::MAX => {}
                 Err(error) => return Err(error),
             }
         }
     }
 
-    /// Gives the file its name, replacing what had it.
+    /// Renames the file, replacing an existing one.
     pub(crate) fn rename_to(mut self, target: &Path) -> io::Result<()> {
         if let Some(path) = &self.path {
             fs::rename(path, target)?;
@@ -100,7 +100,7 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if let Some(path) = &self.path {
-            // A failure here changes nothing: the cause has been reported already.
+            // Ignored: the cause has been reported already.
             let _ = fs::remove_file(path);
         }
     }
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_whole_and_nothing_else_is_left() {
+    fn a_file_is_replaced_and_no_other_is_left() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.rfm");
         write_whole(&path, b"first").unwrap();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_leaves_nothing() {
+    fn a_failed_write_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let taken = folder.path().join("taken");
         fs::create_dir(&taken).unwrap();
@@ -145,7 +145,7 @@ mod tests {
         use std::os::unix::fs::symlink;
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe");
-        // No writer ever comes: opening it for reading would wait for ever.
+        // There is never a writer: opening the pipe for reading would block permanently.
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
         for (target, words) in
@@ -167,7 +167,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (path, victim) = (folder.path().join("a.csv"), folder.path().join("victim"));
         fs::write(&victim, "precious").unwrap();
-        // Other tests of this process may count on meanwhile, so every name that may come next is taken.
+        // Other tests of this process may advance the counter, so every name that may come next is taken.
         for serial in 0..500 {
             let name = format!(".a.csv.{}-{serial}.partial", std::process::id());
             std::os::unix::fs::symlink(&victim, folder.path().join(name)).unwrap();

@@ -11,12 +11,12 @@ use glam::{DMat3, DVec3, Vec3};
 use crate::bvh::WideNode;
 use crate::camera::PinholeRays;
 use crate::cancel::{IsCancelled, go_on, never};
-use crate::compile::{CompileError, CompiledScene, Features, Item, Items, orientation, transformed_bounds};
+use crate::compile::{CompileError, CompiledScene, Item, Items, orientation, transformed_bounds};
 use crate::light::EyeLight;
 use crate::mesh::CompiledMesh;
 use crate::plane::EyePlane;
 use crate::render::TILE_SIZE;
-use crate::scene::{Camera, FrameView, Light, Model, NormalMode, Quality, Scene, TextureMap};
+use crate::scene::{Camera, FrameView, Light, Model, NormalMode, Quality, Scene, SceneFeatures, TextureMap};
 use crate::simd::{self, Level};
 use crate::sphere::EyeSphere;
 use crate::texture::Texture;
@@ -53,7 +53,7 @@ pub struct PreparedFrame {
     pub(crate) lights: Vec<EyeLight>,
     /// The scene's tree, with the boxes of this frame.
     pub(crate) nodes: Vec<WideNode>,
-    pub(crate) features: Features,
+    pub(crate) features: SceneFeatures,
     /// Which lanes it is traced with.
     pub(crate) level: Level,
 }
@@ -152,7 +152,7 @@ impl PreparedFrame {
             coarsest,
             lights: lights(source, &view.quality, &to_eye, unit),
             nodes: Vec::new(),
-            features: Features::of(source).at(&view.quality),
+            features: scene.features().at(&view.quality),
             level: simd::best(),
             scene,
         };

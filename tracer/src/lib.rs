@@ -2,7 +2,8 @@
 //!
 //! The pipeline, in the order of the data:
 //!
-//! ```
+#![cfg_attr(feature = "import", doc = "```")]
+#![cfg_attr(not(feature = "import"), doc = "```ignore")]
 //! use std::sync::Arc;
 //! use rayfarm_tracer::{CompiledScene, PreparedFrame, image, render_rows, scene};
 //!
@@ -25,6 +26,9 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Features, all of them enabled by default: `import` loads scene files and models, `pictures` decodes and saves picture files.
+//! Without both, the crate renders a [`scene::Scene`] with compiled meshes and textures.
 
 mod bvh;
 mod camera;
@@ -35,11 +39,13 @@ pub mod files;
 mod frame;
 pub mod image;
 mod light;
+mod material;
 pub mod mesh;
 pub mod numerics;
 mod plane;
 pub mod reference;
 mod render;
+pub mod rotation;
 pub mod scene;
 mod shade;
 mod simd;
@@ -53,7 +59,7 @@ mod triangle;
 
 pub use camera::Basis;
 pub use cancel::{Cancelled, IsCancelled};
-pub use compile::{CompileError, CompiledScene, Features};
+pub use compile::{CompileError, CompiledScene};
 pub use frame::{PreparedFrame, tile_rows};
 pub use render::{RayCounts, TILE_SIZE, render_rows, render_rows_watched};
 pub use simd::best_name as simd_level;

@@ -1,10 +1,9 @@
-//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] one colour, exactly rounded; [`encode_lanes`] sixteen colours at
-//! once by a polynomial, exact but within 10^-4 of a step of a threshold. Pictures take the
+//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] rounds one colour exactly; `encode_lanes` encodes sixteen
+//! colours at once by a polynomial, exactly except within 10^-4 of a step around a threshold. Pictures use the
 //! second, the oracle and its tests the first.
 //!
-//! 255 thresholds, computed once in `f64`, say where one code ends and the next begins. A table over the leading bits
-//! of the number finds the first candidate; a comparison or two does the rest. No libm in the per-pixel path, so all
-//! machines agree.
+//! 255 thresholds, computed once in `f64`, separate the codes. A table over the leading bits of the number gives the
+//! first candidate, and a comparison or two the code. No libm function is called per pixel, so all machines agree.
 
 use std::sync::LazyLock;
 
@@ -14,16 +13,16 @@ use crate::simd::math::srgb255;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Bytes, Lanes, Simd, SimdBase, SimdFloat, f32x16, select, splat, three, u8x64};
 
-/// Bits of an `f32` below those that index the table: 8 bits of exponent and 6 of mantissa stay.
+/// Number of low bits of an `f32` that the table ignores: 8 bits of exponent and 6 of mantissa remain.
 const SHIFT: u32 = 17;
 
-/// The table ends at the number 1.0.
+/// Index of the last entry of the table, for the number 1.0.
 const ONE_INDEX: usize = (1.0_f32.to_bits() >> SHIFT) as usize;
 
 struct Encoder {
-    /// `thresholds[i]`: the least number that encodes to i + 1.
+    /// `thresholds[i]`: the smallest number that encodes to i + 1.
     thresholds: [f32; 255],
-    /// Code of the least number of each bucket.
+    /// Code of the smallest number of each bucket.
     first_code: [u8; ONE_INDEX + 1],
 }
 
@@ -39,9 +38,9 @@ pub fn encode(color: Vec3) -> [u8; 3] {
 /// RGB8 of four rows of four pixels: row i in the twelve bytes from 16 i on.
 pub(crate) type Encoded = [u8; 64];
 
-/// Encodes sixteen linear colours; values outside [0, 1] are clamped, NaN becomes 0. By a polynomial: a value within 10^-4
-/// of a step of a threshold may fall on its other side. `offsets` in steps, less than half of one, are added before a value
-/// is rounded.
+/// Encodes sixteen linear colours; values outside [0, 1] are clamped, NaN becomes 0. A value within 10^-4 of a step
+/// around a threshold may get the neighbouring code. `offsets`, in steps and below half a step, are added before
+/// rounding.
 #[inline(always)]
 pub(crate) fn encode_lanes<S: Simd>(simd: S, color: Vec3x16<S>, offsets: Option<&Lanes>) -> Encoded {
     let mut steps = three!(channel => unrounded(simd, color.0[channel]));
@@ -55,7 +54,7 @@ pub(crate) fn encode_lanes<S: Simd>(simd: S, color: Vec3x16<S>, offsets: Option<
     simd.swizzle_dyn_within_blocks_u8x64(pixels.to_bytes(), without_fourth).to_array()
 }
 
-/// In each sixteen bytes: four times three of four.
+/// Source index of each byte: in each group of sixteen, three of four bytes, four times.
 const WITHOUT_FOURTH: [u8; 64] = {
     let mut from = [0; 64];
     let mut to = 0;
@@ -67,7 +66,7 @@ const WITHOUT_FOURTH: [u8; 64] = {
     from
 };
 
-/// What [`encode_lanes`] rounds: in steps of the encoding, from 0 to 255.
+/// The values that [`encode_lanes`] rounds, in steps of the encoding, from 0 to 255.
 #[inline(always)]
 pub(crate) fn unrounded<S: Simd>(simd: S, linear: f32x16<S>) -> f32x16<S> {
     let zero = splat(simd, 0.0);
@@ -76,14 +75,14 @@ pub(crate) fn unrounded<S: Simd>(simd: S, linear: f32x16<S>) -> f32x16<S> {
     srgb255(simd, positive.min(splat(simd, 1.0)))
 }
 
-/// The linear values of all 8-bit sRGB codes: textures are made of them.
+/// Linear values of all 8-bit sRGB codes, for texels.
 pub(crate) fn decoded() -> &'static [f32; 256] {
     static DECODED: LazyLock<[f32; 256]> =
         LazyLock::new(|| std::array::from_fn(|code| decode(code as u8) as f32));
     &DECODED
 }
 
-/// The linear value, 0..1, of an 8-bit sRGB code.
+/// Linear value, 0..1, of an 8-bit sRGB code.
 pub fn decode(code: u8) -> f64 {
     decode_unit(f64::from(code) / 255.0)
 }
@@ -134,14 +133,14 @@ mod tests {
     }
 
     #[test]
-    fn every_code_comes_back() {
+    fn every_code_round_trips() {
         for code in 0..=255 {
             assert_eq!(encode(Vec3::splat(decode(code) as f32)), [code; 3]);
         }
     }
 
     #[test]
-    fn it_rounds_as_the_formula_does() {
+    fn codes_match_the_formula() {
         for i in 0..200_000 {
             let linear = i as f32 / 199_999.0;
             let exact = by_formula(f64::from(linear));
@@ -152,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_clamped() {
+    fn values_out_of_range_are_clamped() {
         let odd = [f32::NAN, -1.0, f32::NEG_INFINITY, 1.0, 7.0, f32::INFINITY, 1e-40, 0.0];
         let codes = odd.map(|value| encode(Vec3::splat(value))[0]);
         assert_eq!(codes, [0, 0, 0, 255, 255, 255, 0, 0]);

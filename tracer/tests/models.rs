@@ -1,4 +1,4 @@
-//! The scenes that come with the project: they load, they are what their README says, and the generator makes them.
+//! The scenes of the project: they load, match their README, and are the output of the generator.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -82,7 +82,7 @@ fn the_generator_writes_exactly_the_files_in_the_repository() {
         assert!(is_the_same, "{} is not what the generator writes: run it again", path.display());
         assert_eq!(file.triangles > 0, file.path.ends_with(".obj"), "{}", file.path);
     }
-    // The picture beside the scenes shows one of them.
+    // The picture next to the scenes shows one of them.
     let is_generated = |path: &PathBuf| {
         path.extension().is_some_and(|e| e == "obj" || e == "mtl" || e == "png")
             && !path.ends_with("room.png")

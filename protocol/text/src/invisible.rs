@@ -1,8 +1,8 @@
-//! Characters that leave no mark of their own, from the tables of Unicode 16.
+//! Invisible characters, from the tables of Unicode 16.
 
 use std::ops::RangeInclusive;
 
-/// In ascending order.
+/// Ranges in ascending order.
 const INVISIBLE: [RangeInclusive<u32>; 25] = [
     0xad..=0xad,       // soft hyphen
     0x34f..=0x34f,     // combining grapheme joiner
@@ -31,7 +31,7 @@ const INVISIBLE: [RangeInclusive<u32>; 25] = [
     0x4fffe..=0x10ffff, // planes without characters, tags, more variation selectors, private use
 ];
 
-/// Whether a character is blank, or is there for its effect on others. Ordinary blanks are not among them.
+/// Whether a character is invisible, or only affects others. Ordinary blanks are not included.
 pub(crate) fn is_invisible(c: char) -> bool {
     let code = u32::from(c);
     let at = INVISIBLE.partition_point(|range| *range.end() < code);

@@ -1,8 +1,8 @@
-//! Foreign text, made fit for logs, terminals and windows.
+//! Escaping of untrusted text for logs, terminals and windows.
 //!
-//! Names, reasons and errors of peers, and keys, words and names of files are printed. [`printable`] escapes what
-//! would move a cursor, forge a line, hide, reorder its neighbours or pile up; [`printable_within`] bounds the length
-//! as well. All other text stays as it is, in every script.
+//! Names, reasons and errors of peers, and keys, words and names of files are printed. [`printable`] escapes
+//! characters that move a cursor, forge a line, are invisible, reorder their neighbours or pile up;
+//! [`printable_within`] limits the length as well. All other text is unchanged, in every script.
 
 mod invisible;
 
@@ -13,19 +13,19 @@ use unicode_width::UnicodeWidthChar;
 
 use invisible::is_invisible;
 
-/// Marks that may be on one character: no language has more.
+/// Largest number of marks on one character: no language uses more.
 const MAX_MARKS: usize = 4;
-/// Shown in place of text without a character.
+/// Substitute for text without a character.
 const EMPTY: &str = "(empty)";
-/// Shown in place of text that is all blanks.
+/// Substitute for text of blanks.
 const BLANK: &str = "(blank)";
-/// The end of a text that was cut.
+/// Ending of truncated text.
 const CUT: &str = "…";
 
-/// The text with all characters escaped, as in `\n` or `\u{202e}`, that cannot be seen or act on others: control
-/// characters, separators of lines and paragraphs, bidirectional and zero-width characters, tags, variation selectors,
-/// private use, and marks beyond the fourth on one character. Text without any visible character becomes `(empty)` or
-/// `(blank)`, so the result is never empty. Printing a result again changes nothing.
+/// The text with escapes, such as `\n` or `\u{202e}`, for all characters that are invisible or affect others: control
+/// characters, separators of lines and paragraphs, bidirectional and zero-width characters, tags, variation
+/// selectors, private use, and marks beyond the fourth on one character. Text without any visible character becomes
+/// `(empty)` or `(blank)`, so the result is never empty. The function is idempotent.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if text.is_empty() {
         return Cow::Borrowed(EMPTY);
@@ -43,9 +43,9 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// As [`printable`], in at most `max_bytes` bytes. A text that is longer ends in `…`; no escape is cut in two.
+/// The text as from [`printable`], truncated to `max_bytes` bytes. Truncated text ends in `…`; no escape is split.
 pub fn printable_within(text: &str, max_bytes: usize) -> Cow<'_, str> {
-    // What lies far beyond the bound is not looked at: a printed character has no fewer bytes than the original.
+    // The text far beyond the limit is not processed: a printed character has no fewer bytes than the original.
     let head = cut(text, max_bytes.saturating_add(CUT.len()).max(EMPTY.len()));
     let shown = printable(head);
     if shown.len() <= max_bytes && (head.len() == text.len() || shown == BLANK) {
@@ -66,7 +66,7 @@ pub fn printable_within(text: &str, max_bytes: usize) -> Cow<'_, str> {
     Cow::Owned(kept)
 }
 
-/// The longest beginning of at most `max_bytes` bytes that ends between two characters.
+/// The longest prefix of at most `max_bytes` bytes that ends at a character boundary.
 pub fn cut(text: &str, max_bytes: usize) -> &str {
     let mut end = text.len().min(max_bytes);
     while !text.is_char_boundary(end) {
@@ -75,13 +75,13 @@ pub fn cut(text: &str, max_bytes: usize) -> &str {
     text.get(..end).unwrap_or_default()
 }
 
-/// Each character with its place and whether it is escaped.
+/// Each character with its offset and whether it is escaped.
 fn escapes(text: &str) -> impl Iterator<Item = (usize, char, bool)> {
-    // A mark at the beginning would be put on whatever is printed before the text.
+    // A mark at the beginning would combine with the last character before the text.
     let mut marks = MAX_MARKS;
     text.char_indices().map(move |(at, c)| {
         if is_unprintable(c) {
-            // What follows an escape would be put on its last character.
+            // A mark behind an escape would combine with the escape's last character.
             marks = MAX_MARKS;
             return (at, c, true);
         }
@@ -107,7 +107,7 @@ fn push(shown: &mut String, c: char, escaped: bool) {
         (true, '\r') => shown.push_str("\\r"),
         (true, '\t') => shown.push_str("\\t"),
         (true, c) => {
-            // A string takes everything.
+            // Writing to a string cannot fail.
             let _ = write!(shown, "\\u{{{:x}}}", u32::from(c));
         }
     }

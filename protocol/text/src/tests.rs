@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 
 #[test]
-fn ordinary_text_stays_as_it_is_in_every_script() {
+fn ordinary_text_is_unchanged_in_every_script() {
     for text in ["mill-3", "Küche 2", "작업자", "σκηνή", "мельница", "厨房", "a\\b", "ไม้", "Việt", "שָׁלוֹם"]
     {
         assert!(
@@ -20,7 +20,7 @@ fn ordinary_text_stays_as_it_is_in_every_script() {
 }
 
 #[test]
-fn what_acts_on_other_text_is_escaped() {
+fn characters_that_affect_others_are_escaped() {
     for (text, shown) in [
         ("a\x1b[2Jb\nc", "a\\u{1b}[2Jb\\nc"),
         ("\r\t\0\x7f\u{85}", "\\r\\t\\u{0}\\u{7f}\\u{85}"),
@@ -36,7 +36,7 @@ fn what_acts_on_other_text_is_escaped() {
 }
 
 #[test]
-fn marks_pile_up_to_four_and_never_on_what_was_printed_before() {
+fn marks_are_limited_to_four_and_never_first() {
     let piled = format!("a{}b", "\u{301}".repeat(6));
     assert_eq!(printable(&piled), format!("a{}\\u{{301}}\\u{{301}}b", "\u{301}".repeat(4)));
     assert_eq!(printable("\u{301}a"), "\\u{301}a");
@@ -45,7 +45,7 @@ fn marks_pile_up_to_four_and_never_on_what_was_printed_before() {
 }
 
 #[test]
-fn nothing_becomes_something() {
+fn invisible_text_has_a_substitute() {
     assert_eq!(printable(""), "(empty)");
     assert_eq!(printable(" \u{a0}\u{3000}"), "(blank)");
     assert_eq!(printable("\n"), "\\n");

@@ -1,4 +1,4 @@
-//! Scenes to measure, and frames of them on a number of threads.
+//! Scenes to measure, and their frames on a number of threads.
 #![allow(dead_code, reason = "every benchmark uses its own share of this")]
 
 mod ring;
@@ -12,7 +12,7 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts, TILE_SIZE, render_
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Folder of scenes to measure besides those of the project; `../shared/workloads` beside the repository if not set.
+/// Environment variable with the folder of further scenes; `../shared/workloads` next to the repository if not set.
 const WORKLOADS: &str = "RAYFARM_WORKLOADS";
 
 /// A scene to measure.
@@ -21,7 +21,7 @@ pub(crate) struct Workload {
     path: PathBuf,
 }
 
-/// The project's own scenes, and the workloads where they are at hand.
+/// The project's own scenes, and the workloads if available.
 pub(crate) fn workloads() -> Vec<Workload> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let others = std::env::var_os(WORKLOADS).map_or_else(|| root.join("../shared/workloads"), PathBuf::from);
@@ -35,7 +35,7 @@ pub(crate) fn workloads() -> Vec<Workload> {
 }
 
 impl Workload {
-    /// Reads it, and compiles what it shows.
+    /// Loads and compiles a scene.
     pub(crate) fn load(&self) -> (Arc<CompiledScene>, FrameView) {
         let loaded = match scene::load(&self.path) {
             Ok(loaded) => loaded,
@@ -60,7 +60,7 @@ pub(crate) fn prepare(scene: &Arc<CompiledScene>, view: &FrameView) -> PreparedF
     }
 }
 
-/// Nothing can be measured: says why.
+/// Ends the benchmark with a message, because nothing can be measured.
 pub(crate) fn stop(error: &dyn std::error::Error) -> ! {
     eprintln!("{error}");
     std::process::exit(1);
@@ -73,18 +73,18 @@ pub(crate) fn pool(threads: usize) -> ThreadPool {
     }
 }
 
-/// Room for the bytes of a frame.
+/// A buffer for the bytes of a frame.
 pub(crate) fn room_for(frame: &PreparedFrame) -> Vec<u8> {
     vec![0; frame.width() as usize * frame.height() as usize * 3]
 }
 
-/// A whole frame in bands of rows, on the threads of a pool.
+/// Renders a whole frame in bands of rows, on the threads of a pool.
 pub(crate) fn render(pool: &ThreadPool, frame: &PreparedFrame, pixels: &mut [u8]) -> RayCounts {
     let row_bytes = frame.width() as usize * 3;
     let render_band = |(band, pixels): (usize, &mut [u8])| {
         let top = band as u32 * TILE_SIZE;
         let rows = top..top + (pixels.len() / row_bytes) as u32;
-        // Nothing cancels it.
+        // Never cancelled.
         render_rows(frame, rows, pixels, &|| false).unwrap_or_default()
     };
     let bands = pixels.par_chunks_mut(row_bytes * TILE_SIZE as usize).enumerate();
@@ -96,7 +96,7 @@ fn sum(mut a: RayCounts, b: RayCounts) -> RayCounts {
     a
 }
 
-/// All rays of a frame.
+/// Number of all rays of a frame.
 pub(crate) fn rays(counts: RayCounts) -> u64 {
     counts.primary + counts.shadow + counts.secondary
 }

@@ -1,4 +1,4 @@
-//! A mesh made of nothing: rings around the Y axis whose skin has waves in both directions.
+//! A generated mesh: rings around the Y axis with waves in both directions.
 
 use std::f64::consts::TAU;
 
@@ -7,10 +7,10 @@ use rayfarm_tracer::mesh::{Mesh, NamedMaterial};
 use rayfarm_tracer::scene::Material;
 use rayfarm_tracer::texture::without_repeats;
 
-/// Waves around the ring; its texture repeats as often.
+/// Number of waves around the ring, and of repeats of its texture.
 pub(crate) const WAVES: u32 = 9;
 
-/// Rings of 2 * `steps`^2 triangles each, the outer radius about one.
+/// Rings of 2 * `steps`^2 triangles each, with an outer radius of about one.
 pub(crate) fn mesh(steps: u32, centers: &[DVec3]) -> Mesh {
     let mut mesh = Mesh::default();
     for &center in centers {
@@ -41,7 +41,7 @@ fn share(index: u32, steps: u32) -> f64 {
     f64::from(index) / f64::from(steps)
 }
 
-/// Where the skin is, `around` the axis and `across` the ring, in radians.
+/// Position on the surface, `around` the axis and `across` the ring, in radians.
 fn point(around: f64, across: f64) -> DVec3 {
     let waves = libm::sin(f64::from(WAVES) * around + 2.0 * across) + libm::sin(7.0 * across);
     let thickness = 0.3 + 0.02 * waves;

@@ -1,6 +1,7 @@
-//! One scene with and without each feature: what is asked for costs, what is not asked for must not.
+//! One scene with and without each feature: used features have a cost, unused features must have none.
 //!
-//! A ring of 100,352 uneven triangles over a floor of two. They fill the picture, so that every ray hits something.
+//! The scene is a ring of 100,352 uneven triangles over a floor of two. They fill the picture, so that every ray hits
+//! something.
 
 use std::sync::Arc;
 
@@ -20,13 +21,13 @@ use super::{compile, prepare, stop};
 /// A scene of the comparison.
 pub(crate) struct Variant {
     pub(crate) name: &'static str,
-    /// The variant that it differs from in one thing; the first has none.
-    pub(crate) beside: &'static str,
+    /// The variant that differs in one property; `None` for the first one.
+    pub(crate) baseline: &'static str,
     change: fn(&mut Setting),
 }
 
-const fn variant(name: &'static str, beside: &'static str, change: fn(&mut Setting)) -> Variant {
-    Variant { name, beside, change }
+const fn variant(name: &'static str, baseline: &'static str, change: fn(&mut Setting)) -> Variant {
+    Variant { name, baseline, change }
 }
 
 const PLAIN: &str = "ambient term only";
@@ -34,7 +35,7 @@ const ONE: &str = "one light";
 const SHADOWS: &str = "one light with shadows";
 const FOUR: &str = "four rings in one mesh";
 
-/// All of them, each after the one that it stands beside. The last five ask for nothing that they show.
+/// All variants, each after the one with which it is compared. The last five have features that no pixel uses.
 pub(crate) const VARIANTS: [Variant; 17] = [
     variant(PLAIN, "", |_| {}),
     variant(ONE, PLAIN, |to| to.light([-2.0, 5.0, 2.5], false)),
@@ -97,17 +98,17 @@ const LIGHT: Light = Light {
     shadows: true,
 };
 
-/// What stands on the floor: as many triangles in each case.
+/// Geometry on the floor, with the same number of triangles in each case.
 #[derive(Clone, Copy)]
 enum Rings {
     One,
-    /// Its mesh has neither normals nor texture coordinates.
+    /// One ring whose mesh has neither normals nor texture coordinates.
     OneBare,
     FourInOneMesh,
     FourInstances,
 }
 
-/// A variant while it is being made.
+/// A variant under construction.
 struct Setting {
     scene: Scene,
     textures: Vec<Arc<Texture>>,
@@ -116,7 +117,7 @@ struct Setting {
 }
 
 impl Variant {
-    /// Ready to be rendered, at a size in pixels.
+    /// The finished scene, for a size in pixels.
     pub(crate) fn prepare(&self, width: u32, height: u32) -> PreparedFrame {
         let mut setting = Setting {
             scene: ambient_only(width, height),
@@ -155,7 +156,7 @@ impl Setting {
         self.lit_and_worn(|material| material.texture = Some(0));
     }
 
-    /// 512 x 512 texels: 1 MB, more than fits beside the rest in the nearest caches.
+    /// 512 x 512 texels: 1 MB, more than fits into the first-level cache.
     fn picture(&mut self, filter: Filter) {
         let mut picture = RgbImage::new(512, 512);
         for (index, byte) in picture.pixels.iter_mut().enumerate() {
@@ -209,7 +210,7 @@ impl Setting {
     }
 }
 
-/// Centres of four rings, in the space of a ring.
+/// Centres of four rings, in units of a ring.
 const PLACES: [DVec3; 4] = [
     DVec3::new(-1.2, 0.0, -1.2),
     DVec3::new(1.2, 0.0, -1.2),
@@ -217,7 +218,7 @@ const PLACES: [DVec3; 4] = [
     DVec3::new(1.2, 0.0, 1.2),
 ];
 
-/// The floor, and a camera that sees nothing beside it.
+/// The floor, and a camera that sees only it.
 fn ambient_only(width: u32, height: u32) -> Scene {
     let (far, repeats) = (40.0, 40.0 * WAVES as f32);
     let at = |x: f64, z: f64| (DVec3::new(x * far, -0.5, z * far), glam::vec2(x as f32, z as f32) * repeats);

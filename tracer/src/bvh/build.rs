@@ -1,4 +1,5 @@
-//! Builds trees: clusters of boxes (`cluster.rs`), whose nodes move to better places (`reinsert.rs`), laid out depth first.
+//! Building of binary trees: boxes are clustered (`cluster.rs`), nodes reinserted (`reinsert.rs`), and the tree laid
+//! out depth first.
 
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
@@ -11,33 +12,33 @@ use super::wide::{WideTree, widen, widen_evenly};
 use super::{Child, MAX_DEPTH, MAX_WIDE_DEPTH, Node};
 use crate::cancel::{Cancelled, IsCancelled, go_on};
 
-/// A tree, and the order that it wants its primitives in.
+/// A binary tree, and the order of its primitives in the leaves.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree {
     /// Nodes, the root first, children after their parents.
     pub nodes: Vec<Node>,
-    /// For each position in the leaves, the primitive that belongs there.
+    /// The primitive at each position of the leaves.
     pub order: Vec<u32>,
-    /// Most nodes on the way from the root to a leaf.
+    /// Number of edges on the longest path from the root to a leaf.
     pub depth: u32,
 }
 
-/// How much time the builder may take.
+/// Effort of building a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BuildQuality {
-    /// As soon as possible: for meshes that are traced a few times.
+    /// Fast, for meshes that are traced a few times.
     Fast,
-    /// Where more time would gain little.
+    /// The point beyond which more effort gains little.
     #[default]
     Default,
-    /// Several times as long as the default, for meshes that are compiled once and traced often.
+    /// Several times the effort of the default, for meshes that are compiled once and traced often.
     High,
 }
 
-/// What a builder does for a quality.
+/// Parameters of a build.
 pub(super) struct Effort {
     pub clustering: Clustering,
-    /// Shares of the nodes: see [`improve`].
+    /// Shares of the nodes that each series of passes tries: see [`improve`].
     pub reinsertion: &'static [f32],
 }
 
@@ -54,13 +55,13 @@ impl BuildQuality {
     }
 }
 
-/// Leaves of the median build.
+/// Primitives per leaf of the median build.
 const MEDIAN_LEAF: usize = 4;
 
-/// Builds a tree over boxes (least and greatest corner; finite, within 1e15). No boxes: a root with nothing in it.
+/// Builds a tree over boxes (lower and upper corner; finite, within 1e15). Without boxes it is an empty root.
 ///
-/// The time is O(n log n). Where the surface area heuristic ends deeper than [`MAX_DEPTH`] (boxes that double in size),
-/// the tree is built by the median instead, whose depth is logarithmic whatever the boxes are.
+/// The time is O(n log n). Where the surface area heuristic results in a tree deeper than [`MAX_DEPTH`] (boxes that
+/// double in size), the tree is built by the median, whose depth is logarithmic for all boxes.
 pub(super) fn build(
     boxes: &[Bounds],
     quality: BuildQuality,
@@ -76,11 +77,11 @@ pub(super) fn build(
     Ok(lay_out(&source).unwrap_or_else(|| median(boxes)))
 }
 
-/// Builds a tree of sixteen children a node, and at most `leaf` primitives a leaf, most of them full. Where it ends deeper
-/// than [`MAX_WIDE_DEPTH`], by the median, as [`build`].
+/// Builds a tree of sixteen children per node, with at most `leaf` primitives per leaf, most leaves full. Where it is
+/// deeper than [`MAX_WIDE_DEPTH`], it is built by the median, as in [`build`].
 ///
 /// # Errors
-/// [`Cancelled`]: the question is asked between the steps, each a fraction of the whole.
+/// [`Cancelled`]: `cancelled` is polled between steps, each a fraction of the work.
 pub(crate) fn build_wide(
     boxes: &[Bounds],
     leaf: usize,
@@ -88,7 +89,7 @@ pub(crate) fn build_wide(
     cancelled: &IsCancelled<'_>,
 ) -> Result<WideTree, Cancelled> {
     let tree = build(boxes, quality, cancelled)?;
-    // Single primitives fill their leaves anyway.
+    // Leaves of single primitives are always full.
     let tree = if leaf > 1 { fill(&tree, boxes, leaf, cancelled)? } else { tree };
     go_on(cancelled)?;
     let wide = widen(&tree, leaf);
@@ -96,12 +97,12 @@ pub(crate) fn build_wide(
 }
 
 impl Tree {
-    /// Room for so many nodes.
+    /// An empty tree with room for `capacity` nodes and primitives.
     pub(super) fn new(capacity: usize) -> Self {
         Self { nodes: Vec::with_capacity(capacity), order: Vec::with_capacity(capacity), depth: 1 }
     }
 
-    /// Adds a leaf's primitives and names them.
+    /// Adds a leaf's primitives and returns the child for it.
     pub(super) fn leaf(&mut self, primitives: impl IntoIterator<Item = u32>) -> Child {
         let first = self.order.len() as u32;
         self.order.extend(primitives);
@@ -109,7 +110,7 @@ impl Tree {
     }
 }
 
-/// Copies a tree of `obvhs` in depth-first order. `None` if it is deeper than [`MAX_DEPTH`].
+/// Copies a tree of `obvhs` in depth-first order. `None` where it is deeper than [`MAX_DEPTH`].
 fn lay_out(source: &Bvh2) -> Option<Tree> {
     let mut tree = Tree::new(source.nodes.len() / 2 + 1);
     let bounds = |index: u32| {
@@ -141,7 +142,7 @@ fn lay_out(source: &Bvh2) -> Option<Tree> {
             let link = if is_leaf { tree.leaf(leaf_of(source, child)) } else { Child::Inner(0) };
             tree.nodes[own as usize].set(side, bounds(child), link);
         }
-        // The right side is pushed first, so that the left one follows its parent in memory.
+        // The right child is pushed first, so that the left one follows its parent in memory.
         for (side, child) in [(1, left + 1), (0, left)] {
             if !source.nodes[child as usize].is_leaf() {
                 pending.push((child, Some((own, side)), depth + 1));
@@ -157,7 +158,7 @@ fn leaf_of(source: &Bvh2, index: u32) -> impl Iterator<Item = u32> {
     source.primitive_indices[first..first + node.prim_count as usize].iter().copied()
 }
 
-/// Halves the boxes by the median of their centres along the widest axis, until few are left.
+/// Halves the boxes by the median of their centres along the widest axis, recursively, down to [`MEDIAN_LEAF`] boxes.
 fn median(boxes: &[Bounds]) -> Tree {
     let mut tree = Tree::new(boxes.len());
     let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -220,7 +221,8 @@ mod tests {
             .collect()
     }
 
-    /// Walks the whole tree: children come later, boxes hold what is below, leaves cover the order once.
+    /// Checks the whole tree: children follow their parents, boxes contain everything below, leaves cover the order
+    /// once.
     fn check(tree: &Tree, count: usize) {
         let mut covered = vec![0; count];
         let mut pending = vec![(0_u32, 1_u32)];
@@ -253,14 +255,14 @@ mod tests {
     }
 
     #[test]
-    fn every_primitive_stands_in_one_leaf() {
+    fn every_primitive_is_in_one_leaf() {
         for count in [1, 2, 3, 5, 100, 5000] {
             check(&build(&grid(count), BuildQuality::Default, &never).unwrap(), count);
         }
     }
 
     #[test]
-    fn twenty_thousand_boxes_in_one_place_stay_shallow() {
+    fn twenty_thousand_equal_boxes_give_a_shallow_tree() {
         let tree = build(&[(Vec3::ZERO, Vec3::ONE); 20_000], BuildQuality::Default, &never).unwrap();
         check(&tree, 20_000);
         assert!(tree.depth as usize <= MAX_DEPTH, "depth {}", tree.depth);

@@ -1,11 +1,11 @@
-//! Clusters of boxes that merge round by round until one is left: PLOC (Meister and Bittner 2018).
+//! Clustering of boxes that merge in rounds until one is left: PLOC (Meister and Bittner 2018).
 //!
-//! In a round each cluster chooses, of its neighbours along a Morton curve, the one with which it shares the smallest
-//! box. Two clusters that choose each other merge: of boxes at random places more than half do, so that a few rounds
-//! are enough. Of evenly spaced boxes (all choices of a cluster cost the same), of rows whose gaps grow, and of boxes
-//! inside each other only one pair may agree, and there would be as many rounds as boxes. In a round with fewer than
-//! one pair for [`SLOW`] clusters, choices that are not returned therefore count as well, and then clusters that are
-//! left are paired by their order. A round leaves at most 15 clusters of 16, so all of them together take O(n).
+//! In a round each cluster chooses, among its neighbours along a Morton curve, the one whose union with it has the
+//! smallest surface area. Two clusters that choose each other merge. Of boxes at random places more than half do, so
+//! that a few rounds are enough. Of evenly spaced boxes (all choices of a cluster cost the same), rows with growing
+//! gaps, and nested boxes only one pair may agree, and there would be as many rounds as boxes. Therefore, in a round
+//! with fewer than one pair for [`SLOW`] clusters, choices that are not mutual count as well, and the remaining
+//! clusters are paired in their order. A round leaves at most 15 of 16 clusters, so all rounds together take O(n).
 
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
@@ -15,44 +15,44 @@ use rayon::prelude::*;
 use super::divide::Bounds;
 use crate::cancel::{Cancelled, IsCancelled, go_on};
 
-/// A round is slow when it would merge fewer than one pair for this number of clusters.
+/// Number of clusters per pair below which a round is slow.
 const SLOW: usize = 16;
 
-/// A choice that is not returned counts where it costs at most this many times as much as the other cluster's own: a
-/// large triangle does not get a small one that has better neighbours.
+/// Largest cost of a choice that is not mutual, in multiples of the other cluster's own choice. It keeps a large
+/// triangle from merging with a small one that has better neighbours.
 const DEAR: f32 = 4.0;
 
-/// Clusters that one task of a round looks at.
+/// Clusters per task of a round.
 const CHUNK: usize = 4096;
 
 /// Marks a cluster without a partner.
 const ALONE: u32 = u32::MAX;
 
-/// How boxes are clustered.
+/// Parameters of clustering.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clustering {
-    /// Neighbours on each side that a cluster chooses from.
+    /// Neighbours on each side among which a cluster chooses.
     pub reach: usize,
-    /// The first rounds, in which it chooses from one on each side.
+    /// Number of first rounds with one neighbour on each side.
     pub short_rounds: u32,
-    /// Whether places on the curve have 42 bits for each axis instead of 21.
+    /// Whether positions on the curve have 42 bits per axis in place of 21.
     pub fine_order: bool,
 }
 
-/// What clustering took: figures for tests.
+/// Work of clustering, for tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Work {
-    /// Rounds.
+    /// Number of rounds.
     pub rounds: u32,
-    /// Clusters that rounds began with, in all.
+    /// Clusters at the beginnings of all rounds.
     pub clusters: u64,
 }
 
 impl Clustering {
-    /// A binary tree over boxes (at least one, all finite), with a box in each leaf.
+    /// A binary tree over boxes (at least one, all finite), with one box per leaf.
     ///
     /// # Errors
-    /// [`Cancelled`]: the question is asked before each round.
+    /// [`Cancelled`]: `cancelled` is polled before each round.
     pub(super) fn of(self, boxes: &[Bounds], cancelled: &IsCancelled<'_>) -> Result<(Bvh2, Work), Cancelled> {
         let mut tree = Bvh2::zeroed(boxes.len());
         tree.primitive_indices = (0..boxes.len() as u32).collect();
@@ -72,7 +72,7 @@ impl Clustering {
                 if partner == ALONE as usize {
                     merged.push(clusters[index]);
                 } else if partner < index {
-                    // Children are behind their parents, which are put in front of them later.
+                    // Children are stored behind their parents, which are prepended in later rounds.
                     free -= 2;
                     tree.nodes[free] = clusters[index];
                     tree.nodes[free + 1] = clusters[partner];
@@ -87,7 +87,7 @@ impl Clustering {
     }
 }
 
-/// A leaf for each box, along the curve; leaves in one place keep the order of the boxes.
+/// A leaf for each box, along the curve. Leaves at one position keep the order of the boxes.
 fn leaves_in_order(boxes: &[Bounds], fine: bool) -> Vec<Bvh2Node> {
     let all = boxes.iter().fold(Aabb::empty(), |mut all, &(lo, hi)| {
         all.extend(lo.into());
@@ -100,7 +100,7 @@ fn leaves_in_order(boxes: &[Bounds], fine: bool) -> Vec<Bvh2Node> {
         let (lo, hi) = boxes[index as usize];
         Aabb { min: lo.into(), max: hi.into() }
     };
-    // Where all is flat it is NaN, which becomes zero there.
+    // NaN where all boxes are in one plane; converted to zero there.
     let place = |index: u32| aabb(index).center().as_dvec3() * scale + offset;
     let order = if fine {
         in_order(boxes.len(), |index| morton_encode_u128_unorm(place(index)))
@@ -117,7 +117,7 @@ fn in_order<K: Ord + Copy + Send>(count: usize, key: impl Fn(u32) -> K + Sync) -
     keys.into_iter().map(|(_, index)| index).collect()
 }
 
-/// What clusters choose; kept from round to round.
+/// Choices of all clusters; the buffers are reused in all rounds.
 #[derive(Default)]
 struct Choices {
     chosen: Vec<u32>,
@@ -126,7 +126,7 @@ struct Choices {
 }
 
 impl Choices {
-    /// For each cluster the one that it merges with, or [`ALONE`]. Of more than one cluster, some merge.
+    /// The partner of each cluster, or [`ALONE`]. Of several clusters at least two get partners.
     fn partners(&mut self, clusters: &[Bvh2Node], reach: usize) -> &[u32] {
         let count = clusters.len();
         self.chosen.resize(count, ALONE);
@@ -169,7 +169,7 @@ impl Choices {
         &self.partners
     }
 
-    /// Pairs two clusters where both are free; how many pairs that is.
+    /// Pairs two clusters if neither has a partner. Returns the number of new pairs.
     fn pair(&mut self, a: usize, b: usize) -> usize {
         let free = |cluster: usize| self.partners.get(cluster) == Some(&ALONE);
         if a == b || !free(a) || !free(b) {
@@ -180,12 +180,12 @@ impl Choices {
     }
 }
 
-/// Chooses for the clusters from `first` on: of those with the smallest box in common the last.
+/// Choices of the clusters from `first` on: the last one of those with the smallest union.
 fn choose(clusters: &[Bvh2Node], reach: usize, first: usize, chosen: &mut [u32], costs: &mut [f32]) {
     costs.fill(f32::INFINITY);
     chosen.fill(ALONE);
     let end = first + chosen.len();
-    // Each pair is looked at once, or twice where it is in two chunks.
+    // Each pair is computed once, or twice where it spans two chunks.
     for index in first.saturating_sub(reach)..end {
         let own = clusters[index].aabb();
         let last = (index + reach + 1).min(clusters.len());

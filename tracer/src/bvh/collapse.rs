@@ -1,36 +1,37 @@
-//! Which nodes of a binary tree become the children of wide ones, so that a ray meets as few wide nodes as possible.
+//! Choice of the binary nodes that become children of wide nodes, such that a ray visits few wide nodes.
 //!
-//! Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017, section 3:
-//! the expected number of nodes is the sum of their surface areas, in shares of the root's. The least sum for a
-//! subtree that is to become at most i children is found from those of its halves, bottom up.
+//! Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017,
+//! section 3: the expected number of visited nodes is the sum of their surface areas, in shares of the root's.
+//! Dynamic programming from the leaves up finds the least sum for a subtree of at most i children from the sums of
+//! its halves.
 
 use super::wide::{WIDTH, half_area};
 use super::{Child, Tree};
 
-/// A node costs its area and this much, in shares of the root's area: where areas vanish, few nodes are still fewer.
+/// Constant cost per node, in shares of the root's area: it keeps the number of nodes small where areas vanish.
 const PER_NODE: f32 = 1e-6;
 
-/// What is best for one subtree.
+/// Optimum of one subtree.
 #[derive(Clone, Copy)]
 struct Best {
-    /// Least cost as at most i + 1 children.
+    /// Least cost with at most i + 1 children.
     cost: [f32; WIDTH],
-    /// How many of them the left half makes; 0 if one child less costs no more.
+    /// Number of children from the left half; 0 where one child fewer costs no more.
     left: [u8; WIDTH],
-    /// The same for the subtree's own children, should it become a node itself.
+    /// The same for the children of the subtree's root, if it becomes a wide node.
     own: u8,
 }
 
-/// The cheapest way to cut a binary tree.
+/// The cheapest cuts of a binary tree.
 pub(super) struct Collapse<'a> {
     tree: &'a Tree,
-    /// For each node of the tree its place in `best`, or `u32::MAX` for those that end in a leaf.
+    /// Position in `best` of each node of the tree; `u32::MAX` for nodes that are part of a leaf.
     place: Vec<u32>,
     best: Vec<Best>,
 }
 
 impl<'a> Collapse<'a> {
-    /// `is_leaf` tells which nodes become leaves; all below them do too.
+    /// Computes the cuts. `is_leaf` selects the nodes that become leaves, with everything below them.
     pub(super) fn new(tree: &'a Tree, is_leaf: impl Fn(u32) -> bool) -> Self {
         let mut place = vec![u32::MAX; tree.nodes.len()];
         let mut count = 0;
@@ -43,7 +44,7 @@ impl<'a> Collapse<'a> {
         let nothing = Best { cost: [0.0; WIDTH], left: [0; WIDTH], own: 0 };
         let mut collapse = Self { tree, place, best: vec![nothing; count as usize] };
         let per_node = (half_area(tree.nodes[0].bounds()) * PER_NODE).max(f32::MIN_POSITIVE);
-        // Children stand behind their parents.
+        // Children are stored behind their parents.
         for index in (0..tree.nodes.len()).rev() {
             if collapse.place[index] != u32::MAX {
                 let best = collapse.best_of(index, per_node);
@@ -78,7 +79,7 @@ impl<'a> Collapse<'a> {
         best
     }
 
-    /// Leaves are the same however the tree is cut: they cost nothing.
+    /// Costs of a child. Leaves are the same for all cuts, so they cost nothing.
     fn costs(&self, child: Child) -> [f32; WIDTH] {
         self.of(child).map_or([0.0; WIDTH], |best| best.cost)
     }
@@ -88,14 +89,14 @@ impl<'a> Collapse<'a> {
         self.best.get(self.place[index as usize] as usize)
     }
 
-    /// Calls `emit(node, side)` for each of the best children of a node that is no leaf: what hangs there becomes a child.
+    /// Calls `emit(node, side)` for each of the best children of an inner node; each emitted side becomes a child.
     pub(super) fn children(&self, node: u32, emit: &mut dyn FnMut(u32, usize)) {
         let left = self.of(Child::Inner(node)).map_or(1, |best| usize::from(best.own));
         self.cut(node, 0, left, emit);
         self.cut(node, 1, WIDTH - left, emit);
     }
 
-    /// What hangs on one side, as at most `count` children. Recursion is at most as deep as there are children.
+    /// Emits one side as at most `count` children. The recursion depth is at most the number of children.
     fn cut(&self, node: u32, side: usize, mut count: usize, emit: &mut dyn FnMut(u32, usize)) {
         let child = self.tree.nodes[node as usize].child(side);
         if let (Some(best), Child::Inner(inner)) = (self.of(child), child) {

@@ -1,8 +1,9 @@
-//! Some primitives, divided from above so that leaves come out full.
+//! Top-down division of some primitives into full leaves.
 //!
-//! Where to divide: a ray meets a box that is w by h in the picture by its area, w h. A tile with sides t meets it wherever it
-//! overlaps: (w + t) (h + t) = w h + t (w + h) + t^2. So what a box costs is its area, and its edges times the tile's. Of the
-//! places that leave full leaves (or full nodes) on one side, the one is taken where price times leaves is least.
+//! Cost: a ray meets a box of w by h in the picture in proportion to its area, w h. A tile with sides t meets it
+//! wherever they overlap: (w + t) (h + t) = w h + t (w + h) + t^2. So the cost of a box is its area plus its edges
+//! times the tile's side. Among the divisions with full leaves (or full nodes) on one side, the one with the least
+//! sum of cost times number of leaves is taken.
 
 use glam::Vec3;
 
@@ -10,21 +11,21 @@ use super::build::Tree;
 use super::wide::{WIDTH, half_area};
 use super::{Child, Node};
 
-/// Least and greatest corner.
+/// Lower and upper corner.
 pub(super) type Bounds = (Vec3, Vec3);
 
-/// Side of a tile, in shares of the mesh: of a mesh that fills a picture of sixty-four tiles.
+/// Side of a tile in shares of the mesh, for a mesh that fills a picture of sixty-four tiles.
 const TILE: f32 = 1.0 / 64.0;
 
-/// What it costs that a box is met now and then.
+/// Cost of boxes for tiles of one size.
 #[derive(Clone, Copy)]
 pub(super) struct Price {
-    /// Side of a tile.
+    /// Side of a tile, in units of the mesh.
     tile: f32,
 }
 
 impl Price {
-    /// Within the box of everything.
+    /// Tiles for a mesh with this bounding box.
     pub(super) fn within((lo, hi): Bounds) -> Self {
         Self { tile: (hi - lo).max_element() * TILE }
     }
@@ -34,22 +35,22 @@ impl Price {
     }
 }
 
-/// Some primitives being divided.
+/// The division of some primitives.
 pub(super) struct Division<'a> {
-    /// Of all primitives.
+    /// Boxes of all primitives.
     boxes: &'a [Bounds],
-    /// Primitives of a full leaf.
+    /// Primitives in a full leaf.
     leaf: usize,
     price: Price,
     tree: Tree,
-    /// Of the leaves.
+    /// Sum of the costs of all leaves.
     cost: f32,
-    /// Prices of the boxes around what stands behind each place.
+    /// Costs of the boxes around everything behind each position.
     behind: Vec<f32>,
 }
 
 impl<'a> Division<'a> {
-    /// The tree over some primitives, and the price of its leaves.
+    /// The tree over some primitives, and the cost of its leaves.
     pub(super) fn of(
         mut primitives: Vec<u32>,
         boxes: &'a [Bounds],
@@ -72,7 +73,7 @@ impl<'a> Division<'a> {
         (lo.min(other_lo), hi.max(other_hi))
     }
 
-    /// Divides more primitives than a leaf takes between the sides of a node.
+    /// Divides more primitives than a leaf has between the sides of a node.
     fn divide(&mut self, node: u32, primitives: &mut [u32], depth: u32) {
         self.tree.depth = self.tree.depth.max(depth);
         let at = self.arrange(primitives);
@@ -96,7 +97,7 @@ impl<'a> Division<'a> {
         self.tree.nodes[node as usize].set(side, bounds, child);
     }
 
-    /// Puts primitives in the order along the axis where dividing them costs least, and tells where that is.
+    /// Sorts primitives along the axis of the cheapest division, and returns the position of the division.
     fn arrange(&mut self, primitives: &mut [u32]) -> usize {
         let unit = unit_of(primitives.len(), self.leaf);
         let mut best: Option<(f32, usize, Vec<u32>)> = None;
@@ -112,7 +113,7 @@ impl<'a> Division<'a> {
         at
     }
 
-    /// By centre along an axis, then by number.
+    /// Primitives in the order of their centres along an axis, then of their indices.
     fn sorted(&self, primitives: &[u32], axis: usize) -> Vec<u32> {
         let key = |&primitive: &u32| {
             let (lo, hi) = self.boxes[primitive as usize];
@@ -123,7 +124,7 @@ impl<'a> Division<'a> {
         keys.into_iter().map(|key| key as u32).collect()
     }
 
-    /// Where to divide so that one side is made of full units, and the least sum of prices times leaves.
+    /// The cheapest division with full units on one side: the least sum of costs times leaves, and its position.
     fn cheapest(&mut self, sorted: &[u32], unit: usize) -> (f32, usize) {
         let Self { leaf, price, .. } = *self;
         let count = sorted.len();
@@ -151,7 +152,7 @@ impl<'a> Division<'a> {
 
 const EMPTY: Bounds = (Vec3::INFINITY, Vec3::NEG_INFINITY);
 
-/// Primitives of the largest full leaf, or full subtree of sixteen times as many, that is smaller than `count`.
+/// Primitives of the largest full leaf, or full subtree of a power of sixteen leaves, with fewer than `count`.
 fn unit_of(count: usize, leaf: usize) -> usize {
     let mut unit = leaf;
     while unit * WIDTH < count {
@@ -160,7 +161,7 @@ fn unit_of(count: usize, leaf: usize) -> usize {
     unit
 }
 
-/// Bits that are ordered as the numbers are.
+/// Bits of a number, in the order of the numbers.
 fn in_order(number: f32) -> u32 {
     let bits = number.to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }

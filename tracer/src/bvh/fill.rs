@@ -1,11 +1,11 @@
-//! Full leaves, and full nodes, at the bottom of a binary tree.
+//! Full leaves and full nodes at the bottom of a binary tree.
 //!
-//! A builder for single rays goes down to single triangles, and any subtree of up to sixteen becomes a leaf: of eleven on
-//! average. A tile pays for a leaf as a whole, so every third lane would be for nothing. Subtrees of some thousand
-//! triangles are therefore divided anew, from above, only where leaves come out full: sixteen triangles a leaf, sixteen
-//! leaves a node, sixteen nodes the next.
+//! A builder for single rays divides down to single triangles, and every subtree of up to sixteen becomes a leaf,
+//! with eleven on average. A tile pays for a leaf as a whole, so every third lane would be wasted. Therefore subtrees
+//! of some thousand triangles are divided again from the top (`divide.rs`), only where leaves become full: sixteen
+//! triangles per leaf, sixteen leaves per node, sixteen nodes per node above.
 //!
-//! Single rays gain by the fuller leaves as well. How they are divided: `divide.rs`.
+//! Single rays gain by fuller leaves as well.
 
 use rayon::prelude::*;
 
@@ -15,15 +15,16 @@ use super::wide::{WIDTH, primitives_below, subtree_sizes};
 use super::{Child, Node};
 use crate::cancel::{Cancelled, IsCancelled, go_on};
 
-/// Subtrees of up to this many primitives are divided anew: three full levels. More gained nothing.
+/// Largest number of primitives of a subtree that is divided again: three full levels. Larger ones gained nothing.
 const LARGEST: usize = WIDTH * WIDTH * WIDTH;
 
-/// The same tree with its bottom divided anew where that is better, into leaves of at most `leaf` primitives, most of them full.
+/// The tree with its bottom divided again where that is cheaper, into leaves of at most `leaf` primitives, most of
+/// them full.
 ///
 /// O(n log n), on all threads.
 ///
 /// # Errors
-/// [`Cancelled`]: the question is asked before each subtree.
+/// [`Cancelled`]: `cancelled` is polled before each subtree.
 pub(super) fn fill(
     tree: &Tree,
     boxes: &[Bounds],
@@ -46,10 +47,10 @@ pub(super) fn fill(
     Ok(filling.join(&kept, bottoms))
 }
 
-/// A tree whose bottom is being filled.
+/// A tree whose bottom is filled.
 struct Filling<'a> {
     tree: &'a Tree,
-    /// Primitives below each node.
+    /// Number of primitives below each node.
     sizes: Vec<u32>,
     boxes: &'a [Bounds],
     leaf: usize,
@@ -65,9 +66,9 @@ impl Filling<'_> {
         }
     }
 
-    /// What is below a child of no more than `limit` primitives, divided anew. Where the old way is better (a table's top among
-    /// its cups: the centres of large and small boxes say little about where to divide), the same for its halves, as soon
-    /// as they are a full level smaller.
+    /// The new subtree for a child of at most `limit` primitives. Where the old division is cheaper (a table top
+    /// among its cups: the centres of large and small boxes are a bad criterion), its halves are treated the same way
+    /// once they are a full level smaller.
     fn bottom(&self, child: Child, limit: usize) -> Tree {
         let size = self.size(child);
         if size <= limit {
@@ -90,12 +91,12 @@ impl Filling<'_> {
         joined
     }
 
-    /// What is below a child, divided anew, and the price of its leaves.
+    /// A child divided again, and the cost of its leaves.
     fn divided(&self, child: Child) -> (Tree, f32) {
         Division::of(primitives_below(self.tree, child), self.boxes, self.leaf, self.price)
     }
 
-    /// The price of the leaves that a child would become as it is.
+    /// Cost of the leaves that a child has without a new division.
     fn cost(&self, child: Child) -> f32 {
         let mut cost = 0.0;
         let mut pending = vec![child];
@@ -114,7 +115,7 @@ impl Filling<'_> {
         cost
     }
 
-    /// The kept nodes, in their order, and below them the new bottoms, in the order in which they are met.
+    /// The kept nodes in their order, and below them the new bottoms in the order of traversal.
     fn join(&self, kept: &[u32], bottoms: Vec<Tree>) -> Tree {
         let mut places = vec![0; self.tree.nodes.len()];
         for (place, &node) in (0_u32..).zip(kept) {
@@ -145,7 +146,7 @@ impl Filling<'_> {
 }
 
 impl Tree {
-    /// Adds the nodes of another tree, whose root comes to stand at some depth, and names that root.
+    /// Appends the nodes of another tree, whose root gets the given depth, and returns the child for that root.
     fn append(&mut self, other: Tree, depth: u32) -> Child {
         let (nodes, primitives) = (self.nodes.len() as u32, self.order.len() as u32);
         self.depth = self.depth.max(depth + other.depth - 1);
@@ -175,7 +176,7 @@ mod tests {
     use super::*;
     use crate::cancel::never;
 
-    /// Boxes on a bent sheet, as triangles of a mesh stand.
+    /// Boxes on a bent sheet, as those of the triangles of a mesh.
     fn sheet(count: usize) -> Vec<Bounds> {
         let corner = |i: usize| {
             let (u, v) = ((i % 97) as f32, (i / 97) as f32);
@@ -184,7 +185,8 @@ mod tests {
         (0..count).map(|i| (corner(i), corner(i) + 1.0)).collect()
     }
 
-    /// Goes through the tree: every primitive once, in boxes that hold it, children behind their parents. How many leaves.
+    /// Checks the tree: every primitive once, in boxes that contain it, children behind their parents. Returns the
+    /// number of leaves.
     fn leaves_of(tree: &Tree, boxes: &[Bounds], leaf: usize) -> usize {
         let mut seen = vec![0; boxes.len()];
         let mut leaves = 0;
@@ -229,13 +231,13 @@ mod tests {
             let boxes = sheet(count);
             let filled = filled(&boxes);
             let leaves = leaves_of(&filled, &boxes, 16);
-            // Subtrees of fewer than a thousand are few, and each has one leaf that is not full.
+            // There are few subtrees of fewer than a thousand, and each has one leaf that is not full.
             assert!(leaves as f64 <= (count as f64 / 15.5).ceil(), "{leaves} leaves for {count}");
         }
     }
 
     #[test]
-    fn boxes_in_one_place_are_divided_all_the_same() {
+    fn equal_boxes_are_divided() {
         let boxes = vec![(Vec3::ZERO, Vec3::ONE); 5_000];
         let filled = filled(&boxes);
         leaves_of(&filled, &boxes, 16);

@@ -1,7 +1,7 @@
-//! Bounding volume hierarchies: built bottom up and improved by `obvhs`, kept in an own layout, walked by an own traversal.
+//! Bounding volume hierarchies: building, node layouts, validation.
 //!
-//! Binary trees are widened, over the items of a scene (those never travel) as over the triangles of a mesh, so that one vector
-//! operation looks at sixteen boxes.
+//! Binary trees are widened, over the items of a scene as well as over the triangles of a mesh, so that one vector
+//! operation tests sixteen boxes.
 
 mod build;
 mod cluster;
@@ -20,9 +20,9 @@ pub(crate) use build::build_wide;
 use node::{Child, Node};
 pub(crate) use wide::{WIDTH, WideChild, WideNode, WideTree, validate_wide};
 
-/// Deepest tree that traversal accepts: the size of its stack. A balanced tree over 2^28 primitives is 28 deep;
-/// builds that end deeper are built again by the median.
+/// Largest depth of a binary tree. A balanced tree over 2^28 primitives has depth 28; deeper builds are replaced by
+/// builds by the median.
 const MAX_DEPTH: usize = 64;
 
-/// Deepest wide tree that walks accept: it bounds their stacks.
+/// Largest depth of a wide tree: it bounds the stacks of traversals.
 pub(crate) const MAX_WIDE_DEPTH: usize = 16;

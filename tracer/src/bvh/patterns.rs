@@ -1,4 +1,4 @@
-//! Boxes in patterns that are hard for a builder: what it takes is counted, not timed.
+//! Patterns of boxes that are hard for builders. Work is counted, not timed.
 
 use glam::{Vec2, Vec3};
 
@@ -10,7 +10,7 @@ use super::wide::half_area;
 use super::{BuildQuality, MAX_DEPTH, MAX_WIDE_DEPTH, WIDTH, WideTree, validate_wide};
 use crate::cancel::never;
 
-/// Numbers from 0 to 1 that look random: bits of a product.
+/// Deterministic pseudo-random number from 0 to 1.
 fn dice(index: usize, salt: u64) -> f32 {
     let mixed =
         (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ salt.wrapping_mul(0xD6E8_FEB8_6659_FD93);
@@ -22,7 +22,7 @@ fn anywhere(index: usize) -> Vec3 {
     Vec3::new(dice(index, 1), dice(index, 2), dice(index, 3))
 }
 
-/// The box of these points.
+/// The bounding box of points.
 fn around(points: &[Vec3]) -> Bounds {
     points
         .iter()
@@ -33,7 +33,7 @@ fn cube(center: Vec3, half: f32) -> Bounds {
     (center - half, center + half)
 }
 
-/// A box of a pattern: its index, and how many there are.
+/// A pattern: the box for an index, given the number of boxes.
 type Pattern = fn(usize, usize) -> Bounds;
 
 const RANDOM: (&str, Pattern) = ("random", |i, n| cube(anywhere(i), 0.5 / (n as f32).cbrt()));
@@ -93,13 +93,13 @@ fn boxes((_, pattern): (&str, Pattern), count: usize) -> Vec<Bounds> {
     (0..count).map(|index| pattern(index, count)).collect()
 }
 
-/// Nodes that a ray meets which enters the root anywhere.
+/// Expected number of nodes that a ray visits which enters the root anywhere.
 fn visits(tree: &WideTree) -> f32 {
     let root = half_area(tree.nodes[0].bounds());
     tree.nodes.iter().map(|node| half_area(node.bounds()) / root).sum()
 }
 
-/// The work of a build, but for what takes O(n) whatever the boxes are.
+/// Work of a build beyond the parts that take O(n) for all boxes.
 fn work_of(boxes: &[Bounds], quality: BuildQuality) -> (Work, u64) {
     let effort = quality.effort();
     let (mut tree, work) = effort.clustering.of(boxes, &never).unwrap();
@@ -107,7 +107,7 @@ fn work_of(boxes: &[Bounds], quality: BuildQuality) -> (Work, u64) {
 }
 
 #[test]
-fn every_pattern_takes_about_as_much_work_as_boxes_at_random_places() {
+fn every_pattern_takes_about_the_work_of_random_boxes_places() {
     const COUNT: usize = 100_000;
     for quality in [BuildQuality::Fast, BuildQuality::Default] {
         let (random, visits) = work_of(&boxes(RANDOM, COUNT), quality);
@@ -122,8 +122,8 @@ fn every_pattern_takes_about_as_much_work_as_boxes_at_random_places() {
 }
 
 #[test]
-fn rays_meet_few_nodes_of_rows_and_grids() {
-    // A ray that enters a row in any place and direction meets the nodes above a leaf, and hardly any more.
+fn rays_visit_few_nodes_of_rows_and_grids() {
+    // A ray that enters a row at any place in any direction visits the nodes above one leaf, and few more.
     for (name, most) in
         [("row", 4.0), ("ribbon", 4.0), ("diagonal row", 1.5), ("grid", 4.5), ("cube of boxes", 13.0)]
     {
@@ -135,7 +135,7 @@ fn rays_meet_few_nodes_of_rows_and_grids() {
 }
 
 #[test]
-fn trees_over_every_pattern_are_shallow_and_sound() {
+fn trees_over_every_pattern_are_shallow_and_valid() {
     const COUNT: usize = 20_000;
     for pattern in PATTERNS {
         let (name, all) = (pattern.0, boxes(pattern, COUNT));

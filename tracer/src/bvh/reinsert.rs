@@ -1,9 +1,9 @@
-//! Nodes that move to a better place in their tree: parallel reinsertion (Meister and Bittner 2017), with bounded work.
+//! Improvement of a tree by parallel reinsertion of nodes (Meister and Bittner 2017), with bounded work.
 //!
-//! In a pass the largest nodes look for the place where the sum of areas is least, all at once; then those that gain most
-//! move, unless a move of this pass has changed what is around them. A search is a branch and bound over the whole tree:
-//! where boxes are inside each other nothing bounds it. Searches therefore share a number of nodes to look at: one ends
-//! with the best place so far, and passes end, when there are no more.
+//! In a pass the largest nodes search in parallel for the position with the least sum of areas. Then the nodes with
+//! the largest gains move, unless an earlier move of the pass has changed their surroundings. A search is a branch
+//! and bound over the whole tree, which nested boxes do not bound. Therefore searches share a budget of visited
+//! nodes: a search ends with the best position so far, and passes end, when the budget is used up.
 
 use obvhs::bvh2::reinsertion::reinsert_node;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
@@ -12,34 +12,34 @@ use rayon::prelude::*;
 use super::MAX_DEPTH;
 use crate::cancel::{Cancelled, IsCancelled, go_on};
 
-/// Passes of a series; the second tries a third as many nodes as the first, the third a fifth, and so on.
+/// Passes of a series. The second tries a third as many nodes as the first, the third a fifth, and so on.
 const PASSES: u32 = 16;
 
-/// Nodes that a search may look at, on average: several times as many as it needs among the triangles of a surface.
+/// Visited nodes per search on average: several times the number that searches among the triangles of a surface need.
 const MEAN_VISITS: u64 = 96;
 
-/// Nodes do not move deeper than this: boxes inside each other would become a list.
+/// Largest depth to which nodes move: nested boxes would become a list.
 const DEEPEST: usize = MAX_DEPTH - 8;
 
-/// Nodes that a single search may look at.
+/// Visited nodes of a single search at most.
 const MOST_VISITS: u64 = 4096;
 
-/// A move that was found.
+/// A move found by a search.
 #[derive(Clone, Copy, Default)]
 struct Move {
     from: u32,
     to: u32,
-    /// By how much the sum of areas becomes less.
+    /// Reduction of the sum of areas.
     gain: f32,
-    /// Nodes that the search looked at.
+    /// Nodes that the search visited.
     visits: u32,
 }
 
-/// Improves a tree. For each of `shares` comes a series of passes, whose first tries that share of its nodes. Returns how
-/// many nodes were looked at.
+/// Improves a tree by a series of passes for each of `shares`, whose first pass tries that share of the nodes.
+/// Returns the number of visited nodes.
 ///
 /// # Errors
-/// [`Cancelled`]: the question is asked before each pass; the tree is of no use then.
+/// [`Cancelled`]: `cancelled` is polled before each pass; the tree is invalid then.
 pub(super) fn improve(
     tree: &mut Bvh2,
     shares: &[f32],
@@ -69,9 +69,9 @@ pub(super) fn improve(
     Ok(visits)
 }
 
-/// What the largest nodes gain by, the most first. Each search looks at no more nodes than the limit.
+/// Moves of the largest nodes, those with the largest gain first. Each search visits at most `limit` nodes.
 fn find_moves(tree: &Bvh2, wanted: usize, limit: u32) -> Vec<Move> {
-    // Those near the root are in front, as the clusters that merged last: the largest are among the first ones.
+    // Nodes near the root are in front, because these clusters merged last: the largest ones are among them.
     let first = (2 * wanted + 2).min(tree.nodes.len());
     let key = |index: u32| (area_bits(&tree.nodes[index as usize]), index);
     let mut largest: Vec<u32> = (1..first as u32).collect();
@@ -83,12 +83,12 @@ fn find_moves(tree: &Bvh2, wanted: usize, limit: u32) -> Vec<Move> {
     moves
 }
 
-/// Sorts the largest area first.
+/// A key that sorts the largest area first.
 fn area_bits(node: &Bvh2Node) -> u32 {
     !node.aabb().half_area().to_bits()
 }
 
-/// Carries moves out, but for those whose surroundings another one has changed: `touched` tells in which pass.
+/// Performs moves, except those whose surroundings an earlier one of this pass has changed, which `touched` records.
 fn carry_out(tree: &mut Bvh2, moves: Vec<Move>, touched: &mut [u32], pass: u32) {
     for Move { from, to, .. } in moves.into_iter().take_while(|found| found.gain > 0.0) {
         let (from, to) = (from as usize, to as usize);
@@ -101,7 +101,7 @@ fn carry_out(tree: &mut Bvh2, moves: Vec<Move>, touched: &mut [u32], pass: u32) 
     }
 }
 
-/// Whether a node is near enough to the root for another one to move there.
+/// Whether a node is near enough to the root to receive another node below it.
 fn is_shallow(tree: &Bvh2, mut node: u32) -> bool {
     (0..DEEPEST).any(|_| {
         node = tree.parents[node as usize];
@@ -113,12 +113,12 @@ fn sibling(node: u32) -> u32 {
     Bvh2Node::get_sibling_id32(node)
 }
 
-/// Looks for the best place for a node: which other node should be its sibling.
+/// Searches the best new sibling for a node.
 fn search(tree: &Bvh2, from: u32, limit: u32, stack: &mut Vec<(f32, u32)>) -> Move {
     let node = tree.nodes[from as usize].aabb();
     let (own, parent) = (node.half_area(), tree.parents[from as usize]);
     let mut best = Move { from, ..Move::default() };
-    // Without the node and its parent, the sibling is in the parent's place; the ancestors' boxes become smaller.
+    // Without the node, its sibling takes the place of the parent, and the boxes of the ancestors shrink.
     let mut gain = tree.nodes[parent as usize].aabb().half_area();
     let (mut beside, mut above) = (sibling(from), parent);
     let mut rest = *tree.nodes[beside as usize].aabb();

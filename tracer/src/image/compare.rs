@@ -1,13 +1,13 @@
-//! How much two pictures differ.
+//! Numerical differences of two pictures.
 
 use super::{ImageError, RgbImage, ssim};
 
 /// The difference of two pictures of one size, over their sRGB bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// The largest difference of a channel anywhere.
+    /// Largest difference of a channel.
     pub max: u8,
-    /// Pixels that differ in any channel.
+    /// Number of pixels that differ in any channel.
     pub differing_pixels: usize,
     /// Root of the mean squared difference over all channels, 0..255.
     pub rmse: f64,
@@ -88,7 +88,7 @@ mod tests {
         let (mut a, mut b) = (RgbImage::new(20, 20), RgbImage::new(20, 20));
         a.pixels.fill(100);
         b.pixels.fill(150);
-        // Without variance only the luminance term is left: (2 m n + C1) / (m^2 + n^2 + C1).
+        // Without variance only the luminance term remains: (2 m n + C1) / (m^2 + n^2 + C1).
         let c1 = (0.01f64 * 255.0).powi(2);
         let expected = (2.0 * 100.0 * 150.0 + c1) / (100.0f64.powi(2) + 150.0f64.powi(2) + c1);
         let d = compare(&a, &b).unwrap();

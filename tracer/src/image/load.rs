@@ -1,4 +1,4 @@
-//! Reading pictures. What a file announces is checked against limits before memory is taken for it.
+//! Decoding of picture files. Announced sizes are checked against limits before memory is allocated.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -11,19 +11,21 @@ use ::image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use super::{ImageError, MAX_SIDE, RgbImage};
 use crate::files::open_regular;
 
-/// Memory for all in a picture's file but its pixels: a colour profile of some kilobytes may unpack to gigabytes.
+/// Memory for everything but the pixels of a picture file: a colour profile of some kilobytes may unpack to
+/// gigabytes.
 const MAX_REST_BYTES: u64 = 64 << 20;
 
-/// Bytes of a decoded pixel: four channels of 32 bits at most.
+/// Largest size of a decoded pixel: four channels of 32 bits.
 const MAX_PIXEL_BYTES: u64 = 16;
 
-/// Memory that decoding one picture takes at most: one of the largest size with four 8-bit channels, and the rest.
+/// Largest memory for decoding one picture: one of the largest size with four 8-bit channels, and the rest.
 const MAX_DECODE_BYTES: u64 = 4 * (MAX_SIDE as u64) * (MAX_SIDE as u64) + MAX_REST_BYTES;
 
-/// Bytes of a file that are read at most.
+/// Largest size of a file.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 
-/// Reads a picture in one of the [`super::READ_FORMATS`], recognised by its content; of an animation, the first.
+/// Reads a picture in one of the [`super::READ_FORMATS`], recognised by its content; of an animation, the first
+/// frame.
 ///
 /// # Errors
 /// A file that cannot be read, is no picture, is broken, or is larger than [`MAX_SIDE`] in either direction.
@@ -33,7 +35,7 @@ pub fn load(path: &Path) -> Result<RgbImage, ImageError> {
     Ok(RgbImage { width, height, pixels: picture.into_raw() })
 }
 
-/// As [`load`], with a byte of alpha a pixel where the picture has alpha.
+/// Reads a picture like [`load`], with a byte of alpha per pixel if the picture has alpha.
 ///
 /// # Errors
 /// As [`load`].
@@ -45,7 +47,7 @@ pub fn load_with_alpha(path: &Path) -> Result<(RgbImage, Option<Vec<u8>>), Image
     }
     let mut pixels = picture.into_rgba8().into_raw();
     let alpha = pixels.iter().skip(3).step_by(4).copied().collect();
-    // In place: large pictures are not held three times.
+    // In place: large pictures are not stored three times.
     for pixel in 0..pixels.len() / 4 {
         pixels.copy_within(4 * pixel..4 * pixel + 3, 3 * pixel);
     }
@@ -53,26 +55,26 @@ pub fn load_with_alpha(path: &Path) -> Result<(RgbImage, Option<Vec<u8>>), Image
     Ok((RgbImage { width, height, pixels }, Some(alpha)))
 }
 
-/// Pixels per row, and rows, that a picture announces, without decoding it.
+/// Width and height in the header of a picture file, without decoding it.
 ///
 /// # Errors
-/// As [`load`]; a picture may still turn out to be broken.
+/// As [`load`]; the rest of the file is not checked.
 pub fn size(path: &Path) -> Result<(u32, u32), ImageError> {
     let reader = open(path, MAX_REST_BYTES)?;
-    guarded(path, || reader.into_dimensions())
+    catch_panic(path, || reader.into_dimensions())
 }
 
 fn decoded(path: &Path) -> Result<DynamicImage, ImageError> {
     let (width, height) = size(path)?;
     let pixels = u64::from(width) * u64::from(height);
     let reader = open(path, MAX_DECODE_BYTES.min(MAX_PIXEL_BYTES * pixels + MAX_REST_BYTES))?;
-    guarded(path, || reader.decode())
+    catch_panic(path, || reader.decode())
 }
 
-/// What a decoder gives. One that panics must not end the program: its picture is broken.
-fn guarded<T>(path: &Path, decode: impl FnOnce() -> ::image::ImageResult<T>) -> Result<T, ImageError> {
+/// Result of a decoder. A decoder that panics means a broken picture, and must not end the program.
+fn catch_panic<T>(path: &Path, decode: impl FnOnce() -> ::image::ImageResult<T>) -> Result<T, ImageError> {
     let decoded = catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
-        let reason = DecodingError::new(ImageFormatHint::Unknown, "the decoder does not understand it");
+        let reason = DecodingError::new(ImageFormatHint::Unknown, "the decoder panicked");
         Err(::image::ImageError::Decoding(reason))
     });
     decoded.map_err(|source| broken(path, source))
@@ -82,7 +84,7 @@ fn broken(path: &Path, source: ::image::ImageError) -> ImageError {
     ImageError::Decode { path: path.to_owned(), source }
 }
 
-/// A reader that takes at most `memory` bytes.
+/// A reader that allocates at most `memory` bytes.
 fn open(path: &Path, memory: u64) -> Result<ImageReader<BufReader<File>>, ImageError> {
     let unreadable = |source| ImageError::Read { path: path.to_owned(), source };
     let file = open_regular(path).map_err(unreadable)?;
@@ -102,7 +104,8 @@ fn open(path: &Path, memory: u64) -> Result<ImageReader<BufReader<File>>, ImageE
     Ok(reader)
 }
 
-/// TGA has nothing at its beginning to recognise it by: the file's name does, or the signature at the end of newer ones.
+/// Whether a file is TGA. The format has no magic number: the extension decides, or the signature at the end of newer
+/// files.
 fn is_targa(path: &Path) -> io::Result<bool> {
     const SIGNATURE: &[u8] = b"TRUEVISION-XFILE.\0";
     let named = path.extension().is_some_and(|extension| {
@@ -117,8 +120,8 @@ fn is_targa(path: &Path) -> io::Result<bool> {
     Ok(end == SIGNATURE)
 }
 
-/// Whether a file is a JPEG picture without an end: the decoder fills up what is missing, and says nothing.
-pub(crate) fn ends_early(path: &Path) -> bool {
+/// Whether a file is a JPEG picture without an end. The decoder fills up the missing part without an error.
+pub fn ends_early(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = |start: &mut Vec<u8>| {
         let mut file = open_regular(path)?.take(MAX_FILE_BYTES);
@@ -128,7 +131,7 @@ pub(crate) fn ends_early(path: &Path) -> bool {
     read(&mut start).is_ok_and(|rest| rest > 0) && !has_end(&start)
 }
 
-/// Whether the segments and scans of a JPEG picture come to its end.
+/// Whether the segments and scans of a JPEG picture reach its end marker.
 fn has_end(jpeg: &[u8]) -> bool {
     const START_OF_SCAN: u8 = 0xda;
     const END: u8 = 0xd9;
@@ -149,7 +152,7 @@ fn has_end(jpeg: &[u8]) -> bool {
     false
 }
 
-/// The marker at or behind a place, which moves behind it.
+/// The next marker from a position on, which moves behind it.
 fn next_marker(jpeg: &[u8], at: &mut usize) -> Option<u8> {
     let rest = jpeg.get(*at..)?;
     let start = rest.windows(2).position(|pair| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff))?;
@@ -157,7 +160,7 @@ fn next_marker(jpeg: &[u8], at: &mut usize) -> Option<u8> {
     rest.get(start + 1).copied()
 }
 
-/// Moves behind the coded pixels, to the next marker that is not one of theirs.
+/// Moves a position behind the coded pixels, to the next marker outside of them.
 fn skip_scan(jpeg: &[u8], at: &mut usize) {
     let rest = jpeg.get(*at..).unwrap_or_default();
     let is_end = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7);
@@ -193,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn an_announced_size_beyond_the_limit_is_refused_before_memory_is_taken() {
+    fn an_announced_size_beyond_the_limit_is_refused() {
         let message = message_for(b"P6\n20000 20000\n255\nabc");
         assert!(message.contains("16384"), "{message}");
     }
@@ -244,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn targa_is_known_by_its_name_or_its_end() {
+    fn targa_is_recognised_by_its_name_or_its_end() {
         let folder = tempfile::tempdir().unwrap();
         let mut bytes = encoded(ImageFormat::Tga);
         let path = |name: &str, bytes: &[u8]| {
@@ -260,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_that_are_cut_are_refused_or_end_early() {
+    fn truncated_pictures_are_refused_or_end_early() {
         let folder = tempfile::tempdir().unwrap();
         for (name, format) in FORMATS {
             let path = folder.path().join(name);
@@ -276,7 +279,7 @@ mod tests {
     fn the_end_of_a_jpeg_is_behind_its_scans() {
         let whole = encoded(ImageFormat::Jpeg);
         assert!(has_end(&whole));
-        // What follows the end says nothing; what looks like an end inside of a segment is none.
+        // Bytes behind the end are ignored, and so are end markers inside of a segment.
         assert!(has_end(&[&whole[..], b"trailing"].concat()));
         let thumbnail = b"\xff\xe1\x00\x08\xff\xd8\xff\xd9\x00\x00";
         let cut = [&whole[..2], thumbnail, &whole[2..whole.len() - 2]].concat();

@@ -1,5 +1,5 @@
-//! Writing pictures. A file appears whole or not at all: the bytes go to a temporary name in the same folder, which
-//! is renamed when it is complete and removed when it is not.
+//! Writing of picture files. A file appears whole or not at all: the bytes go to a temporary name in the same folder,
+//! which is renamed when complete and removed on failure.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -10,7 +10,7 @@ use ::image::{ExtendedColorType, ImageEncoder};
 use super::{ImageError, RgbImage};
 use crate::files::Temporary;
 
-/// The extensions that [`save`] knows, for messages.
+/// Extensions that [`save`] supports, for messages.
 pub const KNOWN_EXTENSIONS: &str = ".png, .ppm";
 
 #[derive(Clone, Copy)]
@@ -30,23 +30,23 @@ impl Format {
     }
 }
 
-/// Writes a picture as PNG or PPM, by the extension of `path`, replacing what was there.
+/// Writes a picture as PNG or PPM, by the extension of `path`, replacing an existing file.
 ///
 /// # Errors
-/// An unknown extension, a buffer that does not fit the size, a folder that cannot be written to, a full disk. A file
-/// that was there before is then still there, and no half-written one beside it.
+/// An unknown extension, a buffer that does not match the size, a folder without write permission, a full disk. An
+/// existing file is then unchanged, and no partial file is left.
 pub fn save(path: &Path, image: &RgbImage) -> Result<(), ImageError> {
     let format = Format::of(path)?;
     image.check()?;
     let failed = |source| ImageError::Write { path: path.to_owned(), source };
-    let (temporary, file) = Temporary::create_beside(path).map_err(failed)?;
+    let (temporary, file) = Temporary::create_next_to(path).map_err(failed)?;
     let mut out = BufWriter::new(file);
     match format {
         Format::Png => write_png(&mut out, image)
             .map_err(|source| ImageError::Encode { path: path.to_owned(), source })?,
         Format::Ppm => write_ppm(&mut out, image).map_err(failed)?,
     }
-    // Closed before it is renamed: Windows does not rename open files.
+    // Closed before renaming: Windows does not rename open files.
     drop(out.into_inner().map_err(|e| failed(e.into_error()))?);
     temporary.rename_to(path).map_err(failed)
 }
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_come_back_as_they_were_and_alone() {
+    fn pictures_round_trip_and_no_other_file_is_left() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.png", "b.ppm", "c.PNG"] {
             let path = folder.path().join(name);
@@ -103,13 +103,13 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_leaves_nothing_behind_and_the_old_file_in_place() {
+    fn a_failure_leaves_the_old_file_and_no_other() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("nowhere/a.png");
         let message = save(&missing, &gradient()).unwrap_err().to_string();
         assert!(message.contains("nowhere") && message.contains("folder exists"), "{message}");
 
-        // A folder stands where the file should go, so the last step, the renaming, fails.
+        // A folder has the target's name, so the last step, the renaming, fails.
         let taken = folder.path().join("taken.ppm");
         fs::create_dir(&taken).unwrap();
         fs::write(taken.join("inside"), "x").unwrap();
@@ -125,10 +125,10 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_process_left_behind_is_in_nobodys_way() {
+    fn files_of_a_killed_process_are_skipped() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ppm");
-        // Other tests of this process may count on meanwhile, so all that may come next is taken.
+        // Other tests of this process may advance the counter, so all names that may come next are taken.
         let left: Vec<String> =
             (0..500).map(|serial| format!(".a.ppm.{}-{serial}.partial", std::process::id())).collect();
         left.iter().for_each(|name| fs::write(folder.path().join(name), "half").unwrap());

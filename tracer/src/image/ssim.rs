@@ -1,6 +1,6 @@
-//! Structural similarity (Wang et al. 2004): an 11 x 11 Gaussian window slides over both pictures' luma, and means,
-//! variances and the covariance under it are compared. At the borders the window is cut and its weights are
-//! renormalised, so pictures of every size have a value. Only the rows under the window are held.
+//! Structural similarity (Wang et al. 2004): an 11 x 11 Gaussian window slides over the luma of both pictures, and
+//! means, variances and the covariance under it are compared. At the borders the window is cut and its weights are
+//! renormalised, so pictures of every size have a value. Only the rows under the window are in memory.
 
 use std::collections::VecDeque;
 
@@ -11,10 +11,10 @@ const SIGMA: f64 = 1.5;
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
 const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
-/// Sums under the window at one pixel: a, b, a^2, b^2, ab.
+/// Weighted sums under the window at one pixel: a, b, a^2, b^2, ab.
 type Moments = [f64; 5];
 
-/// The mean of the similarity over all pixels; 1 for empty pictures. Both pictures have one size.
+/// Mean similarity over all pixels; 1 for empty pictures. Both pictures have one size.
 pub(super) fn mean(a: &RgbImage, b: &RgbImage) -> f64 {
     let (width, height) = (a.width as usize, a.height as usize);
     if width == 0 || height == 0 {

@@ -1,7 +1,7 @@
-//! The bytes of a compiled mesh: a header, then sections of plain numbers, each starting on a cache line.
+//! The bytes of a compiled mesh: a header, then sections of plain numbers, each aligned to a cache line.
 //!
-//! Little endian, versioned, no pointers. The whole file is checked once, in one pass, before anything trusts it:
-//! it may come from a peer or from disk.
+//! Little endian, versioned, without pointers. All bytes are checked once, in one pass, before they are used: they
+//! may come from a peer or from a file.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
@@ -10,11 +10,11 @@ use super::{FORMAT_VERSION, MAGIC, MeshError, OLDEST_FORMAT_VERSION};
 use crate::bvh::{WIDTH, WideNode};
 use crate::simd::{Lanes, three};
 
-/// Source of a lane without a triangle.
+/// Source index of a lane without a triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Sixteen triangles in mesh space, indexed `[corner][axis].0[lane]`. Lanes without a triangle hold NaN, which fails every
-/// comparison.
+/// Sixteen triangles in mesh space, indexed `[corner][axis].0[lane]`. Lanes without a triangle are NaN, which fails
+/// every comparison.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct TriangleBlock(pub(crate) [[Lanes; 3]; 3]);
@@ -22,7 +22,7 @@ pub(crate) struct TriangleBlock(pub(crate) [[Lanes; 3]; 3]);
 const _: () = assert!(size_of::<TriangleBlock>() == 576);
 
 impl TriangleBlock {
-    /// Corners of one triangle.
+    /// Corners of the triangle in one lane.
     #[inline(always)]
     pub(crate) fn corners(&self, lane: usize) -> [Vec3; 3] {
         three!(k => {
@@ -32,7 +32,7 @@ impl TriangleBlock {
     }
 }
 
-/// Alignment of sections, in bytes: one cache line, and what a [`WideNode`] wants.
+/// Alignment of sections, in bytes: one cache line, which is also the alignment of a [`WideNode`].
 pub(super) const ALIGN: usize = 64;
 
 /// One cache line of bytes.
@@ -48,7 +48,7 @@ pub(super) struct AlignedBytes {
 
 impl AlignedBytes {
     pub(super) fn zeroed(len: usize) -> Self {
-        // Zero pages from the system: nothing is written twice.
+        // Zero pages of the operating system: nothing is written twice.
         Self { lines: bytemuck::zeroed_vec(len.div_ceil(ALIGN)), len }
     }
 
@@ -83,11 +83,11 @@ pub(super) struct Header {
     pub normal_count: u32,
     pub material_count: u32,
     pub material_bytes: u32,
-    /// Lanes with texture coordinates: all of them, or none.
+    /// Lanes with texture coordinates: all, or zero.
     pub uv_count: u32,
-    /// Lanes with the whole repeats of their texture coordinates: all of them, or none.
+    /// Lanes with whole repeats of their texture coordinates: all, or zero.
     pub repeat_count: u32,
-    /// Lanes with colours: all of them, or none.
+    /// Lanes with colours: all, or zero.
     pub color_count: u32,
     pub reserved: u32,
 }
@@ -106,7 +106,7 @@ impl Header {
         }
     }
 
-    /// Reads and checks what can be checked without the sections.
+    /// Reads the header, and checks everything that can be checked without the sections.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, MeshError> {
         if !bytes.starts_with(&MAGIC) {
             return Err(MeshError::Format("it does not start with RFMESH".into()));
@@ -122,7 +122,7 @@ impl Header {
             )));
         }
         if header.version == OLDEST_FORMAT_VERSION {
-            // What stands there was reserved.
+            // These fields were reserved in that version.
             (header.repeat_count, header.color_count) = (0, 0);
         }
         if !(-220..=220).contains(&header.exponent) {
@@ -188,26 +188,26 @@ impl Header {
 /// Byte offsets of the sections of a compiled mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sections {
-    /// [`WideNode`] each.
+    /// Nodes, [`WideNode`] each.
     pub nodes: usize,
-    /// [`TriangleBlock`] each.
+    /// Blocks, [`TriangleBlock`] each.
     pub blocks: usize,
-    /// `u32` per lane of the blocks: the triangle's position in the source, or [`NO_TRIANGLE`].
+    /// Sources, `u32` per lane of the blocks: the triangle's position in the source file, or [`NO_TRIANGLE`].
     pub sources: usize,
-    /// `u16` per lane: its material slot.
+    /// Material slots of triangles, `u16` per lane.
     pub slots: usize,
-    /// Three `u32` per lane, into `normals`; empty without normals.
+    /// Normal indices, three `u32` per lane; empty without normals.
     pub indices: usize,
-    /// `Vec3` per vertex.
+    /// Normals, `Vec3` per vertex.
     pub normals: usize,
-    /// Three `Vec2` per lane; empty without texture coordinates.
+    /// Texture coordinates, three `Vec2` per lane; empty without.
     pub uvs: usize,
-    /// `Vec2` per lane; empty where no texture tells whole repeats apart.
+    /// Whole repeats, `Vec2` per lane; empty where no texture distinguishes them.
     pub repeats: usize,
-    /// Three times three sRGB bytes per lane; empty without colours of vertices.
+    /// Vertex colours, three times three sRGB bytes per lane; empty without.
     pub colors: usize,
-    /// Material slots: see [`super::compiled`].
+    /// The material slots themselves: see [`super::materials`].
     pub materials: usize,
-    /// Length of the whole.
+    /// Length of all bytes.
     pub end: usize,
 }

@@ -1,21 +1,21 @@
-//! What a mesh loses and gains before its tree is built.
+//! Cleaning and centring of a mesh before its tree is built.
 //!
-//! Builders of trees and tests of triangles have inputs that they cannot bear: vertices that are not finite, triangles
-//! without an area, thousands of copies of one triangle (no split separates them, so the tree degenerates to a list).
-//! They go here, and are counted. What stays is moved to its own centre and scaled by a power of two, so that
-//! coordinates lie within [-1, 1] and `f32` spends its digits on the shape, wherever the model stands and however
-//! large it is. Both steps are exact up to one rounding to `f32` a coordinate.
+//! Tree builders and intersection tests do not accept every input: not vertices that are not finite, triangles
+//! without an area, and thousands of copies of one triangle (no split separates them, so the tree degenerates to a
+//! list). These are dropped and counted. The remaining mesh is moved to its own centre and scaled by a power of two,
+//! so that coordinates are within [-1, 1] and `f32` has its digits for the shape, whatever the model's position and
+//! size. Both steps are exact up to one rounding to `f32` per coordinate.
 
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{MAX_COORDINATE, MAX_MATERIALS, MAX_TRIANGLES, Mesh, MeshError, MeshReport, Smoothing, normals};
 
-/// A mesh that is fit to be traced.
+/// A cleaned and centred mesh.
 pub(super) struct CleanMesh {
     /// Corners in mesh space, within [-1, 1].
     pub corners: Vec<[Vec3; 3]>,
-    /// Corners as indices into `normals`; the source's positions where there are none.
+    /// Corners as indices into `normals`; into the source's positions where `normals` is empty.
     pub indices: Vec<[u32; 3]>,
     /// Position of each kept triangle in the source.
     pub sources: Vec<u32>,
@@ -27,13 +27,13 @@ pub(super) struct CleanMesh {
     pub uv_repeats: Vec<Vec2>,
     /// Colours of each kept triangle; empty where the source has none.
     pub colors: Vec<[[u8; 3]; 3]>,
-    /// Unit normals; empty unless asked for, and where all triangles are flat.
+    /// Unit normals; empty if not requested, and where all triangles are flat.
     pub normals: Vec<Vec3>,
-    /// model = center + mesh * 2^exponent.
+    /// Centre in model space: model = center + mesh * 2^exponent.
     pub center: DVec3,
-    /// See `center`.
+    /// Binary exponent of the scale: see `center`.
     pub exponent: i32,
-    /// Bounds of the kept triangles in the model's space.
+    /// Bounds of the kept triangles in model space.
     pub bounds: (DVec3, DVec3),
 }
 
@@ -91,7 +91,7 @@ pub(super) fn clean(mesh: &Mesh, with_normals: bool) -> Result<(CleanMesh, MeshR
     Ok((kept, report))
 }
 
-/// Lengths and indices that the rest relies on.
+/// Checks the lengths and indices on which the other steps rely.
 fn check_shape(mesh: &Mesh) -> Result<(), MeshError> {
     let triangles = mesh.triangles.len();
     if triangles > MAX_TRIANGLES {
@@ -161,7 +161,7 @@ fn bounds_of(mesh: &Mesh, triangles: &[u32]) -> (DVec3, DVec3) {
     })
 }
 
-/// Centre, and the exponent of the power of two that brings the half extent into (1/2, 1].
+/// Centre, and the exponent of the power of two that scales the half extent into (1/2, 1].
 fn placement((lo, hi): (DVec3, DVec3)) -> (DVec3, i32) {
     if !lo.is_finite() || !hi.is_finite() {
         return (DVec3::ZERO, 0);
@@ -172,17 +172,18 @@ fn placement((lo, hi): (DVec3, DVec3)) -> (DVec3, i32) {
     (center, if half_extent > 0.0 { exponent } else { 0 })
 }
 
-/// No area in exact arithmetic: products of `f32` differences are exact in `f64`, up to the final subtraction.
+/// Whether a triangle has no area in exact arithmetic: products of `f32` differences are exact in `f64`, up to the
+/// final subtraction.
 fn is_degenerate(corners: &[Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a) == DVec3::ZERO
 }
 
-/// Which triangles are copies of one that comes earlier, and are not needed as its other side: `differ` tells of two that are
-/// wound the opposite way whether they look different.
+/// Flags the copies of earlier triangles, except those that are needed as the other side of a face: `differ` decides
+/// for two triangles of opposite winding whether they look different.
 ///
-/// Sorted by a hash, copies stand together; where different triangles have the same one, their corners decide. So the time is
-/// O(n log n) whatever the triangles are.
+/// Sorted by a hash, copies are adjacent; among triangles with the same hash the corners decide. So the time is O(n
+/// log n) for all triangles.
 fn repeated(triangles: &[[Vec3; 3]], differ: impl Fn(usize, usize) -> bool) -> Vec<bool> {
     let mut by_hash: Vec<(u64, u32)> =
         (0_u32..).zip(triangles).map(|(i, corners)| (hash(&identity(corners)), i)).collect();
@@ -191,11 +192,11 @@ fn repeated(triangles: &[[Vec3; 3]], differ: impl Fn(usize, usize) -> bool) -> V
     for alike in by_hash.chunk_by(|a, b| a.0 == b.0).filter(|alike| alike.len() > 1) {
         let mut alike: Vec<_> = alike.iter().map(|&(_, i)| (identity(&triangles[i as usize]), i)).collect();
         alike.sort_unstable();
-        for copies in alike.chunk_by(|a, b| a.0 == b.0) {
-            let mut copies = copies.iter().map(|&(_, i)| i as usize);
-            let Some(first) = copies.next() else { continue };
+        for duplicates in alike.chunk_by(|a, b| a.0 == b.0) {
+            let mut duplicates = duplicates.iter().map(|&(_, i)| i as usize);
+            let Some(first) = duplicates.next() else { continue };
             let mut has_other_side = false;
-            for copy in copies {
+            for copy in duplicates {
                 let is_other_side = is_turned(&triangles[first], &triangles[copy]);
                 let needed = is_other_side && !has_other_side && differ(first, copy);
                 has_other_side |= needed;
@@ -206,19 +207,19 @@ fn repeated(triangles: &[[Vec3; 3]], differ: impl Fn(usize, usize) -> bool) -> V
     repeated
 }
 
-/// Where each corner of one triangle is among those of another with the same corners.
+/// Index of each corner of one triangle among those of another with the same corners.
 fn matching(a: &[Vec3; 3], b: &[Vec3; 3]) -> [usize; 3] {
     a.map(|corner| b.iter().position(|&other| other == corner).unwrap_or(0))
 }
 
-/// Whether two triangles with the same corners are wound the opposite way.
+/// Whether two triangles with the same corners have opposite windings.
 fn is_turned(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
     let [first, second, _] = matching(a, b);
     second != (first + 1) % 3
 }
 
-/// Whether two triangles with the same corners, as two sides of one face, look different: by material, texture coordinates, or
-/// normals, on whichever side these are.
+/// Whether two triangles with the same corners, as two sides of one face, look different: by material, texture
+/// coordinates, or normals.
 fn sides_differ(mesh: &Mesh, corners: &[[Vec3; 3]], sources: &[u32], a: usize, b: usize) -> bool {
     let places = matching(&corners[a], &corners[b]);
     let [a, b] = [a, b].map(|i| sources[i] as usize);
@@ -233,7 +234,7 @@ fn sides_differ(mesh: &Mesh, corners: &[[Vec3; 3]], sources: &[u32], a: usize, b
         || !mesh.normals.is_empty() && (0..3).any(other_normal)
 }
 
-/// Multiplies and folds, a number at a time.
+/// A hash: multiplies and folds number by number.
 fn hash(identity: &[[u32; 3]; 3]) -> u64 {
     identity.iter().flatten().fold(1 << 63, |hash: u64, &bits| {
         let product = u128::from(hash ^ u64::from(bits)) * 0x9E37_79B9_7F4A_7C15;
@@ -241,7 +242,7 @@ fn hash(identity: &[[u32; 3]; 3]) -> u64 {
     })
 }
 
-/// Equal for triangles with the same corners in the same or the opposite winding.
+/// The corners in a canonical order: equal for triangles with the same corners in the same or the opposite winding.
 fn identity(corners: &[Vec3; 3]) -> [[u32; 3]; 3] {
     // Adding zero turns -0.0 into 0.0.
     let mut bits = corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));

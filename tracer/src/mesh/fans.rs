@@ -1,9 +1,9 @@
-//! The faces around one place, divided into fans of faces that are smooth among each other.
+//! The faces around one position, divided into fans of smoothly connected faces.
 
 use glam::{DVec3, Vec3};
 
-/// Faces that may share an edge and be smooth over it. An edge of more is a crease: nothing says which belong together, and
-/// looking at all pairs of thousands would take too long.
+/// Largest number of faces at an edge over which faces are smooth. An edge of more is a crease: nothing defines which
+/// of them belong together, and all pairs of thousands would take too long.
 const MOST_AT_AN_EDGE: usize = 8;
 
 /// A corner of a face.
@@ -13,19 +13,19 @@ pub(super) struct Entry {
     pub(super) corner: u8,
 }
 
-/// Averaged normals in one place.
+/// Averaged normals at one position.
 pub(super) struct Fans {
     /// Unit normals, in the order of their first corners.
     pub(super) normals: Vec<Vec3>,
-    /// For each corner the index of its normal.
+    /// Index of the normal of each corner.
     pub(super) of_entries: Vec<u32>,
 }
 
-/// Averages normals over the corners that meet in a place.
+/// Averages normals over the corners at one position.
 ///
-/// `neighbours` are the places at the other ends of a corner's two edges: the one that its face leads to, and the one that
-/// it comes from. `is_smooth` is asked for pairs of corners that share an edge, with `true` where their faces show
-/// opposite sides there: some files have faces with their corners the wrong way round.
+/// `neighbours` are the positions at the other ends of a corner's two edges: the next one in the order of the face,
+/// and the previous one. `is_smooth` is called for pairs of corners that share an edge, with `true` where their faces
+/// have opposite windings: some files have inverted faces.
 pub(super) fn around(
     entries: &[Entry],
     neighbours: impl Fn(&Entry) -> [u32; 2],
@@ -33,7 +33,8 @@ pub(super) fn around(
     weight: impl Fn(&Entry) -> DVec3,
 ) -> Fans {
     let mut sides = Sides::new(entries.len());
-    // Half edges: the place at the other end, the corner, and whether the face leads there.
+    // Half edges: the position at the other end, the corner, and whether the edge leads there in the order of its
+    // face.
     let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(2 * entries.len());
     for (number, entry) in (0_u32..).zip(entries) {
         let [to, from] = neighbours(entry);
@@ -43,8 +44,8 @@ pub(super) fn around(
     for edge in edges.chunk_by(|a, b| a.0 == b.0).filter(|edge| edge.len() <= MOST_AT_AN_EDGE) {
         for (i, &(_, a, a_leads)) in edge.iter().enumerate() {
             for &(_, b, b_leads) in edge.iter().skip(i + 1) {
-                // Of two neighbours one leads to where the other comes from. Where there are more than two, a face that
-                // does not is the other side of something.
+                // Two adjacent faces of equal winding run through the edge in opposite directions. Where there are
+                // more than two, a face of the other winding belongs to the other side of a surface.
                 let turned = a_leads == b_leads;
                 if turned && edge.len() > 2 {
                     continue;
@@ -58,9 +59,9 @@ pub(super) fn around(
     sides.normals(entries, weight)
 }
 
-/// Sets of corners, each of which shows the same side as the first of its set, or the other one.
+/// Disjoint sets of corners, each with the same winding as the first one of its set or with the opposite one.
 struct Sides {
-    /// The corner that this one follows, and whether it shows the other side.
+    /// The parent of each corner, and whether its winding is opposite to the parent's.
     leaders: Vec<(u32, bool)>,
 }
 
@@ -69,7 +70,7 @@ impl Sides {
         Self { leaders: (0..count as u32).map(|corner| (corner, false)).collect() }
     }
 
-    /// The first corner of the set, and whether this one shows its other side.
+    /// The first corner of the set, and whether the winding of this one is opposite.
     fn first(&mut self, corner: u32) -> (u32, bool) {
         let (mut at, mut turned) = (corner, false);
         loop {
@@ -77,7 +78,7 @@ impl Sides {
             if leader == at {
                 return (at, turned);
             }
-            // Halve the way for those that come later.
+            // Path halving.
             let (above, above_turned) = self.leaders[leader as usize];
             self.leaders[at as usize] = (above, is_turned ^ above_turned);
             turned ^= is_turned ^ above_turned;
@@ -87,7 +88,7 @@ impl Sides {
 
     fn join(&mut self, a: u32, b: u32, turned: bool) {
         let ((a, a_turned), (b, b_turned)) = (self.first(a), self.first(b));
-        // The earlier one leads.
+        // The earlier one becomes the parent.
         let (leader, follower) = (a.min(b), a.max(b));
         if leader != follower {
             self.leaders[follower as usize] = (leader, turned ^ a_turned ^ b_turned);
@@ -102,7 +103,7 @@ impl Sides {
             sums[first as usize] += if turned { -weight } else { weight };
         }
         let mut fans = Fans { normals: Vec::new(), of_entries: Vec::with_capacity(entries.len()) };
-        // The normal of each side of each set, once it is asked for.
+        // The normal of each side of each set, once it is computed.
         let mut numbers = vec![[None; 2]; entries.len()];
         for (number, entry) in (0_u32..).zip(entries) {
             let (first, turned) = self.first(number);

@@ -1,16 +1,17 @@
-//! The material slots of a compiled mesh, as bytes.
+//! The material slots of a compiled mesh as bytes.
 //!
-//! Per slot: diffuse, specular, exponent, emission (ten `f32`), flags (`u8`: 1 unlit), the length of the name in
-//! bytes (`u8`), the name, and three textures: diffuse, cut-out, emission. A texture is the length of its file's
-//! name in bytes (`u16`, 0 for none), the name, its wrap (`u8`), scale and offset (four `f32`). Version 3 has neither
-//! emission nor flags, and of one texture the name alone.
+//! Per slot: diffuse, specular, exponent, emission (ten `f32`), flags (`u8`: 1 is unlit), the length of the name in
+//! bytes (`u8`), the name, and three textures: diffuse, cut-out, emission. A texture is the length of its file name
+//! in bytes (`u16`, 0 for none), the name, its wrap (`u8`), scale and offset (four `f32`). Version 3 has neither
+//! emission nor flags, and one texture without wrap, scale and offset.
 
 use glam::{Vec2, Vec3};
 
 use super::{MAX_MATERIALS, MAX_TEXTURE_NAME, MeshError, NamedMaterial, OLDEST_FORMAT_VERSION, TextureFile};
-use crate::scene::{Material, Tiling, Wrap};
+use crate::material::Material;
+use crate::texture::{Tiling, Wrap};
 
-/// Longest name of a material slot, in bytes; longer ones are cut.
+/// Longest name of a material slot, in bytes; longer ones are truncated.
 const MAX_NAME: usize = 255;
 
 const UNLIT: u8 = 1;
@@ -33,7 +34,7 @@ pub(super) fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
 }
 
 fn encode_texture(texture: Option<&TextureFile>, bytes: &mut Vec<u8>) {
-    // Half a path is none.
+    // A truncated path would name no file, so it is dropped.
     let Some(TextureFile { file, tiling }) = texture.filter(|texture| texture.file.len() <= MAX_TEXTURE_NAME)
     else {
         return bytes.extend_from_slice(&[0; 2]);
@@ -47,10 +48,10 @@ fn encode_texture(texture: Option<&TextureFile>, bytes: &mut Vec<u8>) {
     }
 }
 
-/// By their number in the bytes.
+/// Wraps by their number in the bytes.
 const WRAPS: [Wrap; 3] = [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror];
 
-/// Slots in the layout of a version of compiled meshes.
+/// Decodes material slots in the layout of a version.
 pub(super) fn decode_materials(
     bytes: &[u8],
     count: u32,
@@ -85,7 +86,7 @@ impl<'b> Reader<'b> {
     }
 
     fn slot(&mut self) -> Result<NamedMaterial, MeshError> {
-        let material = self.phong()?;
+        let material = self.blinn_phong()?;
         let emission = Vec3::from_array(self.numbers()?);
         let flags = self.byte()?;
         let unlit = flags & UNLIT != 0;
@@ -97,14 +98,14 @@ impl<'b> Reader<'b> {
     }
 
     fn old_slot(&mut self) -> Result<NamedMaterial, MeshError> {
-        let material = self.phong()?;
+        let material = self.blinn_phong()?;
         let length = self.byte()?;
         let name = self.text(length.into())?;
         let texture = Some(self.file_name()?).filter(|name| !name.is_empty()).map(TextureFile::new);
         Ok(NamedMaterial { texture, ..NamedMaterial::plain(name, material) })
     }
 
-    fn phong(&mut self) -> Result<Material, MeshError> {
+    fn blinn_phong(&mut self) -> Result<Material, MeshError> {
         let [dr, dg, db, sr, sg, sb, exponent] = self.numbers()?;
         let (diffuse, specular) = (Vec3::new(dr, dg, db), Vec3::new(sr, sg, sb));
         Ok(Material { diffuse, specular, exponent, ..Material::NEUTRAL })
@@ -115,7 +116,8 @@ impl<'b> Reader<'b> {
         if file.is_empty() {
             return Ok(None);
         }
-        let broken = || MeshError::Format("a texture is laid on in a way that is not known".into());
+        let broken =
+            || MeshError::Format("a texture has an unknown wrap, or scale and offset out of range".into());
         let wrap = *WRAPS.get(usize::from(self.byte()?)).ok_or_else(broken)?;
         let [u, v, right, up] = self.floats()?;
         let tiling = Tiling { wrap, scale: Vec2::new(u, v), offset: Vec2::new(right, up) };
@@ -143,7 +145,7 @@ impl<'b> Reader<'b> {
         Ok(numbers)
     }
 
-    /// Colours and exponents.
+    /// Non-negative numbers: colours and exponents.
     fn numbers<const N: usize>(&mut self) -> Result<[f32; N], MeshError> {
         let numbers = self.floats()?;
         if numbers.iter().any(|number| !(0.0..=1e9).contains(number)) {

@@ -1,31 +1,31 @@
-//! What a compiled mesh holds, and how many bytes each part of it takes.
+//! Sizes of the parts of a compiled mesh.
 
 use super::CompiledMesh;
 use crate::bvh::WIDTH;
 
-/// The bytes of a compiled mesh, part by part. They are the same in memory, in a file and on the wire.
+/// Bytes of a compiled mesh by part. They are the same in memory, in a file and on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshMemory {
-    /// Nodes of the tree, of up to sixteen children each.
+    /// Number of nodes of the tree, with up to sixteen children each.
     pub nodes: usize,
-    /// Room for triangles in the leaves, sixteen by sixteen; some of it is empty.
+    /// Lanes of all blocks, sixteen per leaf; some are empty.
     pub lanes: usize,
     /// Bytes of the nodes.
     pub node_bytes: usize,
-    /// Bytes of the triangles' corners.
+    /// Bytes of the corners of triangles.
     pub triangle_bytes: usize,
-    /// Bytes of the vertex normals and of what names them; zero where the mesh carries none.
+    /// Bytes of the vertex normals and their indices; zero if the mesh has none.
     pub normal_bytes: usize,
-    /// Bytes of the texture coordinates; zero where the mesh carries none.
+    /// Bytes of the texture coordinates; zero if the mesh has none.
     pub uv_bytes: usize,
-    /// Bytes of the colours of vertices; zero where the mesh carries none.
+    /// Bytes of the vertex colours; zero if the mesh has none.
     pub color_bytes: usize,
     /// Bytes of the rest: header, material slots, positions in the source.
     pub rest_bytes: usize,
 }
 
 impl MeshMemory {
-    /// All of it.
+    /// Sum of all parts.
     pub fn total_bytes(&self) -> usize {
         self.node_bytes
             + self.triangle_bytes
@@ -35,24 +35,24 @@ impl MeshMemory {
             + self.rest_bytes
     }
 
-    /// What normals would take at least, were they there: the three numbers of each triangle that name them.
+    /// Lower bound of the bytes that normals would take: their three indices per lane.
     pub fn least_normal_bytes(&self) -> usize {
         self.lanes * size_of::<[u32; 3]>()
     }
 
-    /// What colours of vertices would take, were they there.
+    /// Bytes that vertex colours would take.
     pub fn full_color_bytes(&self) -> usize {
         self.lanes * size_of::<[[u8; 3]; 3]>()
     }
 
-    /// What texture coordinates would take, were they there.
+    /// Bytes that texture coordinates would take.
     pub fn full_uv_bytes(&self) -> usize {
         self.lanes * size_of::<[glam::Vec2; 3]>()
     }
 }
 
 impl CompiledMesh {
-    /// How many bytes each part of it takes.
+    /// Bytes by part.
     pub fn memory(&self) -> MeshMemory {
         let node_bytes = size_of_val(self.nodes());
         let triangle_bytes = size_of_val(self.blocks());

@@ -1,9 +1,11 @@
-//! Triangle meshes: as a file describes them ([`Mesh`]), and ready to trace ([`CompiledMesh`]).
+//! Triangle meshes: as read from a file ([`Mesh`]), and ready to trace ([`CompiledMesh`]).
 //!
-//! A compiled mesh is one immutable blob of bytes, named by its BLAKE3 hash. It is made once, on the master or by
-//! `rayfarm-master compile`, and travels to every worker as it is: all workers walk the same tree.
+//! A compiled mesh is one immutable blob of bytes, named by its BLAKE3 hash. It is built once, on the master or by
+//! `rayfarm-master compile`, and sent to every worker unchanged: all workers traverse the same tree.
 
 mod blob;
+mod build;
+mod check;
 mod clean;
 mod compiled;
 mod fans;
@@ -20,9 +22,11 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::bvh::BuildQuality;
 use crate::cancel::Cancelled;
-use crate::scene::{Material, Tiling};
+use crate::material::Material;
+use crate::texture::Tiling;
 pub(crate) use blob::TriangleBlock;
-pub use compiled::{CompileOptions, CompiledMesh, MeshReport};
+pub use build::{CompileOptions, MeshReport};
+pub use compiled::CompiledMesh;
 pub use memory::MeshMemory;
 
 /// First bytes of a compiled mesh, in memory and on disk.
@@ -31,7 +35,7 @@ pub const MAGIC: [u8; 6] = *b"RFMESH";
 /// Version of the layout of compiled meshes.
 pub const FORMAT_VERSION: u16 = 4;
 
-/// The oldest version that is read: its slots know neither emission nor cut-outs, its triangles no colours.
+/// The oldest version that is read: without emission, cut-outs and vertex colours.
 pub const OLDEST_FORMAT_VERSION: u16 = 3;
 
 /// Most triangles that one mesh may have: they fill at most 2^28 lanes of blocks, and their indices stay inside `u32`.
@@ -62,23 +66,23 @@ impl fmt::Debug for MeshId {
     }
 }
 
-/// A mesh as a file describes it: not cleaned, not indexed for tracing, digits still `f64`.
+/// A mesh as read from a file: not cleaned, not indexed for tracing, still in `f64`.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Vertex positions.
     pub positions: Vec<DVec3>,
-    /// One normal per position, zero where it is missing; or empty where the file gives none. What is missing is averaged
-    /// over the faces, as `smoothing` says.
+    /// One normal per position, zero where it is missing; or empty where the file has none. Missing normals are
+    /// averaged over the faces according to `smoothing`.
     pub normals: Vec<Vec3>,
     /// Corners as indices into `positions`.
     pub triangles: Vec<[u32; 3]>,
-    /// How normals are averaged where there are none.
+    /// Averaging of missing normals.
     pub smoothing: Smoothing,
     /// One index into `materials` per triangle.
     pub triangle_materials: Vec<u16>,
-    /// Texture coordinates of the corners of each triangle, as [`crate::texture::without_repeats`] leaves them; or empty.
+    /// Texture coordinates of the corners of each triangle, as from [`crate::texture::without_repeats`]; or empty.
     pub uvs: Vec<[Vec2; 3]>,
-    /// The whole repeats that were taken off `uvs`, for each triangle; or empty where no texture tells them apart.
+    /// Whole repeats that were removed from `uvs`, for each triangle; or empty where no texture distinguishes them.
     pub uv_repeats: Vec<Vec2>,
     /// Colours of the corners of each triangle, sRGB; or empty.
     pub colors: Vec<[[u8; 3]; 3]>,
@@ -86,16 +90,15 @@ pub struct Mesh {
     pub materials: Vec<NamedMaterial>,
 }
 
-/// Over which faces a missing normal is averaged. Both sides of a surface that is there twice, once for each side, are
-/// never averaged into one.
+/// The faces over which a missing normal is averaged. Two opposite sides of a duplicated surface are never averaged.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Smoothing {
-    /// All that share the position's index.
+    /// All faces with the same position index.
     #[default]
     Full,
-    /// Those that are connected at the corner by edges where faces meet at this angle at most, in degrees.
+    /// Faces connected at the corner by edges with an angle of at most this many degrees.
     CreaseAngle(f64),
-    /// Those that are connected at the corner by edges between faces of one group. A group for each triangle; 0 is flat.
+    /// Faces connected at the corner by edges within one group. One group per triangle; 0 is flat.
     Groups(Vec<u32>),
 }
 
@@ -104,13 +107,13 @@ pub enum Smoothing {
 pub struct NamedMaterial {
     /// Name in the file, for messages.
     pub name: String,
-    /// What the file says of it, but for its textures: an index there means nothing without a scene.
+    /// The material without its textures, whose indices need a scene.
     pub material: Material,
-    /// The texture of its diffuse colour.
+    /// Texture of the diffuse colour.
     pub texture: Option<TextureFile>,
-    /// The picture that says where it is cut out; without it the alpha of `texture` does.
+    /// Picture of the cut-out; without it the alpha of `texture` cuts out.
     pub cutout: Option<TextureFile>,
-    /// The texture of its emission.
+    /// Texture of the emission.
     pub emission_texture: Option<TextureFile>,
 }
 
@@ -120,37 +123,37 @@ impl NamedMaterial {
         Self { name: name.into(), material, texture: None, cutout: None, emission_texture: None }
     }
 
-    /// Its textures.
+    /// All textures.
     pub fn textures(&self) -> impl Iterator<Item = &TextureFile> {
         [&self.texture, &self.cutout, &self.emission_texture].into_iter().flatten()
     }
 
-    /// Its textures, to be changed.
-    pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureFile> {
+    /// The textures, mutable.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureFile> {
         [&mut self.texture, &mut self.cutout, &mut self.emission_texture].into_iter().flatten()
     }
 }
 
-/// The file of a texture, and how it is laid on.
+/// The picture file of a texture and its tiling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureFile {
     /// A path with `/` between its parts, relative to the model's folder, or absolute.
     pub file: String,
-    /// Where it lies.
+    /// Placement in texture space.
     pub tiling: Tiling,
 }
 
 impl TextureFile {
-    /// A picture that repeats once a unit.
+    /// A picture with one repeat per unit.
     pub fn new(file: impl Into<String>) -> Self {
         Self { file: file.into(), tiling: Tiling::default() }
     }
 }
 
-/// Why a mesh cannot be compiled, or bytes are no compiled mesh.
+/// Reason why a mesh cannot be compiled, or bytes are no compiled mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
-    /// Nothing to trace.
+    /// No triangle is left after cleaning.
     #[error(
         "the mesh has no triangle left to trace ({dropped} dropped as degenerate, duplicate or not finite); a model needs at least one triangle with an area"
     )]
@@ -158,20 +161,20 @@ pub enum MeshError {
         /// Triangles that cleaning dropped.
         dropped: usize,
     },
-    /// A bound of this module is exceeded.
+    /// A limit is exceeded.
     #[error("the mesh has {count} {what}; the limit is {limit}")]
     TooMany {
-        /// What there are too many of.
+        /// The limited items.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
-        /// How many there may be.
+        /// The limit.
         limit: usize,
     },
-    /// An index points outside, or two arrays that belong together differ in length.
+    /// An index is out of range, or two arrays of different lengths belong together.
     #[error("the mesh is inconsistent: {0}")]
     Inconsistent(String),
-    /// The result was not wanted any more.
+    /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// The bytes are no compiled mesh of this version.

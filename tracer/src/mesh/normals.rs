@@ -1,8 +1,8 @@
-//! Normals at the corners of triangles: those of the file, and averaged ones where it has none.
+//! Normals at the corners of triangles: those of the file, and averages where it has none.
 //!
-//! Averages are weighted by area. Which faces go into one depends on the edges: around a corner, faces are connected where
-//! they share an edge that is smooth. So a vertex on a crease has a normal for each side of it, and where a surface is
-//! there twice, once for each side, each has its own.
+//! Averages are weighted by area. Around a corner, faces are connected where they share a smooth edge, and a
+//! connected set has one normal. So a vertex on a crease has a normal for each side, and each side of a duplicated
+//! surface has its own.
 
 use std::collections::HashMap;
 
@@ -12,15 +12,15 @@ use rayon::prelude::*;
 use super::clean::CleanMesh;
 use super::fans::{Entry, Fans, around};
 use super::{Mesh, Smoothing};
-use crate::scene::rotation::sin_cos_degrees;
+use crate::rotation::sin_cos_degrees;
 
-/// Degrees by which an angle may exceed the crease angle: a column of nine sides has nine angles of 40 degrees, rounded.
+/// Tolerance of the crease angle, in degrees: a column of nine sides has nine angles of 40 degrees, rounded.
 const ROUNDING: f64 = 0.1;
 
 /// Cosine of the angle at which two faces that share an edge are the two sides of one surface: nearly 180 degrees.
 const OPPOSITE: f64 = -0.999;
 
-/// Places that are looked at together by one thread.
+/// Positions per parallel task.
 const PLACES: usize = 4096;
 
 /// Gives every corner a normal.
@@ -36,7 +36,7 @@ pub(super) fn fill_in(mesh: &Mesh, kept: &mut CleanMesh) {
     }
 }
 
-/// Averaged over all faces that share a position's index.
+/// Normals averaged over all faces that share a position's index.
 fn averaged(mesh: &Mesh, kept: &CleanMesh) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for (indices, corners) in kept.indices.iter().zip(&kept.corners) {
@@ -48,7 +48,7 @@ fn averaged(mesh: &Mesh, kept: &CleanMesh) -> Vec<Vec3> {
     sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
 }
 
-/// The normal of a triangle, as long as twice its area.
+/// The normal of a triangle, with twice its area as its length.
 fn weighted(corners: &[Vec3; 3]) -> DVec3 {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a)
@@ -58,8 +58,8 @@ fn is_flat(groups: &[u32], kept: &CleanMesh) -> bool {
     kept.sources.iter().all(|&source| groups[source as usize] == 0)
 }
 
-/// Averages the normals that are missing. The first one of each place has its number, unless the file gives some: all
-/// others follow.
+/// Averages the missing normals. Without normals in the file, the first one of each position has the position's
+/// index, and all others follow.
 fn fill_in_missing(mesh: &Mesh, given: Vec<Vec3>, kept: &mut CleanMesh) {
     let (places, place_count) = places(mesh);
     let faces = Faces::new(mesh, kept, &places);
@@ -95,12 +95,12 @@ fn fill_in_missing(mesh: &Mesh, given: Vec<Vec3>, kept: &mut CleanMesh) {
     kept.normals = normals;
 }
 
-/// Gives positions that are one place one number, in the order of their first vertices: patches and parts repeat the
-/// vertices of their seams, and averaged normals must not see those seams.
+/// Indices of distinct positions, in the order of their first vertices, and their number: patches and parts repeat
+/// the vertices of their seams, over which normals are averaged.
 fn places(mesh: &Mesh) -> (Vec<u32>, usize) {
     let mut known: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.positions.len());
     let places = mesh.positions.iter().map(|position| {
-        // Adding zero makes one zero of both.
+        // Adding zero turns -0.0 into 0.0.
         let place = position.to_array().map(|coordinate| (coordinate + 0.0).to_bits());
         let next = known.len() as u32;
         *known.entry(place).or_insert(next)
@@ -109,13 +109,13 @@ fn places(mesh: &Mesh) -> (Vec<u32>, usize) {
     (places, known.len())
 }
 
-/// The triangles that are kept, as their neighbours see them.
+/// The kept triangles and their connections.
 struct Faces<'m> {
-    /// Corners as places.
+    /// Corners as indices of positions.
     places: Vec<[u32; 3]>,
-    /// As long as twice the area.
+    /// Normals with twice the area as their length.
     weighted: Vec<DVec3>,
-    /// Of unit length.
+    /// Unit normals.
     normals: Vec<DVec3>,
     smoothing: &'m Smoothing,
     sources: Vec<u32>,
@@ -144,7 +144,7 @@ impl<'m> Faces<'m> {
         }
     }
 
-    /// The averaged normals at the corners that meet in a place.
+    /// The averaged normals at one position.
     fn normals_around(&self, entries: &[Entry]) -> Fans {
         let neighbours = |entry: &Entry| {
             let corners = self.places[entry.triangle as usize];
@@ -156,7 +156,7 @@ impl<'m> Faces<'m> {
         around(entries, neighbours, is_smooth, weight)
     }
 
-    /// Whether two faces that share an edge go over into each other; `turned` when one of them shows its back there.
+    /// Whether two faces that share an edge are smooth over it; `turned` if they have opposite windings there.
     fn is_smooth(&self, a: u32, b: u32, turned: bool) -> bool {
         let cosine = self.normals[a as usize].dot(self.normals[b as usize]);
         let cosine = if turned { -cosine } else { cosine };
@@ -171,7 +171,7 @@ impl<'m> Faces<'m> {
     }
 }
 
-/// The corners of all faces by place, in the order of the faces.
+/// The corners of all faces by position, in the order of the faces.
 struct Entries {
     starts: Vec<usize>,
     entries: Vec<Entry>,

@@ -1,11 +1,10 @@
-//! Cleaning, the round trip through bytes, and bytes that lie.
+//! Cleaning, the round trip through bytes, and invalid bytes.
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::Wrap;
-use crate::texture::without_repeats;
+use crate::texture::{Wrap, without_repeats};
 
 fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let triangle_materials = vec![0; triangles.len()];
@@ -29,7 +28,7 @@ fn sheet(n: u32) -> Mesh {
     mesh(positions, triangles)
 }
 
-/// The same with texture coordinates, and a slot with a texture.
+/// The sheet with texture coordinates, and a slot with a texture.
 fn textured(n: u32) -> Mesh {
     let mut mesh = sheet(n);
     let uv = |v: u32| DVec2::new(mesh.positions[v as usize].x, mesh.positions[v as usize].z * 0.5);
@@ -44,7 +43,7 @@ fn corners(mesh: &CompiledMesh) -> Vec<[Vec3; 3]> {
 }
 
 #[test]
-fn what_cannot_be_traced_is_dropped_and_counted() {
+fn untraceable_triangles_are_dropped_and_counted() {
     let positions = vec![
         DVec3::ZERO,
         DVec3::X,
@@ -84,7 +83,7 @@ fn twenty_thousand_copies_of_one_triangle_become_one() {
 }
 
 #[test]
-fn bytes_come_back_as_the_same_mesh() {
+fn bytes_round_trip() {
     let (compiled, _) = CompiledMesh::compile(&sheet(20)).unwrap();
     let again = CompiledMesh::from_bytes(compiled.bytes()).unwrap();
     assert_eq!(again.id(), compiled.id());
@@ -95,7 +94,7 @@ fn bytes_come_back_as_the_same_mesh() {
 }
 
 #[test]
-fn normals_are_left_out_where_nobody_asks_for_them() {
+fn normals_are_left_out_if_not_requested() {
     let (flat, _) = CompiledMesh::compile_with(
         &sheet(20),
         CompileOptions { normals: false, ..CompileOptions::default() },
@@ -123,9 +122,9 @@ fn the_parts_of_a_mesh_are_all_of_its_bytes() {
 }
 
 #[test]
-fn texture_coordinates_and_names_come_back() {
+fn texture_coordinates_and_names_round_trip() {
     let mut source = textured(9);
-    // Cleaning drops one of them, and its coordinates with it.
+    // Cleaning drops one triangle with its coordinates.
     source.triangles[5] = [0; 3];
     let (compiled, report) = CompiledMesh::compile(&source).unwrap();
     assert_eq!(report.dropped_degenerate, 1);
@@ -141,7 +140,7 @@ fn texture_coordinates_and_names_come_back() {
 }
 
 #[test]
-fn other_material_slots_change_nothing_else() {
+fn new_material_slots_change_nothing_else() {
     let (compiled, _) = CompiledMesh::compile(&textured(5)).unwrap();
     let mut materials = compiled.materials();
     materials[0].texture = Some(TextureFile::new("../elsewhere/a much longer name than before.png"));
@@ -152,7 +151,7 @@ fn other_material_slots_change_nothing_else() {
     assert_eq!(changed.with_materials(&compiled.materials()).unwrap().id(), compiled.id());
 }
 
-/// Everything that a slot and a triangle may carry.
+/// A mesh with all attributes of slots and triangles.
 fn rich(n: u32) -> Mesh {
     let mut mesh = textured(n);
     mesh.uv_repeats = (0..mesh.triangles.len()).map(|i| Vec2::new(i as f32 - 3.0, 7.0)).collect();
@@ -167,7 +166,7 @@ fn rich(n: u32) -> Mesh {
 }
 
 #[test]
-fn repeats_colours_and_all_that_slots_say_come_back() {
+fn repeats_colours_and_slots_round_trip() {
     let mut source = rich(9);
     source.triangles[5] = [0; 3];
     let (compiled, _) = CompiledMesh::compile(&source).unwrap();
@@ -190,7 +189,7 @@ fn repeats_colours_and_all_that_slots_say_come_back() {
         (&(|mesh: &mut Mesh| mesh.colors.truncate(7)) as &dyn Fn(&mut Mesh), "colours of vertices for 7"),
         (&|mesh| mesh.uv_repeats.truncate(7), "whole repeats of texture coordinates for 7"),
         (&|mesh| mesh.uv_repeats[1].x = f32::NAN, "a number of whole repeats is not finite"),
-        (&|mesh| mesh.materials[0].cutout.as_mut().unwrap().tiling.scale.x = 1e7, "laid on in a way"),
+        (&|mesh| mesh.materials[0].cutout.as_mut().unwrap().tiling.scale.x = 1e7, "unknown wrap"),
         (&|mesh| mesh.materials[0].material.emission.x = -1.0, "not in 0..1e9"),
     ] {
         let mut mesh = rich(2);
@@ -201,7 +200,7 @@ fn repeats_colours_and_all_that_slots_say_come_back() {
 }
 
 #[test]
-fn the_version_before_is_still_read() {
+fn the_previous_version_is_read() {
     let (compiled, _) = CompiledMesh::compile(&textured(4)).unwrap();
     let start = compiled.bytes().len() - compiled.header().material_bytes as usize;
     let mut old = compiled.bytes()[..start].to_vec();
@@ -211,7 +210,7 @@ fn the_version_before_is_still_read() {
     old.extend_from_slice(b"\x04clay\x0d\x00maps/clay.png");
     let mut header = blob::Header { version: OLDEST_FORMAT_VERSION, ..*compiled.header() };
     header.material_bytes = (old.len() - start) as u32;
-    // What was reserved then means nothing.
+    // The reserved fields of that version are ignored.
     (header.repeat_count, header.color_count) = (7, 9);
     old[..size_of::<blob::Header>()].copy_from_slice(bytemuck::bytes_of(&header));
     let read = CompiledMesh::from_bytes(&old).unwrap();
@@ -225,7 +224,7 @@ fn the_version_before_is_still_read() {
         ..Material::NEUTRAL
     };
     assert_eq!(slot.material, material);
-    // Changed, it is written anew.
+    // New slots are written in the newest version.
     let changed = read.with_materials(&rich(1).materials).unwrap();
     assert_eq!(changed.materials(), rich(1).materials);
     assert!(!changed.has_colors());
@@ -246,7 +245,7 @@ fn broken_texture_coordinates_are_refused() {
 }
 
 #[test]
-fn averaged_normals_of_a_flat_sheet_stand_upright() {
+fn averaged_normals_of_a_flat_sheet_are_vertical() {
     let mut flat = sheet(4);
     flat.positions.iter_mut().for_each(|position| position.y = 0.0);
     let (compiled, _) = CompiledMesh::compile(&flat).unwrap();
@@ -279,7 +278,7 @@ fn a_mesh_far_from_its_origin_keeps_its_digits() {
 }
 
 #[test]
-fn other_formats_and_versions_are_told_apart() {
+fn other_formats_and_versions_are_refused() {
     let text = CompiledMesh::from_bytes(b"v 0 0 0").unwrap_err().to_string();
     assert!(text.contains("RFMESH") && text.contains("rayfarm-master compile"), "{text}");
     let (compiled, _) = CompiledMesh::compile(&sheet(2)).unwrap();
@@ -290,9 +289,9 @@ fn other_formats_and_versions_are_told_apart() {
     assert!(cut.contains("there are 200"), "{cut}");
 }
 
-/// Where the header keeps its centre and its bounds, and a few places behind them in the first block.
+/// Offsets of the centre and the bounds in the header, and of numbers in the first block.
 #[test]
-fn numbers_that_lead_a_builder_astray_are_refused() {
+fn inconsistent_bounds_and_corners_are_refused() {
     let (compiled, _) = CompiledMesh::compile(&sheet(4)).unwrap();
     let (center, lo, hi) = (16, 40, 64);
     for (at, number) in [(center, 1e90), (center, 5.0), (lo, -1e300), (lo, 9.0), (hi, 1e300), (hi, -9.0)] {
@@ -313,7 +312,7 @@ fn numbers_that_lead_a_builder_astray_are_refused() {
 
 proptest! {
     #[test]
-    fn changed_bytes_are_refused_or_still_a_sound_mesh(
+    fn changed_bytes_are_refused_or_a_valid_mesh(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
         let (compiled, _) = CompiledMesh::compile(&textured(4)).unwrap();

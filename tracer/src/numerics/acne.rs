@@ -1,18 +1,20 @@
-//! Shadows where there are none, and light where there is none: pixels against the oracle's, under the scene's own lights and
+//! Shadow acne and light leaks at surfaces: pixels compared with the oracle's, under the scene's own lights and under
+//! grazing light.
 //! under light that grazes.
 
 use glam::{DVec3, Vec3};
 
-use super::oracle::{affordable, ask, chosen};
+use super::oracle::{affordable, chosen, compare};
 use super::{Check, Effort, Outcome, Subject};
 use crate::camera::Basis;
 use crate::compile::CompileError;
 use crate::scene::{Attenuation, Light, LightKind, Scene};
 
-/// Degrees above a ground that lies flat before the camera.
+/// Elevations of a sun, in degrees above the horizontal plane.
 const ELEVATIONS: [f64; 3] = [0.1, 1.0, 5.0];
 
-/// Counts pixels that are not the oracle's. Asked about first are those in shadow whose neighbours are not: so acne looks.
+/// Counts pixels that differ from the oracle's. Pixels in shadow with few neighbours in shadow are compared first,
+/// because acne consists of them.
 ///
 /// # Errors
 /// A scene that cannot be traced.
@@ -34,19 +36,19 @@ fn under(case: String, subject: &Subject, effort: &Effort) -> Result<Outcome, Co
     let view = subject.view(effort.side);
     let specks = specks(&picture, &lit, view.width as usize);
     let pixels = chosen(&specks, picture.len() / 3, affordable(subject, effort));
-    let verdict = ask(subject, &view, &picture, &pixels);
+    let comparison = compare(subject, &view, &picture, &pixels);
     Ok(Outcome {
         check: Check::Acne,
         case,
         unit: "pixels",
-        tested: verdict.tested,
-        at_edges: verdict.at_edges,
-        wrong: verdict.wrong,
-        failures: verdict.failures.iter().map(ToString::to_string).collect(),
+        tested: comparison.tested,
+        at_edges: comparison.at_edges,
+        wrong: comparison.wrong,
+        failures: comparison.failures.iter().map(ToString::to_string).collect(),
     })
 }
 
-/// White light along the ground, from the right and from behind the camera.
+/// White directional light along the ground, from the right and from behind the camera.
 fn sun(scene: &Scene, elevation: f64) -> Light {
     let Basis { forward, right, .. } = Basis::of(&scene.camera);
     let up = scene.camera.up.normalize_or(DVec3::Y);
@@ -69,7 +71,7 @@ pub(super) fn specks(picture: &[u8], lit: &[u8], width: usize) -> Vec<usize> {
     let is_dark = |x: usize, y: usize| x < width && y < height && dark[y * width + x];
     let neighbours = |pixel: usize| {
         let (x, y) = (pixel % width, pixel / width);
-        // Before the first comes `usize::MAX`, which is outside as well.
+        // The neighbours of index 0 include `usize::MAX`, which is outside as well.
         let columns = [x.wrapping_sub(1), x, x + 1];
         let rows = [y.wrapping_sub(1), y, y + 1];
         let around = rows.into_iter().flat_map(|row| columns.into_iter().map(move |column| (column, row)));

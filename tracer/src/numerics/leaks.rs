@@ -1,15 +1,15 @@
-//! Rays aimed at the edges and vertices of meshes: none may slip between two triangles.
+//! Rays aimed at the edges and vertices of meshes: none may pass between two adjacent triangles.
 //!
-//! An edge *closes*, seen from a point, when triangles lie on both sides of it: whatever rounding does to a ray that is aimed at
-//! it, the ray meets one of them. An outline or a border does not close, and rays aimed at it may pass. A vertex closes when
-//! all of its edges do. Nothing else is assumed of a mesh: it may be open, and may intersect itself.
+//! An edge *closes*, seen from a point, when it has triangles on both sides: a ray that is aimed at it meets one of
+//! them, whatever the rounding. An outline or a border does not close, and rays aimed at it may pass. A vertex closes
+//! when all of its edges do. Nothing else is assumed: a mesh may be open, and may intersect itself.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::placed::placed;
 use super::random::Random;
-use super::replay::slip;
+use super::replay::leak_message;
 use super::seams::{Edge, Seams};
 use super::{Check, Effort, Outcome, Subject};
 use crate::compile::Item;
@@ -18,21 +18,21 @@ use crate::frame::PreparedFrame;
 use crate::trace::PrimitiveId;
 use crate::triangle::ShearedRay;
 
-/// Scale of the scene, and how many of its extents it is moved.
+/// Scales of the scene, and distances by which it is moved, in extents.
 pub(super) const PLACES: [(f64, f64); 7] =
     [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e3), (1.0, 1e6), (1e-6, 1e6), (1e6, 1e6)];
 
-/// Rays that are shot in one go.
+/// Rays per parallel task.
 const PACK: u64 = 4096;
 
-/// Rays that slip through and are named, of each case.
+/// Leaking rays that are described, per case.
 const NAMED: usize = 8;
 
-/// Rays go through points of edges between this share of the edge and the same share before its end.
+/// Smallest distance of the target on an edge from the edge's ends, as a share of the edge.
 const FROM_THE_END: f64 = 1.0 / 64.0;
 
-/// Counts rays that slip through the scene's meshes, from inside and outside, at scales of 10^-6 to 10^6 and moved by up to
-/// 10^6 extents. Without models there is nothing to count.
+/// Counts rays that leak through the scene's meshes, from inside and outside, at scales of 10^-6 to 10^6 and moved by
+/// up to 10^6 extents. A scene without models has no cases.
 ///
 /// # Errors
 /// A scene that cannot be traced.
@@ -40,7 +40,7 @@ pub fn leaks(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
     if subject.scene.models.is_empty() {
         return Ok(Vec::new());
     }
-    // Rays go through cut-outs: that is no leak.
+    // Rays pass cut-outs, which is no leak.
     let mut whole = subject.clone();
     whole.scene.materials.iter_mut().for_each(|material| material.cutout = None);
     let subject = &whole;
@@ -51,8 +51,8 @@ pub fn leaks(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
         let subject = at_place(subject, place, extent);
         let frame = subject.prepared(effort.side)?;
         let pieces = pieces(&subject, &frame, &seams);
-        let Tally { at_edges, wrong, slipped } = shoot(&frame, &pieces, rays);
-        let name = |&ray: &u64| slip(&frame, &pieces, ray, number(ray, place));
+        let Tally { at_edges, wrong, leaked } = shoot(&frame, &pieces, rays);
+        let name = |&ray: &u64| leak_message(&frame, &pieces, ray, number(ray, place));
         Ok(Outcome {
             check: Check::Leaks,
             case: case(place),
@@ -60,7 +60,7 @@ pub fn leaks(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compile
             tested: rays,
             at_edges,
             wrong,
-            failures: slipped.iter().map(name).collect(),
+            failures: leaked.iter().map(name).collect(),
         })
     };
     (0..PLACES.len()).map(at).collect()
@@ -73,55 +73,55 @@ pub(super) fn at_place(subject: &Subject, place: usize, extent: f64) -> Subject 
     subject.with(placed(&subject.scene, scale, offset))
 }
 
-/// What a place is called.
+/// Description of a place.
 pub(super) fn case(place: usize) -> String {
     let (scale, distance) = PLACES[place % PLACES.len()];
     format!("scale {scale:e}, {distance:e} extents away")
 }
 
-/// What `--ray` takes: the same ray at the same place, however many are shot.
+/// Number of a ray for `--ray`: it means the same ray at the same place for every total of rays.
 fn number(ray: u64, place: usize) -> u64 {
     ray * PLACES.len() as u64 + place as u64
 }
 
-/// The ray of its case and the place that a number names.
+/// The ray within its case, and the place: the inverse of [`number`].
 pub(super) fn of_number(number: u64) -> (u64, usize) {
     (number / PLACES.len() as u64, (number % PLACES.len() as u64) as usize)
 }
 
-/// A model in the world, with its seams.
+/// A model in world space, with its seams.
 pub(super) struct Piece<'a> {
     pub(super) model: usize,
     pub(super) seams: &'a Seams,
     /// world = `linear` * mesh + `translation`.
     linear: DMat3,
     translation: DVec3,
-    /// About how large it is, in world units.
+    /// Approximate size, in world units.
     size: f64,
-    /// How far off a point may be, in world units, after rounding on its way from mesh to world to mesh.
+    /// Error bound of a point after rounding from mesh to world to mesh space, in world units.
     rounding: f64,
 }
 
-/// What became of rays.
+/// Counts of rays.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tally {
     pub(super) at_edges: u64,
     pub(super) wrong: u64,
-    /// The first of those that slipped through.
-    pub(super) slipped: Vec<u64>,
+    /// The first rays that leaked.
+    pub(super) leaked: Vec<u64>,
 }
 
 impl Tally {
     fn and(mut self, mut other: Self) -> Self {
-        self.slipped.append(&mut other.slipped);
-        self.slipped.sort_unstable();
-        self.slipped.truncate(NAMED);
+        self.leaked.append(&mut other.leaked);
+        self.leaked.sort_unstable();
+        self.leaked.truncate(NAMED);
         let (at_edges, wrong) = (self.at_edges + other.at_edges, self.wrong + other.wrong);
         Self { at_edges, wrong, ..self }
     }
 }
 
-/// The models of a scene whose meshes have the given seams.
+/// The models of a scene, with the seams of their meshes.
 pub(super) fn pieces<'a>(subject: &Subject, frame: &PreparedFrame, seams: &'a [Seams]) -> Vec<Piece<'a>> {
     let eye = frame.view().camera.position;
     let piece = |(model, description): (usize, &crate::scene::Model)| {
@@ -138,14 +138,14 @@ pub(super) fn pieces<'a>(subject: &Subject, frame: &PreparedFrame, seams: &'a [S
             linear,
             translation: center + description.translate,
             size,
-            // Stretched models lose digits on the way there and back.
+            // Stretched models lose digits on the way to world space and back.
             rounding: 16.0 * f64::EPSILON * farthest * size * inverse,
         })
     };
     subject.scene.models.iter().enumerate().filter_map(piece).collect()
 }
 
-/// Frobenius norm, one for a rotation.
+/// Frobenius norm of a linear map, divided such that a rotation has norm one.
 fn norm(matrix: DMat3) -> f64 {
     let squares =
         matrix.x_axis.length_squared() + matrix.y_axis.length_squared() + matrix.z_axis.length_squared();
@@ -159,17 +159,17 @@ pub(super) fn shoot(frame: &PreparedFrame, pieces: &[Piece<'_>], rays: u64) -> T
         let mut tally = Tally::default();
         for ray in index * PACK..rays.min((index + 1) * PACK) {
             let shot = aim(pieces, &mut random);
-            let slips = shot.closes && !pieces[shot.piece].stops(frame, &shot);
+            let leaks = shot.closes && !pieces[shot.piece].stops(frame, &shot);
             tally.at_edges += u64::from(!shot.closes);
-            tally.wrong += u64::from(slips);
-            tally.slipped.extend((slips && tally.slipped.len() < NAMED).then_some(ray));
+            tally.wrong += u64::from(leaks);
+            tally.leaked.extend((leaks && tally.leaked.len() < NAMED).then_some(ray));
         }
         tally
     };
     (0..rays.div_ceil(PACK)).into_par_iter().map(pack).reduce(Tally::default, Tally::and)
 }
 
-/// One of the rays of [`shoot`].
+/// The ray of [`shoot`] with an index.
 pub(super) fn shot(pieces: &[Piece<'_>], ray: u64) -> Aimed {
     let mut random = Random::new(ray / PACK);
     for _ in 0..ray % PACK {
@@ -183,7 +183,7 @@ fn aim(pieces: &[Piece<'_>], random: &mut Random) -> Aimed {
     pieces[piece].shot(piece, random)
 }
 
-/// A ray at an edge, or at its first end.
+/// A ray aimed at an edge, or at its first end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Aimed {
     pub(super) origin: DVec3,
@@ -191,9 +191,9 @@ pub(super) struct Aimed {
     /// Index of the piece.
     pub(super) piece: usize,
     pub(super) edge: usize,
-    /// Place on the edge; zero at its first end.
+    /// Position of the target on the edge, from 0 at its first end to 1.
     pub(super) share: f64,
-    /// Whether something must stop it.
+    /// Whether the ray must be stopped.
     pub(super) closes: bool,
 }
 
@@ -218,7 +218,7 @@ impl Piece<'_> {
         Aimed { origin, direction, piece, edge, share, closes }
     }
 
-    /// Just below or above a triangle, within the model's box, or around it.
+    /// A random origin: just below or above a triangle, inside the model's box, or around it.
     fn origin(&self, random: &mut Random) -> DVec3 {
         let edge = &self.seams.edges[random.below(self.seams.edges.len())];
         let [a, b] = edge.ends.map(|end| self.world(end));
@@ -237,8 +237,8 @@ impl Piece<'_> {
         self.linear * self.seams.vertices[vertex as usize] + self.translation
     }
 
-    /// Whether triangles lie on both sides of an edge, seen from a point, for certain: so far from the plane through the
-    /// point and the edge that rounding cannot bring them over, not even next to the edge's ends.
+    /// Whether an edge has triangles on both sides for certain, seen from a point: so far from the plane through the
+    /// point and the edge that rounding cannot move them across it, including near the ends of the edge.
     fn closes(&self, origin: DVec3, edge: usize) -> bool {
         let edge: &Edge = &self.seams.edges[edge];
         let [a, b] = edge.ends.map(|end| self.world(end) - origin);
@@ -255,8 +255,8 @@ impl Piece<'_> {
         left && right
     }
 
-    /// Whether something stops a ray: a triangle that has a corner in common with what is aimed at, something before it, or
-    /// something else that coincides with it.
+    /// Whether the scene stops a ray: by a triangle with a corner in common with the target, by a primitive in front
+    /// of it, or by another primitive that coincides with it.
     pub(super) fn stops(&self, frame: &PreparedFrame, shot: &Aimed) -> bool {
         let Some(ray) = frame.to_eye(shot.origin, shot.direction) else { return false };
         let Some((t, primitive)) = frame.closest(&ray, f64::INFINITY) else { return false };
@@ -276,7 +276,8 @@ impl Piece<'_> {
         model == self.model && ends.iter().any(|&end| corners.contains(&self.seams.vertices[end as usize]))
     }
 
-    /// Where the ray meets the triangles at which it is aimed, without a tree; minus infinity where it meets none.
+    /// Distance at which the ray meets the triangles around its target, without a tree; minus infinity where it
+    /// misses them.
     fn exactly(&self, frame: &PreparedFrame, shot: &Aimed) -> f64 {
         self.around(shot)
             .into_iter()
@@ -284,14 +285,14 @@ impl Piece<'_> {
             .fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Where the ray meets one triangle.
+    /// Distance at which the ray meets one triangle.
     pub(super) fn meets(&self, frame: &PreparedFrame, shot: &Aimed, corners: &[DVec3; 3]) -> Option<f64> {
         let ray = frame.to_eye(shot.origin, shot.direction)?;
         let local = frame.instances[self.model].to_mesh(&ray);
         ShearedRay::new(local.origin, local.direction).intersect(corners)
     }
 
-    /// The triangles at which a ray is aimed, in mesh space.
+    /// The triangles around the target of a ray, in mesh space.
     pub(super) fn around(&self, shot: &Aimed) -> Vec<[DVec3; 3]> {
         let seams = self.seams;
         let first = seams.edges[shot.edge].ends[0];
@@ -302,7 +303,7 @@ impl Piece<'_> {
             let [a, b] = edge.ends;
             triangles.extend(seams.opposite(edge).iter().map(|&opposite| sorted([a, b, opposite])));
         }
-        // Each stands at two edges of a vertex.
+        // Each triangle is at two edges of a vertex.
         triangles.sort_unstable();
         triangles.dedup();
         triangles.into_iter().map(|corners| corners.map(|vertex| seams.vertices[vertex as usize])).collect()

@@ -1,10 +1,10 @@
-//! The levels of SIMD that this machine has, against each other: not a byte may differ.
+//! Comparison of the SIMD levels of this machine, byte by byte.
 
 use super::{Check, Effort, Outcome, Subject, differing_bytes, picture};
 use crate::compile::CompileError;
 use crate::simd;
 
-/// Counts bytes of the picture that another level renders than the best one does: an outcome for each other level.
+/// Counts bytes of the picture that differ from those of the best level: one outcome for each other level.
 ///
 /// # Errors
 /// A scene that cannot be traced.

@@ -1,14 +1,14 @@
-//! Whether the numbers hold on a scene: checks that return counts, for whoever wants to see them or to fail on them.
+//! Checks of the numerics on a scene. They return counts, to be printed or asserted.
 //!
 //! | check | what is counted | against |
 //! | --- | --- | --- |
-//! | [`leaks`] | rays that slip between triangles that share the edge or vertex they aim at | geometry alone |
-//! | [`acne`] | pixels darker or brighter than they should be, under the scene's lights and grazing ones | the oracle |
-//! | [`scale`] | bytes that change when the scene is scaled by 2^k | the scene as it is |
-//! | [`offset`] | pixels that are wrong when the scene stands far from the origin | the oracle |
-//! | [`levels`] | bytes that another level of SIMD renders | the best level |
+//! | [`leaks`] | rays that pass between two triangles with a common edge or vertex at which they are aimed | geometry alone |
+//! | [`acne`] | pixels that are too dark or too bright, under the scene's lights and grazing ones | the oracle |
+//! | [`scale`] | bytes that change when the scene is scaled by 2^k | the unscaled scene |
+//! | [`offset`] | wrong pixels when the scene is far from the origin | the oracle |
+//! | [`levels`] | bytes that differ on another level of SIMD | the best level |
 //!
-//! Nothing here is random from run to run: the same scene and [`Effort`] give the same counts on every machine.
+//! The checks are deterministic: the same scene and [`Effort`] give the same counts on every machine.
 
 mod acne;
 mod leaks;
@@ -31,7 +31,9 @@ use crate::compile::{CompileError, CompiledScene};
 use crate::frame::PreparedFrame;
 use crate::mesh::CompiledMesh;
 use crate::render::render_rows;
-use crate::scene::{FrameView, LoadedScene, Scene};
+#[cfg(feature = "import")]
+use crate::scene::LoadedScene;
+use crate::scene::{FrameView, Scene};
 use crate::texture::Texture;
 
 pub use acne::acne;
@@ -42,40 +44,41 @@ pub use replay::replay;
 pub use scale::scale;
 pub use scenes::built_in;
 
-/// A scene with all it names.
+/// A scene with its meshes and textures, to be checked.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// For tables.
+    /// Name for tables.
     pub name: String,
-    /// What to check.
+    /// The scene.
     pub scene: Scene,
-    /// Its meshes.
+    /// Meshes of the scene.
     pub meshes: Vec<Arc<CompiledMesh>>,
-    /// Its textures.
+    /// Textures of the scene.
     pub textures: Vec<Arc<Texture>>,
 }
 
-/// How much is checked.
+/// Extent of the checks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
-    /// Rays aimed at edges and vertices, over all places of the scene together.
+    /// Rays aimed at edges and vertices, in all places of the scene together.
     pub rays: u64,
-    /// Pixels on the longer side of the pictures, one sample each.
+    /// Pixels on the longer side of the pictures, with one sample per pixel.
     pub side: u32,
-    /// Primitives that the oracle may be asked about for each picture: it asks all primitives for each ray of each pixel.
+    /// Ray-primitive tests that the oracle may perform per picture: it tests all primitives for each ray of each
+    /// pixel.
     pub oracle_work: u64,
-    /// Pixels of each picture that the oracle is asked for, whatever that takes; `None`: as many as `oracle_work` allows.
+    /// Pixels of each picture that are compared with the oracle; `None`: as many as `oracle_work` allows.
     pub pixels: Option<u32>,
 }
 
 impl Default for Effort {
-    /// Some seconds for a scene of 100,000 triangles.
+    /// Takes some seconds for a scene of 100,000 triangles.
     fn default() -> Self {
         Self { rays: 200_000, side: 192, oracle_work: 20_000_000, pixels: None }
     }
 }
 
-/// The kinds of checks.
+/// A kind of check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Check {
     /// See [`leaks`].
@@ -102,34 +105,34 @@ impl fmt::Display for Check {
     }
 }
 
-/// What one case of a check counted.
+/// Counts of one case of a check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
     /// The check.
     pub check: Check,
-    /// Under which light, at which place, with which level.
+    /// The case: light, place or level.
     pub case: String,
-    /// What was looked at: rays, pixels or bytes.
+    /// Unit of the counts: rays, pixels or bytes.
     pub unit: &'static str,
-    /// How many of them.
+    /// Number of tested units.
     pub tested: u64,
-    /// Those of them that say nothing: pixels on an edge, where rounding may see either side, and rays that were aimed at an
-    /// outline or a border, which may pass.
+    /// Undecided units: pixels at an edge, where rounding may show either side, and rays aimed at an outline or a
+    /// border, which may pass.
     pub at_edges: u64,
-    /// Those of them that are wrong.
+    /// Wrong units.
     pub wrong: u64,
-    /// What is wrong with the first of these, a line each.
+    /// Descriptions of the first wrong units, one line each.
     pub failures: Vec<String>,
 }
 
 impl Outcome {
-    /// Whether nothing is wrong.
+    /// Whether no unit is wrong.
     pub fn holds(&self) -> bool {
         self.wrong == 0
     }
 }
 
-/// All checks of one scene.
+/// Runs all checks of one scene.
 ///
 /// # Errors
 /// A scene that cannot be traced.
@@ -143,18 +146,19 @@ pub fn run(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, CompileEr
 }
 
 impl Subject {
-    /// What was loaded, under a name.
+    /// A subject from a loaded scene.
+    #[cfg(feature = "import")]
     pub fn new(name: impl Into<String>, loaded: LoadedScene) -> Self {
         let LoadedScene { scene, meshes, textures, .. } = loaded;
         Self { name: name.into(), scene, meshes, textures }
     }
 
-    /// Another scene of the same meshes and textures.
+    /// The subject with another scene of the same meshes and textures.
     fn with(&self, scene: Scene) -> Self {
         Self { scene, ..self.clone() }
     }
 
-    /// The scene's own view, one sample a pixel, `side` pixels long.
+    /// The scene's own view with one sample per pixel, `side` pixels on its longer side.
     fn view(&self, side: u32) -> FrameView {
         let own = FrameView::of(&self.scene);
         let longer = u64::from(own.width.max(own.height)).max(1);
@@ -168,12 +172,12 @@ impl Subject {
         PreparedFrame::new(Arc::new(compiled), &self.view(side))
     }
 
-    /// The picture as bytes, RGB8.
+    /// The picture as RGB8 bytes.
     fn rendered(&self, side: u32) -> Result<Vec<u8>, CompileError> {
         Ok(picture(&self.prepared(side)?))
     }
 
-    /// Largest extent of what is finite; where nothing is, the distance to what the camera looks at.
+    /// Largest extent of the finite geometry; without any, the distance of the camera's look-at point.
     fn extent(&self) -> Result<f64, CompileError> {
         let frame = self.prepared(1)?;
         let camera = &self.scene.camera;
@@ -184,7 +188,7 @@ impl Subject {
 
 fn picture(frame: &PreparedFrame) -> Vec<u8> {
     let mut bytes = vec![0; frame.width() as usize * frame.height() as usize * 3];
-    let _ = render_rows(frame, 0..frame.height(), &mut bytes, &|| false); // nobody cancels it
+    let _ = render_rows(frame, 0..frame.height(), &mut bytes, &|| false); // never cancelled
     bytes
 }
 

@@ -1,17 +1,18 @@
-//! The scene far from the world's origin, with its camera: the picture of the near one, as far as the digits of its positions go.
+//! The scene far from the world's origin, together with its camera: it must give the same picture, up to the digits
+//! of its positions.
 
 use glam::DVec3;
 
-use super::oracle::{affordable, ask, chosen};
+use super::oracle::{affordable, chosen, compare};
 use super::placed::placed;
 use super::{Check, Effort, Outcome, Subject};
 use crate::compile::CompileError;
 
-/// How far, in extents of the scene.
+/// Distances from the origin, in extents of the scene.
 const DISTANCES: [f64; 4] = [1e1, 1e3, 1e5, 1e6];
 
-/// Counts pixels that are not the oracle's, of the scene moved by up to 10^6 of its extents. Asked about first are those that
-/// are not what they were before the scene was moved.
+/// Counts pixels that differ from the oracle's, of the scene moved by up to 10^6 of its extents. Pixels that changed
+/// by the move are compared first.
 ///
 /// # Errors
 /// A scene that cannot be traced.
@@ -24,15 +25,15 @@ pub fn offset(subject: &Subject, effort: &Effort) -> Result<Vec<Outcome>, Compil
         let picture = far.rendered(effort.side)?;
         let changed = changed(&near, &picture);
         let pixels = chosen(&changed, near.len() / 3, affordable(subject, effort));
-        let verdict = ask(&far, &far.view(effort.side), &picture, &pixels);
+        let comparison = compare(&far, &far.view(effort.side), &picture, &pixels);
         Ok(Outcome {
             check: Check::Offset,
             case: format!("{distance:e} extents, {} changed", changed.len()),
             unit: "pixels",
-            tested: verdict.tested,
-            at_edges: verdict.at_edges,
-            wrong: verdict.wrong,
-            failures: verdict.failures.iter().map(ToString::to_string).collect(),
+            tested: comparison.tested,
+            at_edges: comparison.at_edges,
+            wrong: comparison.wrong,
+            failures: comparison.failures.iter().map(ToString::to_string).collect(),
         })
     };
     DISTANCES.into_iter().map(at).collect()

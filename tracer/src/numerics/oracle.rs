@@ -1,4 +1,4 @@
-//! Pixels of the fast path against the oracle's.
+//! Comparison of pixels with the oracle's.
 
 use std::fmt;
 
@@ -9,16 +9,18 @@ use super::{Effort, Subject};
 use crate::reference::Oracle;
 use crate::scene::FrameView;
 
-/// A pixel stands at an edge when what the oracle sees this far away, in pixels, is on either side of what the fast path saw. The fast
-/// path shades points that are rounded to `f32`, to 2^-24 of their distance: in a picture of 16384 pixels that is 2^-10 of one.
+/// Distance in pixels within which a pixel counts as being at an edge: the oracle's colours there bracket the
+/// compared colour. The fast path shades points that are rounded to `f32`, to 2^-24 of their distance: in a picture
+/// of 16384 pixels that is 2^-10 of one.
 const NEXT_TO: f64 = 1.0 / 1024.0;
-/// As far away, at the edge of a shadow: there the rounding of the point counts as often as light that grazes draws it out.
+
+/// The same distance at the edge of a shadow, where grazing light magnifies the rounding of the point.
 const NEXT_TO_SHADOW: f64 = 1.0 / 16.0;
 
-/// Pixels that are wrong and are named, of each case.
+/// Wrong pixels that are described, per case.
 const NAMED: usize = 8;
 
-/// A pixel that is wrong.
+/// A pixel that differs from the oracle's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WrongPixel {
     /// Column and row.
@@ -34,20 +36,20 @@ impl fmt::Display for WrongPixel {
     }
 }
 
-/// What the oracle says of some pixels.
+/// Result of comparing some pixels with the oracle's.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Verdict {
+pub(super) struct Comparison {
     pub(super) tested: u64,
     pub(super) at_edges: u64,
     pub(super) wrong: u64,
-    /// The first of those that are.
+    /// The first wrong pixels.
     pub(super) failures: Vec<WrongPixel>,
 }
 
-/// Asks the oracle of a scene about pixels of its picture. A channel may differ by a step of the encoding.
-pub(super) fn ask(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &[usize]) -> Verdict {
+/// Compares pixels of a scene's picture with the oracle's. A channel may differ by one step of the encoding.
+pub(super) fn compare(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &[usize]) -> Comparison {
     let oracle = Oracle::new(&subject.scene, &subject.meshes, &subject.textures, view);
-    let judge = |&pixel: &usize| {
+    let compared = |&pixel: &usize| {
         let found = [0, 1, 2].map(|channel| picture[pixel * 3 + channel]);
         let (x, y) = (pixel as u32 % view.width, pixel as u32 / view.width);
         let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
@@ -57,13 +59,13 @@ pub(super) fn ask(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &
         let at_edge = !right && around(center).any(|ring| is_between(found, ring.map(seen), expected));
         let wrong = !right && !at_edge;
         let failures = Vec::from_iter(wrong.then_some(WrongPixel { at: [x, y], found, expected }));
-        Verdict { tested: 1, at_edges: at_edge.into(), wrong: wrong.into(), failures }
+        Comparison { tested: 1, at_edges: at_edge.into(), wrong: wrong.into(), failures }
     };
-    pixels.par_iter().map(judge).reduce(Verdict::default, Verdict::and)
+    pixels.par_iter().map(compared).reduce(Comparison::default, Comparison::and)
 }
 
-impl Verdict {
-    /// Of these pixels, and then those.
+impl Comparison {
+    /// The sums of both results.
     fn and(mut self, other: Self) -> Self {
         self.failures.extend(other.failures);
         self.failures.truncate(NAMED);
@@ -76,7 +78,7 @@ impl Verdict {
     }
 }
 
-/// How many pixels the oracle may be asked for.
+/// Number of pixels that the oracle may compute.
 pub(super) fn affordable(subject: &Subject, effort: &Effort) -> usize {
     if let Some(pixels) = effort.pixels {
         return pixels as usize;
@@ -90,12 +92,12 @@ pub(super) fn affordable(subject: &Subject, effort: &Effort) -> usize {
     (effort.oracle_work / (primitives.max(1) * rays) as u64).clamp(16, 4096) as usize
 }
 
-/// `count` pixels of so many: evenly spread, but half of them at most, and these too evenly, from among `first`.
+/// `count` of `pixels` indices: up to half of them from `first`, the others from all, both evenly spread.
 pub(super) fn chosen(first: &[usize], pixels: usize, count: usize) -> Vec<usize> {
     let step = first.len().div_ceil(count.div_ceil(2)).max(1);
     let mut chosen: Vec<usize> = first.iter().copied().step_by(step).collect();
     let rest = count.saturating_sub(chosen.len()).max(1);
-    // From the middle of each share, so that the first is no corner.
+    // The middle of each share, so that the first index is not a corner.
     chosen.extend((0..rest).map(|i| (2 * i + 1) * pixels / (2 * rest)));
     chosen.sort_unstable();
     chosen.dedup();
@@ -106,7 +108,7 @@ fn is_near(found: [u8; 3], expected: [u8; 3]) -> bool {
     found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1)
 }
 
-/// Whether each channel is one that is seen around, or lies between these: beside an edge, colours may change from place to place.
+/// Whether each channel equals one of the surrounding colours, or is between these: near an edge colours may vary.
 pub(super) fn is_between(found: [u8; 3], around: [[u8; 3]; 8], center: [u8; 3]) -> bool {
     (0..3).all(|channel| {
         let seen = || around.iter().chain([&center]).map(|color| color[channel]);
@@ -115,7 +117,7 @@ pub(super) fn is_between(found: [u8; 3], around: [[u8; 3]; 8], center: [u8; 3]) 
     })
 }
 
-/// Rings of places around one.
+/// Rings of positions around one.
 fn around(center: DVec2) -> impl Iterator<Item = [DVec2; 8]> {
     let steps = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
     let ring = move |away: f64| steps.map(|(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * away);

@@ -1,11 +1,11 @@
-//! A scene somewhere else, at another size.
+//! A scene at another place and size.
 
 use glam::DVec3;
 
 use crate::scene::{Attenuation, Light, LightKind, Scene};
 
-/// The scene `factor` times as large, then moved by `offset`: every length grows, and lights with it, so that the picture stays.
-/// With a power of two for a factor, and no offset, not a digit changes.
+/// The scene scaled by `factor`, then moved by `offset`. Lengths and lights scale such that the picture stays the
+/// same, bit for bit for powers of two without an offset.
 pub(super) fn placed(scene: &Scene, factor: f64, offset: DVec3) -> Scene {
     let place = |p: DVec3| p * factor + offset;
     let mut scene = scene.clone();

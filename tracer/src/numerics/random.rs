@@ -1,4 +1,4 @@
-//! Numbers without a pattern, the same on every machine: SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom
+//! Pseudo-random numbers, the same on every machine: SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom
 //! Number Generators", OOPSLA 2014).
 
 use glam::DVec3;
@@ -17,17 +17,17 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub(super) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Below `count`.
+    /// A number below `count`.
     pub(super) fn below(&mut self, count: usize) -> usize {
         (self.bits() % count.max(1) as u64) as usize
     }
 
-    /// In the cube [-1, 1).
+    /// A point in the cube [-1, 1).
     pub(super) fn in_cube(&mut self) -> DVec3 {
         DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }

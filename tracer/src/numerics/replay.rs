@@ -1,4 +1,4 @@
-//! One ray of [`super::leaks`] once more, with all that is known of it.
+//! Repetition of one ray of [`super::leaks`], with a report of all its tests.
 
 use std::fmt::Write;
 
@@ -14,8 +14,8 @@ use crate::reference::Oracle;
 use crate::scene::{Camera, FrameView};
 use crate::trace::{Primitive, RayHit};
 
-/// What is known of a ray that [`super::leaks`] shoots, told by the number that a failure names, in lines; `None` where the scene
-/// has no models.
+/// A report, in lines, of the ray of [`super::leaks`] with the number of a failure; `None` where the scene has no
+/// models.
 ///
 /// # Errors
 /// A scene that cannot be traced.
@@ -31,24 +31,25 @@ pub fn replay(subject: &Subject, effort: &Effort, number: u64) -> Result<Option<
     let shot = shot(&pieces, ray);
     let mut text = format!("ray {number}: {}, ray {ray} there\n", case(place));
     // Writing to a string cannot fail.
-    let _ = tell(&mut text, &subject, &frame, &pieces[shot.piece], &shot);
+    let _ = report(&mut text, &subject, &frame, &pieces[shot.piece], &shot);
     Ok(Some(text))
 }
 
-/// A ray that slipped through, in one line.
-pub(super) fn slip(frame: &PreparedFrame, pieces: &[Piece<'_>], ray: u64, number: u64) -> String {
+/// A leaking ray in one line.
+pub(super) fn leak_message(frame: &PreparedFrame, pieces: &[Piece<'_>], ray: u64, number: u64) -> String {
     let shot = shot(pieces, ray);
     let piece = &pieces[shot.piece];
     let found = frame.closest_hit(shot.origin, shot.direction, f64::INFINITY);
-    let sees = found.map_or_else(|| "nothing".to_owned(), |hit| named(frame, &hit));
+    let hit = found.map_or_else(|| "nothing".to_owned(), |hit| named(frame, &hit));
     format!(
-        "ray {number} slips through {} at {}: it sees {sees}; --ray {number} shows it again",
+        "ray {number} leaks through {} at {}: it hits {hit}; --ray {number} replays it",
         named_mesh(frame, piece.model),
         target(frame, piece, &shot),
     )
 }
 
-fn tell(
+/// Writes the report of a ray.
+fn report(
     text: &mut String,
     subject: &Subject,
     frame: &PreparedFrame,
@@ -64,17 +65,17 @@ fn tell(
         writeln!(text, "    {}: {met}", with_corners(&frame.instances[piece.model].mesh, &corners))?;
     }
     let found = frame.closest_hit(origin, direction, f64::INFINITY);
-    writeln!(text, "  the fast path sees {}", seen(frame, found))?;
-    writeln!(text, "  the oracle sees    {}", seen(frame, by_the_oracle(subject, origin, direction)))?;
-    let verdict = match (shot.closes, piece.stops(frame, shot)) {
-        (false, _) => "may pass: seen from there, triangles lie on one side only of what it is aimed at",
-        (true, true) => "is stopped, as it must be",
-        (true, false) => "SLIPS THROUGH: triangles lie on all sides of what it is aimed at",
+    writeln!(text, "  the fast path hits {}", described(frame, found))?;
+    writeln!(text, "  the oracle hits    {}", described(frame, by_the_oracle(subject, origin, direction)))?;
+    let result = match (shot.closes, piece.stops(frame, shot)) {
+        (false, _) => "may pass: seen from its origin, its target has triangles on one side only",
+        (true, true) => "is stopped, as required",
+        (true, false) => "LEAKS: its target has triangles on all sides",
     };
-    writeln!(text, "  it {verdict}")
+    writeln!(text, "  it {result}")
 }
 
-/// What the oracle sees from a point.
+/// The oracle's closest hit from a point.
 fn by_the_oracle(subject: &Subject, origin: DVec3, direction: DVec3) -> Option<RayHit> {
     let look_at = origin + direction;
     let up = if direction.cross(DVec3::Y) == DVec3::ZERO { DVec3::X } else { DVec3::Y };
@@ -83,7 +84,7 @@ fn by_the_oracle(subject: &Subject, origin: DVec3, direction: DVec3) -> Option<R
     Oracle::new(&subject.scene, &subject.meshes, &subject.textures, &view).closest_hit(direction)
 }
 
-fn seen(frame: &PreparedFrame, hit: Option<RayHit>) -> String {
+fn described(frame: &PreparedFrame, hit: Option<RayHit>) -> String {
     hit.map_or_else(|| "nothing".to_owned(), |hit| format!("{} at t = {:?}", named(frame, &hit), hit.t))
 }
 
@@ -99,7 +100,7 @@ fn target(frame: &PreparedFrame, piece: &Piece<'_>, shot: &Aimed) -> String {
     format!("{what} of {}", at.join(", "))
 }
 
-/// As the scene and its file name them, counted from 1.
+/// Name of a model, counted from 1 as in the scene, and its mesh.
 fn named_mesh(frame: &PreparedFrame, model: usize) -> String {
     let id: String = frame.instances[model].mesh.id().to_string().chars().take(8).collect();
     format!("model {} (mesh {id})", model + 1)

@@ -1,4 +1,4 @@
-//! The scene scaled by powers of two: not a byte may change.
+//! The scene scaled by powers of two: no byte of the picture may change.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use super::placed::placed;
 use super::{Check, Effort, Outcome, Subject, differing_bytes};
 use crate::compile::CompileError;
 
-/// The largest k of 2^k.
+/// Largest k of the factors 2^k.
 const MOST: i32 = 20;
 
 /// Counts bytes of the picture that change when the scene is scaled by 2^k, k from -20 to 20.

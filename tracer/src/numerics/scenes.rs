@@ -1,4 +1,4 @@
-//! Scenes of nothing but shapes, for checks without a scene file.
+//! Built-in scenes of simple shapes, for checks without a scene file.
 
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use crate::scene::{
     Scene, Sphere,
 };
 
-/// A plane, spheres on it, and a torus over it, flat and smooth.
+/// Three scenes: a plane, spheres on it, and flat and smooth tori over it.
 ///
 /// # Errors
-/// None that could happen: the torus is a mesh.
+/// None in practice: the torus is a valid mesh.
 pub fn built_in() -> Result<Vec<Subject>, MeshError> {
     let plane = ground();
     let mut spheres = ground();
@@ -70,7 +70,7 @@ fn ground() -> Scene {
     }
 }
 
-/// A torus around the y axis, of radii 1 and 0.4: closed, with a hole, facets of all orientations.
+/// A torus around the y axis with radii 1 and 0.4: closed, with a hole, facets in all orientations.
 pub(super) fn torus(around: u32, across: u32) -> Mesh {
     let angle = |k: u32, n: u32| std::f64::consts::TAU * f64::from(k) / f64::from(n);
     let point = |i: u32, j: u32| {

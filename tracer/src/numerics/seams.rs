@@ -1,4 +1,4 @@
-//! Where the triangles of a mesh meet: its vertices and edges, with what lies on each side of them.
+//! Seams of a mesh: its vertices and edges, with the triangles on each side.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -7,20 +7,20 @@ use glam::{DVec3, Vec3};
 
 use crate::mesh::CompiledMesh;
 
-/// The vertices and edges of a mesh. Corners at one place are one vertex, whatever the file says.
+/// The vertices and edges of a mesh. Corners at one position are one vertex, whatever the file's indices.
 pub(super) struct Seams {
-    /// In mesh space.
+    /// Vertices in mesh space.
     pub(super) vertices: Vec<DVec3>,
     pub(super) edges: Vec<Edge>,
-    /// The third corners of the triangles at each edge.
+    /// The third corners of the triangles at all edges.
     opposite: Vec<u32>,
-    /// The edges at each vertex.
+    /// The edges at all vertices, vertex by vertex.
     spokes: Vec<u32>,
-    /// Where those of a vertex begin, and after the last vertex the end.
+    /// Offset of each vertex's edges in `spokes`, then the length.
     first_spoke: Vec<u32>,
 }
 
-/// Two vertices.
+/// An edge between two vertices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
     pub(super) ends: [u32; 2],
@@ -57,12 +57,13 @@ impl Seams {
     }
 }
 
-/// Distinct places of corners, and the triangles as indices of them. Those with two corners in one place have no edges.
+/// Distinct positions of corners, and the triangles as indices of them. Triangles with two corners at one position
+/// are left out.
 fn welded(mesh: &CompiledMesh) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
     let mut vertices = Vec::new();
     let mut number_of = |corner: Vec3| {
-        // Minus zero is zero.
+        // Minus zero equals zero.
         let corner = corner + Vec3::ZERO;
         *numbers.entry(corner.to_array().map(f32::to_bits)).or_insert_with(|| {
             vertices.push(corner.as_dvec3());
@@ -74,7 +75,7 @@ fn welded(mesh: &CompiledMesh) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     (vertices, triangles)
 }
 
-/// The edges at each vertex, vertex by vertex, and where those of each begin.
+/// The edges at all vertices, and the offset of each vertex's edges.
 fn spokes(vertices: usize, edges: &[Edge]) -> (Vec<u32>, Vec<u32>) {
     let mut first = vec![0_u32; vertices + 1];
     for end in edges.iter().flat_map(|edge| edge.ends) {

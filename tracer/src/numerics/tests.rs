@@ -1,10 +1,10 @@
-//! The checks hold where they should, and see what is wrong where something is.
+//! The checks pass on correct scenes and detect faults.
 
 use glam::DVec3;
 
 use super::leaks::{Tally, pieces, shoot, shot};
-use super::oracle::{Verdict, ask, chosen, is_between};
-use super::replay::slip;
+use super::oracle::{Comparison, chosen, compare, is_between};
+use super::replay::leak_message;
 use super::scenes::torus;
 use super::seams::Seams;
 use super::*;
@@ -16,7 +16,7 @@ fn tori() -> Subject {
 }
 
 #[test]
-fn the_built_in_scenes_hold() {
+fn the_built_in_scenes_pass() {
     for subject in built_in().unwrap() {
         let outcomes = run(&subject, &LITTLE).unwrap();
         let broken: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.holds()).collect();
@@ -43,7 +43,7 @@ fn a_torus_has_the_seams_that_euler_counts() {
     }
 }
 
-/// One of 3072 triangles is missing: rays aimed at its edges slip through.
+/// With one of 3072 triangles missing, rays aimed at its edges leak.
 #[test]
 fn a_missing_triangle_leaks() {
     let whole = tori();
@@ -63,22 +63,22 @@ fn a_missing_triangle_leaks() {
     assert_eq!(wrong, 0);
     assert!((1_000..50_000).contains(&at_edges), "{at_edges} of 100,000 at outlines");
     let frame = frame_of(&broken);
-    let Tally { wrong, slipped, .. } = count(&frame);
-    assert!((5..1_000).contains(&wrong), "{wrong} of 100,000 slipped through one hole of 3,072");
-    assert_eq!(slipped.len(), wrong.min(8) as usize);
-    // Each is named: by number, mesh and triangles.
-    let told = slip(&frame, &pieces(&whole, &frame, &seams), slipped[0], 7 * slipped[0]);
-    let [number, id] = [(7 * slipped[0]).to_string(), broken_id.to_string()];
-    for word in [format!("ray {number} slips through model "), id[..8].to_owned(), format!("--ray {number}")]
+    let Tally { wrong, leaked, .. } = count(&frame);
+    assert!((5..1_000).contains(&wrong), "{wrong} of 100,000 leaked through one hole of 3,072");
+    assert_eq!(leaked.len(), wrong.min(8) as usize);
+    // Each failure names its ray, mesh and triangles.
+    let message = leak_message(&frame, &pieces(&whole, &frame, &seams), leaked[0], 7 * leaked[0]);
+    let [number, id] = [(7 * leaked[0]).to_string(), broken_id.to_string()];
+    for word in [format!("ray {number} leaks through model "), id[..8].to_owned(), format!("--ray {number}")]
     {
-        assert!(told.contains(&word), "{word}: {told}");
+        assert!(message.contains(&word), "{word}: {message}");
     }
-    assert!(told.contains(" triangle ") && told.contains("it sees "), "{told}");
+    assert!(message.contains(" triangle ") && message.contains("it hits "), "{message}");
 }
 
-/// The number that a failure names shows the same ray again, whatever else is shot.
+/// The number of a failure repeats the same ray, for every total of rays.
 #[test]
-fn a_ray_is_shown_again() {
+fn a_ray_is_replayed() {
     let subject = tori();
     let seams = [Seams::of(&subject.meshes[0])];
     let frame = subject.prepared(8).unwrap();
@@ -88,39 +88,39 @@ fn a_ray_is_shown_again() {
     let text = replay(&subject, &LITTLE, number).unwrap().unwrap();
     let from = format!("from {:?} along {:?}", shot.origin, shot.direction);
     assert!(text.starts_with("ray 35021: scale 1e0, 0e0 extents away, ray 5003 there\n"), "{text}");
-    for word in [from.as_str(), "aimed at the ", " met at t = ", "the fast path sees ", "the oracle sees "] {
+    for word in [from.as_str(), "aimed at the ", " met at t = ", "the fast path hits ", "the oracle hits "] {
         assert!(text.contains(word), "{word}: {text}");
     }
-    // Both see the same, and it is said what that means.
+    // Both hits are the same, and the report interprets them.
     let after = |what: &str| text.split(what).nth(1).and_then(|rest| rest.lines().next()).unwrap().trim();
     let thing = |seen: &str| seen.split(" at t = ").next().unwrap().to_owned();
     assert!(text.contains("is stopped") || text.contains("may pass"), "{text}");
     assert!(text.contains("aimed at the edge") || text.contains("aimed at the vertex"), "{text}");
-    assert_eq!(after("fast path sees") == "nothing", after("oracle sees") == "nothing", "{text}");
-    assert!(!thing(after("fast path sees")).is_empty());
+    assert_eq!(after("fast path hits") == "nothing", after("oracle hits") == "nothing", "{text}");
+    assert!(!thing(after("fast path hits")).is_empty());
     assert_eq!(replay(&built_in().unwrap()[0], &LITTLE, 1).unwrap(), None, "a plane has no edges");
 }
 
 #[test]
-fn the_oracle_sees_a_pixel_that_is_wrong() {
+fn the_oracle_detects_a_wrong_pixel() {
     let subject = tori();
     let mut picture = subject.rendered(64).unwrap();
     let view = subject.view(64);
     let pixels = chosen(&[], picture.len() / 3, 40);
-    let fine = ask(&subject, &view, &picture, &pixels);
+    let fine = compare(&subject, &view, &picture, &pixels);
     assert_eq!((fine.tested, fine.wrong), (40, 0));
     for &pixel in &pixels[..3] {
         picture[pixel * 3 + 1] ^= 0x20;
     }
-    let broken = ask(&subject, &view, &picture, &pixels);
-    let told = broken.failures[0].to_string();
+    let broken = compare(&subject, &view, &picture, &pixels);
+    let message = broken.failures[0].to_string();
     let (x, y) = (pixels[0] as u32 % view.width, pixels[0] as u32 / view.width);
-    assert!(told.starts_with(&format!("pixel ({x}, {y}) is [")), "{told}");
-    assert_eq!(broken, Verdict { wrong: 3, failures: broken.failures.clone(), ..fine });
+    assert!(message.starts_with(&format!("pixel ({x}, {y}) is [")), "{message}");
+    assert_eq!(broken, Comparison { wrong: 3, failures: broken.failures.clone(), ..fine });
 }
 
 #[test]
-fn specks_are_shadows_by_themselves() {
+fn specks_are_isolated_shadows() {
     let (width, height) = (8, 6);
     let lit = vec![200; width * height * 3];
     let mut picture = lit.clone();
@@ -132,7 +132,7 @@ fn specks_are_shadows_by_themselves() {
 }
 
 #[test]
-fn pixels_are_chosen_from_all_over_and_from_those_that_matter() {
+fn pixels_are_chosen_evenly_and_from_the_first_ones() {
     assert_eq!(chosen(&[], 100, 4), [12, 37, 62, 87]);
     assert_eq!(chosen(&[5, 6], 100, 4), [5, 6, 25, 75]);
     let many: Vec<usize> = (0..1000).collect();
@@ -141,7 +141,7 @@ fn pixels_are_chosen_from_all_over_and_from_those_that_matter() {
 }
 
 #[test]
-fn a_scene_is_placed_with_all_that_is_in_it() {
+fn a_scene_is_placed_with_all_its_objects() {
     let subject = tori();
     let moved = placed::placed(&subject.scene, 2.0, DVec3::new(10.0, 0.0, 0.0));
     assert_eq!(moved.models[1].translate, DVec3::new(11.6, 1.2, 0.0));
@@ -151,7 +151,7 @@ fn a_scene_is_placed_with_all_that_is_in_it() {
 }
 
 #[test]
-fn what_lies_between_colours_is_between_them_in_every_channel() {
+fn colours_are_compared_channel_by_channel() {
     let mut around = [[100, 50, 0]; 8];
     around[3] = [140, 10, 0];
     let is = |found| is_between(found, around, [100, 50, 0]);

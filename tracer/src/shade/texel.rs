@@ -201,7 +201,7 @@ impl PointUvs {
             return [u, v];
         }
         let [u, v] = match &self.repeats {
-            Some(repeats) if tiling.tells_repeats_apart() => {
+            Some(repeats) if tiling.distinguishes_repeats() => {
                 [u + repeats[0].load(simd), v + repeats[1].load(simd)]
             }
             _ => [u, v],

@@ -1,4 +1,4 @@
-//! Adaptive anti-aliasing, from outside: what it saves, and what it may not change.
+//! Adaptive anti-aliasing through the public API: savings and errors.
 
 use crate::common::{analytic, empty, instanced, render};
 use rayfarm_tracer::RayCounts;
@@ -19,7 +19,7 @@ fn rmse(a: &RgbImage, b: &RgbImage) -> f64 {
 }
 
 #[test]
-fn most_of_the_error_goes_for_a_part_of_the_rays() {
+fn a_part_of_the_rays_removes_most_of_the_error() {
     let (toruses, mesh) = instanced(200, 150);
     for (scene, meshes) in [(analytic(200, 150), vec![]), (toruses, vec![mesh])] {
         let (reference, _) = shot(&scene, &meshes, 64, false);
@@ -37,7 +37,7 @@ fn most_of_the_error_goes_for_a_part_of_the_rays() {
 }
 
 #[test]
-fn a_picture_without_edges_takes_a_ray_a_corner_and_is_that_of_regular_sampling() {
+fn a_picture_without_edges_takes_one_ray_per_corner() {
     let scene = empty(70, 48);
     let (regular, _) = shot(&scene, &[], 16, false);
     let (adaptive, counts) = shot(&scene, &[], 16, true);
@@ -48,7 +48,7 @@ fn a_picture_without_edges_takes_a_ray_a_corner_and_is_that_of_regular_sampling(
 }
 
 #[test]
-fn one_sample_a_pixel_leaves_nothing_to_adapt() {
+fn one_sample_per_pixel_leaves_nothing_to_adapt() {
     let scene = analytic(60, 40);
     assert_eq!(shot(&scene, &[], 1, true), shot(&scene, &[], 1, false));
 }

@@ -1,4 +1,4 @@
-//! What is seen does not depend on how well the tree over a mesh is built, nor on how many threads build it.
+//! Pictures do not depend on the build quality of a mesh's tree, nor on the number of threads that build it.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

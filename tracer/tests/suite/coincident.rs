@@ -1,4 +1,4 @@
-//! Surfaces in one plane: of each surface the whole is seen or nothing, in one even colour, on every path.
+//! Coplanar surfaces: one of them is visible as a whole, in one even colour, on every path.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,11 +16,11 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, Primitive, render_rows};
 
 const SIDE: u32 = 96;
 
-/// The materials of the tests: outside red, inside grey.
+/// Materials of the tests: red outside, grey inside.
 const OUTSIDE: u32 = 0;
 const INSIDE: u32 = 1;
 
-/// A quad of corners that go round, as two triangles that share the diagonal from corner `first`.
+/// A quad with its corners in order, as two triangles that share the diagonal from corner `first`.
 fn fan(corners: [DVec3; 4], first: usize) -> [[DVec3; 3]; 2] {
     let at = |i: usize| corners[(first + i) % 4];
     [[at(0), at(1), at(2)], [at(0), at(2), at(3)]]
@@ -49,7 +49,7 @@ fn mesh_of(triangles: &[([DVec3; 3], u16)]) -> Arc<CompiledMesh> {
     Arc::new(CompiledMesh::compile(&mesh).unwrap().0)
 }
 
-/// Both sides of a wall, the inside cut along the given diagonal. The placement is applied before the rounding to `f32`.
+/// Both sides of a wall, the inside divided by the given diagonal. The placement is applied before rounding to `f32`.
 fn two_sided(place: impl Fn(DVec3) -> DVec3, outside_first: bool, diagonal: usize) -> Arc<CompiledMesh> {
     let outside = fan(wall().map(&place), 0).map(|triangle| (triangle, OUTSIDE as u16));
     let inside = fan(turned(wall()).map(&place), diagonal).map(|triangle| (triangle, INSIDE as u16));
@@ -68,7 +68,7 @@ fn model(mesh: &CompiledMesh) -> Model {
     }
 }
 
-/// A scene before a black background, without light but ambient.
+/// A scene with a black background and ambient light only.
 fn dark_scene(eye: DVec3, look_at: DVec3) -> Scene {
     let mut scene = empty(SIDE, SIDE * 3 / 4);
     scene.background = Background::Color(Vec3::ZERO);
@@ -79,7 +79,7 @@ fn dark_scene(eye: DVec3, look_at: DVec3) -> Scene {
     scene
 }
 
-/// How many pixels have which colour.
+/// Number of pixels of each colour.
 fn colours(image: &RgbImage) -> BTreeMap<[u8; 3], usize> {
     let mut counts = BTreeMap::new();
     for pixel in image.pixels.chunks_exact(3) {
@@ -89,7 +89,7 @@ fn colours(image: &RgbImage) -> BTreeMap<[u8; 3], usize> {
     counts
 }
 
-/// Renders a scene and holds each pixel against the oracle and against a single ray. Returns the colours.
+/// Renders a scene and compares each pixel with the oracle and with a single ray. Returns the colours.
 fn seen(scene: &Scene, meshes: &[Arc<CompiledMesh>]) -> BTreeMap<[u8; 3], usize> {
     let view = FrameView::of(scene);
     let (image, _) = render(scene, meshes, &view);
@@ -103,7 +103,7 @@ fn seen(scene: &Scene, meshes: &[Arc<CompiledMesh>]) -> BTreeMap<[u8; 3], usize>
     let pairs = image.pixels.chunks_exact(3).zip(expected.pixels.chunks_exact(3));
     let off = pairs.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) > 1)).count();
     assert!(off <= 2, "{off} pixels are not the oracle's");
-    // In bands of other heights the same bytes.
+    // The same bytes in bands of other heights.
     let mut bands = RgbImage::new(view.width, view.height);
     let (mut from, row) = (0, view.width as usize * 3);
     while from < view.height {
@@ -116,7 +116,7 @@ fn seen(scene: &Scene, meshes: &[Arc<CompiledMesh>]) -> BTreeMap<[u8; 3], usize>
     colours(&image)
 }
 
-/// The colours of a scene must be one, that of this material; every fourth ray asked alone sees it as well.
+/// Asserts that the scene has one colour, that of this material, also for every fourth single ray.
 fn assert_even(what: &str, scene: &Scene, meshes: &[Arc<CompiledMesh>], material: u32) {
     let found = seen(scene, meshes);
     assert_eq!(found.len(), 1, "{what}: {found:?}");
@@ -136,7 +136,7 @@ fn turns() -> [DMat3; 4] {
 }
 
 #[test]
-fn of_the_two_sides_of_a_wall_the_one_that_faces_the_camera_is_seen() {
+fn of_two_sides_of_a_wall_the_front_side_is_visible() {
     for (index, turn) in turns().into_iter().enumerate() {
         for (scale, offset) in [(1.0, 0.0), (1.0, 37.7), (1e-6, 0.0), (3e5, 1e3), (1.0, 1e6)] {
             for case in 0..4 {
@@ -182,7 +182,7 @@ fn a_wall_under_light_is_even_and_its_far_side_is_dark() {
             assert_eq!(lit.len(), 1, "turn {index}, light at {elevation}: {lit:?}");
             scene.lights[0].shadows = false;
             assert_eq!(seen(&scene, &[Arc::clone(&mesh)]), lit, "no shadow falls on it");
-            // From behind it is unlit.
+            // It is unlit from behind.
             scene.lights[0].shadows = true;
             scene.camera.position = turn * DVec3::new(0.4, 0.3, -8.0);
             let behind = seen(&scene, &[Arc::clone(&mesh)]);
@@ -193,7 +193,7 @@ fn a_wall_under_light_is_even_and_its_far_side_is_dark() {
 }
 
 #[test]
-fn instances_in_one_plane_have_one_winner() {
+fn of_coplanar_instances_one_is_visible() {
     let one_side =
         |material: u16, corners| mesh_of(&fan(corners, usize::from(material)).map(|t| (t, material)));
     for rotate in [DVec3::ZERO, DVec3::new(20.0, 35.0, 50.0), DVec3::new(-70.0, 12.0, 5.0)] {
@@ -219,7 +219,7 @@ fn instances_in_one_plane_have_one_winner() {
                 material,
             );
         }
-        // Of two that face the camera the first is seen.
+        // Of two that face the camera the first one is visible.
         let both = [one_side(0, wall()), one_side(1, wall())];
         for (first, second, material) in [(0, 1, OUTSIDE), (1, 0, INSIDE)] {
             scene.models = vec![placed(&both[first], 1.0), placed(&both[second], 1.0)];
@@ -246,9 +246,9 @@ fn triangles_of_the_scene_follow_the_same_rule() {
     }
 }
 
-/// Whichever way it is wound, and whatever it is part of.
+/// For both windings, and for triangles of scenes and meshes.
 #[test]
-fn what_lies_on_a_plane_is_seen_on_it() {
+fn items_on_a_plane_are_visible() {
     for (index, turn) in turns().into_iter().enumerate() {
         for side in [1.0, -1.0] {
             let mut scene = dark_scene(turn * DVec3::new(0.2, 0.4, 3.5 * side), DVec3::ZERO);
@@ -272,7 +272,7 @@ fn what_lies_on_a_plane_is_seen_on_it() {
                 let mut with_model = scene.clone();
                 with_model.models = vec![model(&mesh)];
                 let as_model = red(&seen(&with_model, &[mesh]));
-                // As many pixels as without the plane, but for those on the edges.
+                // The same number of pixels as without the plane, except at the edges.
                 with_triangle.planes.clear();
                 let alone: usize = seen(&with_triangle, &[]).values().sum();
                 assert!(
@@ -285,9 +285,9 @@ fn what_lies_on_a_plane_is_seen_on_it() {
     }
 }
 
-/// Single rays see what the picture shows, from outside of the camera as well.
+/// Single rays hit what the picture shows, also from outside of the camera.
 #[test]
-fn a_single_ray_sees_the_same_surface_all_over() {
+fn single_rays_hit_the_same_surface_everywhere() {
     for turn in turns() {
         let mesh = two_sided(|p| turn * p, false, 1);
         let mut scene = dark_scene(DVec3::new(9.0, 8.0, 7.0), DVec3::ZERO);
@@ -306,9 +306,9 @@ fn a_single_ray_sees_the_same_surface_all_over() {
     }
 }
 
-/// The rule does not reach farther than rounding: what is a thousandth nearer is seen.
+/// The rule does not reach beyond rounding: a surface that is a thousandth nearer is visible.
 #[test]
-fn surfaces_that_are_apart_stay_apart() {
+fn separate_surfaces_are_not_coincident() {
     let mesh = two_sided(|p| p, true, 1);
     let mut scene = dark_scene(DVec3::new(0.4, 0.3, 3.0), DVec3::ZERO);
     for (nearer, material) in [(1e-5, INSIDE), (-1e-5, OUTSIDE)] {

@@ -1,4 +1,4 @@
-//! However a frame is cut, and whoever renders the pieces, it is the same frame.
+//! Every division of a frame into rows, by any threads, gives the same frame.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 const SCENES: [&str; 5] = ["room.toml", "lights.toml", "textured.toml", "instances.toml", "product.toml"];
 
-/// One column, less than a tile, a tile and a bit, tiles and a bit.
+/// Widths: one column, less than a tile, a tile and some columns, tiles and some columns.
 const WIDTHS: [u32; 6] = [1, 3, 15, 17, 33, 150];
 
 const THREADS: usize = 4;
@@ -18,7 +18,7 @@ fn compiled(name: &str) -> Arc<CompiledScene> {
     Arc::new(CompiledScene::new(loaded.scene, loaded.meshes, loaded.textures).unwrap())
 }
 
-/// The next of a sequence without pattern (Marsaglia, "Xorshift RNGs", 2003).
+/// The next number of a pseudo-random sequence (Marsaglia, "Xorshift RNGs", 2003).
 fn next(state: &mut u32) -> u32 {
     *state ^= *state << 13;
     *state ^= *state >> 17;
@@ -32,7 +32,7 @@ fn rendered(frame: &PreparedFrame, rows: std::ops::Range<u32>) -> Vec<u8> {
     bytes
 }
 
-/// Rows at which pieces begin and end: some of one row, some of many.
+/// Boundaries of pieces: some of one row, some of many.
 fn cuts(height: u32, state: &mut u32) -> Vec<u32> {
     let mut cuts = vec![0];
     while let Some(&last) = cuts.last()
@@ -77,7 +77,7 @@ fn pieces_rendered_by_several_threads_are_the_same_frame() {
         let view = FrameView { width, height, samples, quality, ..FrameView::of(scene.scene()) };
         let frame = PreparedFrame::new(scene, &view).unwrap();
         let whole = rendered(&frame, 0..height);
-        // Each thread takes every fourth piece of five rows, the last ones first.
+        // Each thread renders every fourth piece of five rows, the last ones first.
         let pieces: Vec<std::ops::Range<u32>> =
             (0..height).step_by(5).map(|top| top..(top + 5).min(height)).collect();
         std::thread::scope(|scope| {

@@ -1,5 +1,5 @@
-//! Rows of the table of extremes that no other file holds: exact distances to spheres, meshes that are no surfaces, the
-//! largest frame, lights that weaken on scenes of all sizes, models written far from their origin.
+//! Extreme inputs that no other file covers: exact distances to spheres, degenerate meshes, the largest frame,
+//! attenuated lights at all scales, models far from their origin.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use rayfarm_tracer::scene::{
 };
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
-/// A number as the sum of two: some 32 digits (Dekker, "A floating-point technique for extending the available precision",
-/// Numerische Mathematik 18, 1971).
+/// A number as the sum of two, with some 32 digits (Dekker, "A floating-point technique for extending the available
+/// precision", Numerische Mathematik 18, 1971).
 #[derive(Clone, Copy, Debug)]
 struct Twofold(f64, f64);
 
@@ -58,7 +58,7 @@ fn dot(a: DVec3, b: DVec3) -> Twofold {
     product(0).add(product(1)).add(product(2))
 }
 
-/// Where a ray from the origin first meets a sphere: the textbook's formula in numbers that can bear it.
+/// Distance at which a ray from the origin first hits a sphere: the textbook's formula with enough digits.
 fn exact_distance(center: DVec3, radius: f64, direction: DVec3) -> f64 {
     let radius = Twofold(radius, 0.0);
     let (a, b, c) =
@@ -68,7 +68,7 @@ fn exact_distance(center: DVec3, radius: f64, direction: DVec3) -> f64 {
     if c.0 > 0.0 { near.0 } else { b.add(root).over(a).0 }
 }
 
-/// What `closest_hit` answers for one sphere and rays from the origin, against the exact distance: the largest relative error.
+/// Largest relative error of `closest_hit` for one sphere and rays from the origin, compared with the exact distance.
 fn worst_error(center: DVec3, radius: f64, directions: impl IntoIterator<Item = DVec3>) -> f64 {
     let mut scene = empty(8, 8);
     scene.camera.position = DVec3::ZERO;
@@ -85,11 +85,11 @@ fn worst_error(center: DVec3, radius: f64, directions: impl IntoIterator<Item = 
     directions.into_iter().map(error).fold(0.0, f64::max)
 }
 
-/// One unit in the last place of the `f32` numbers that points are made of.
+/// One unit in the last place of the `f32` coordinates of points.
 const ULP: f64 = f32::EPSILON as f64;
 
 #[test]
-fn the_reference_for_spheres_knows_what_is_known() {
+fn the_reference_for_spheres_matches_known_distances() {
     // A chord of 3, 4 and 5; and a hit at 1 of a sphere whose squares have 24 digits.
     assert_eq!(exact_distance(DVec3::new(0.0, 3.0, -5.0), 5.0, DVec3::NEG_Z), 1.0);
     assert_eq!(exact_distance(DVec3::new(0.0, -1e12, 0.0), 1e12 - 1.0, DVec3::NEG_Y), 1.0);
@@ -123,8 +123,8 @@ fn distances_to_a_speck_of_a_millionth_are_within_an_ulp_to_its_outline() {
     }
 }
 
-/// A torus with slivers, triangles without an area, copies, a triangle over another, and vertices that nobody uses.
-fn disfigured() -> Mesh {
+/// A torus with slivers, triangles without an area, duplicates, a triangle over another, and unused vertices.
+fn degenerate() -> Mesh {
     let mut mesh = torus(16, 12);
     let mut add = |corners: [DVec3; 3]| {
         let first = mesh.positions.len() as u32;
@@ -138,8 +138,8 @@ fn disfigured() -> Mesh {
         add([bottom, top, top]);
         add([bottom, bottom.lerp(top, 0.3), top]);
     }
-    let copies = mesh.triangles[..30].to_vec();
-    mesh.triangles.extend(copies);
+    let duplicates = mesh.triangles[..30].to_vec();
+    mesh.triangles.extend(duplicates);
     mesh.positions.extend([DVec3::splat(1e5), DVec3::NAN, DVec3::INFINITY]);
     mesh.triangle_materials = vec![0; mesh.triangles.len()];
     mesh
@@ -160,10 +160,10 @@ fn with_model(mesh: &CompiledMesh, width: u32, height: u32) -> Scene {
 }
 
 #[test]
-fn slivers_copies_and_unused_vertices_give_the_oracles_picture() {
-    let (mesh, report) = CompiledMesh::compile(&disfigured()).unwrap();
+fn slivers_duplicates_and_unused_vertices_match_the_oracle() {
+    let (mesh, report) = CompiledMesh::compile(&degenerate()).unwrap();
     assert_eq!((report.dropped_duplicate, report.dropped_not_finite), (30, 0));
-    // Slivers that are thinner than the digits of the mesh are left out as well.
+    // Slivers thinner than the digits of the mesh are dropped as well.
     assert!((80..110).contains(&report.dropped_degenerate), "{report:?}");
     let (lo, hi) = mesh.bounds();
     assert!(hi.max_element() < 2.0 && lo.min_element() > -2.0, "an unused vertex counts: {lo} {hi}");
@@ -178,7 +178,7 @@ fn slivers_copies_and_unused_vertices_give_the_oracles_picture() {
 }
 
 #[test]
-fn rows_of_the_largest_frame_are_the_oracles() {
+fn rows_of_the_largest_frame_match_the_oracle() {
     let scene = analytic(16384, 16384);
     let view = FrameView::of(&scene);
     let oracle = Oracle::new(&scene, &[], &[], &view);
@@ -194,9 +194,9 @@ fn rows_of_the_largest_frame_are_the_oracles() {
     }
 }
 
-/// Lights that weaken are made stronger with the scene, by a power of two: nothing may change then.
+/// Attenuated lights are scaled with the scene by a power of two: the picture must not change.
 #[test]
-fn lights_that_weaken_do_so_alike_at_all_scales() {
+fn attenuated_lights_are_the_same_at_all_scales() {
     let scene = analytic(96, 64);
     let (expected, _) = render(&scene, &[], &FrameView::of(&scene));
     for exponent in [-40, -13, 7, 40] {
@@ -230,10 +230,10 @@ fn scaled(scene: &Scene, factor: f64) -> Scene {
     scene
 }
 
-/// The numbers of an OBJ file have more digits than `f32`: a model that is written ten thousand extents from its origin keeps
-/// its shape.
+/// The numbers of an OBJ file have more digits than `f32`: a model at ten thousand extents from its origin keeps its
+/// shape.
 #[test]
-fn a_model_written_far_from_its_origin_keeps_its_shape() {
+fn a_model_far_from_its_origin_keeps_its_shape() {
     let folder = tempfile::tempdir().unwrap();
     let picture_at = |name: &str, offset: f64| {
         let mesh = torus(20, 12);
@@ -260,7 +260,7 @@ fn a_model_written_far_from_its_origin_keeps_its_shape() {
 }
 
 #[test]
-fn exponents_and_lights_beyond_reason_stay_finite() {
+fn extreme_exponents_and_lights_stay_finite() {
     let mut scene = analytic(32, 24);
     scene.materials.iter_mut().for_each(|material| (material.exponent, material.specular) = (1e6, Vec3::ONE));
     scene.lights.iter_mut().for_each(|light| light.color = Vec3::splat(1e30));

@@ -1,4 +1,4 @@
-//! The picture of `models/lights.toml` must not change unnoticed: against a stored picture, and against the oracle.
+//! The picture of `models/lights.toml`, compared with a stored picture and with the oracle.
 //!
 //! After a change of the scene or of the rules of light, look at the new picture and store it:
 //! `RAYFARM_STORE_GOLDEN=1 cargo test -p rayfarm-tracer --test suite golden`.
@@ -11,7 +11,7 @@ use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{FrameView, LoadedScene, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
-/// One pixel in 500 may lie on an edge that another platform rounds to its other side.
+/// One pixel in 500 may be on an edge that another platform rounds to the other side.
 const EDGE_PIXELS_PER_MILLE: usize = 2;
 
 fn in_package(path: &str) -> PathBuf {
@@ -32,7 +32,7 @@ fn render(loaded: LoadedScene, view: &FrameView) -> RgbImage {
     picture
 }
 
-/// Pixels with a channel that is off by more than one step.
+/// Number of pixels with a channel that differs by more than one step.
 fn off(a: &RgbImage, b: &RgbImage) -> usize {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let pairs = a.pixels.chunks_exact(3).zip(b.pixels.chunks_exact(3));
@@ -46,7 +46,7 @@ fn assert_close(picture: &RgbImage, expected: &RgbImage) {
 }
 
 #[test]
-fn the_lights_are_those_of_the_stored_picture() {
+fn the_lights_match_the_stored_picture() {
     let (loaded, view) = lights(320, 240, 4);
     let picture = render(loaded, &view);
     let stored = in_package("tests/suite/golden/lights.png");
@@ -57,7 +57,7 @@ fn the_lights_are_those_of_the_stored_picture() {
 }
 
 #[test]
-fn the_lights_are_those_of_the_oracle() {
+fn the_lights_match_the_oracle() {
     let (loaded, view) = lights(60, 45, 1);
     let expected = Oracle::new(&loaded.scene, &loaded.meshes, &loaded.textures, &view).render();
     assert_close(&render(loaded, &view), &expected);

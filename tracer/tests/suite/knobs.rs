@@ -1,4 +1,4 @@
-//! The knobs of a frame's quality: what is left out is what the oracle leaves out, and what is rougher is so within known bounds.
+//! Quality knobs: reduced features match an oracle without them, and approximations are within known bounds.
 
 use std::path::Path;
 
@@ -16,14 +16,14 @@ fn at(scene: &Scene, quality: Quality) -> FrameView {
     FrameView { quality, ..FrameView::of(scene) }
 }
 
-/// Pixels with a channel that is off by more than so many steps.
+/// Number of pixels with a channel that differs by more than `steps`.
 fn off_by_more(steps: u8, a: &RgbImage, b: &RgbImage) -> usize {
     let pairs = a.pixels.chunks_exact(3).zip(b.pixels.chunks_exact(3));
     pairs.filter(|(a, b)| a.iter().zip(b.iter()).any(|(a, b)| a.abs_diff(*b) > steps)).count()
 }
 
 #[test]
-fn shadows_and_highlights_are_left_out_as_the_oracle_leaves_them_out() {
+fn pictures_without_shadows_and_highlights_match_the_oracle() {
     let (instances, mesh) = instanced(120, 90);
     let mesh = std::slice::from_ref(&mesh);
     for (scene, meshes) in [(analytic(160, 120), &[][..]), (instances, mesh)] {
@@ -43,7 +43,7 @@ fn shadows_and_highlights_are_left_out_as_the_oracle_leaves_them_out() {
 }
 
 #[test]
-fn the_filter_of_all_textures_is_the_oracles() {
+fn the_filter_of_all_textures_matches_the_oracle() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/textured.toml");
     let LoadedScene { scene, meshes, textures, .. } = load(&path).unwrap();
     let pictures = [None, Some(Filter::Nearest), Some(Filter::Bilinear)].map(|filter| {
@@ -51,7 +51,7 @@ fn the_filter_of_all_textures_is_the_oracles() {
         let view = FrameView { quality: Quality { filter, ..FULL() }, ..small };
         let (picture, _) = render_textured(&scene, &meshes, &textures, &view);
         let oracle = Oracle::new(&scene, &meshes, &textures, &view).render();
-        // As without the knob: texels whose edge lies next to a ray.
+        // As without the knob: texels with an edge next to a ray.
         assert!(off_by_more(1, &picture, &oracle) <= 6, "{filter:?}");
         picture
     });
@@ -76,21 +76,21 @@ fn the_fast_exponent_is_near_the_exact_one() {
         let (exact, _) = render(&scene, &[], &at(&scene, FULL()));
         let (fast, _) = render(&scene, &[], &fast);
         let difference = compare(&exact, &fast).unwrap();
-        // 0.0021 of 0.4 times the lights' 4.0: a step or two of the encoding, more where it is darkest.
+        // 0.0021 of 0.4 times the lights' 4.0: a step or two of the encoding, more in the dark.
         assert!(difference.max <= 3, "{exponents:?}: {difference:?}");
         assert!(difference.rmse < 0.3, "{exponents:?}: {difference:?}");
     }
 }
 
 #[test]
-fn exponents_that_are_powers_by_squaring_are_the_same_when_fast() {
+fn squared_exponents_are_the_same_when_fast() {
     let scene = polished([1.0, 40.0, 256.0]);
     let fast = at(&scene, Quality { exponent: ExponentPrecision::Fast, ..FULL() });
     assert!(render(&scene, &[], &fast) == render(&scene, &[], &at(&scene, FULL())));
 }
 
 #[test]
-fn reduced_colors_are_the_nearest_of_five_six_and_five_bits() {
+fn reduced_colors_are_rounded_to_five_six_and_five_bits() {
     let scene = analytic(160, 120);
     for samples in [1, 4] {
         let full = FrameView { samples, ..at(&scene, FULL()) };
@@ -114,10 +114,10 @@ fn dusk() -> Scene {
     scene
 }
 
-/// What a ray straight up would see there.
+/// Radiance of a ray straight up in that scene.
 const DUSK: f32 = 0.03;
 
-/// What a row of it is, encoded and not rounded: the mean of its pixels.
+/// Encoded value of a row of it without rounding: the mean of its pixels.
 fn dusk_row(y: u32) -> f64 {
     let half = 5.0_f64.to_radians().tan();
     let pixel = |x: u32| {
@@ -130,14 +130,14 @@ fn dusk_row(y: u32) -> f64 {
     (0..320).map(pixel).sum::<f64>() / 320.0
 }
 
-/// Rows of 8 x 8 pixels each as the means of their bytes.
+/// Means of the bytes of each row of 8 x 8 pixels.
 fn means(picture: &RgbImage) -> Vec<f64> {
     let rows = picture.pixels.chunks_exact(8 * 3 * picture.width as usize);
     rows.map(|row| row.iter().map(|&byte| f64::from(byte)).sum::<f64>() / row.len() as f64).collect()
 }
 
 #[test]
-fn a_gradient_in_the_dark_has_bands_and_none_when_it_is_dithered() {
+fn dithering_removes_the_bands_of_a_dark_gradient() {
     let scene = dusk();
     for (samples, adaptive) in [(1, false), (4, false), (4, true), (16, true)] {
         let picture = |dither| {
@@ -150,7 +150,7 @@ fn a_gradient_in_the_dark_has_bands_and_none_when_it_is_dithered() {
         assert!(even(&means(&plain)) > 8, "bands many pixels high: {:?}", means(&plain));
         let smooth = means(&dithered);
         assert_eq!(even(&smooth), 0, "{smooth:?}");
-        // What the eye sees is the light itself.
+        // The perceived value is the light itself.
         for (row, mean) in smooth.iter().enumerate() {
             let exact = (0..8).map(|y| dusk_row(row as u32 * 8 + y)).sum::<f64>() / 8.0;
             assert!((mean - exact).abs() < 0.1, "row {row}: {mean}, and the light {exact}");
@@ -161,7 +161,7 @@ fn a_gradient_in_the_dark_has_bands_and_none_when_it_is_dithered() {
 }
 
 #[test]
-fn a_flat_colour_that_is_a_byte_stays_it_when_it_is_dithered() {
+fn dithering_keeps_colours_that_are_bytes() {
     let mut scene = dusk();
     let color = [3_u8, 130, 251];
     let linear = color.map(|code| rayfarm_tracer::srgb::decode(code) as f32);
@@ -171,7 +171,7 @@ fn a_flat_colour_that_is_a_byte_stays_it_when_it_is_dithered() {
 }
 
 #[test]
-fn fewer_colours_are_dithered_too() {
+fn reduced_colours_are_dithered_too() {
     let scene = dusk();
     let quality = Quality { dither: true, colors: ColorDepth::Reduced, ..FULL() };
     let (picture, _) = render(&scene, &[], &at(&scene, quality));

@@ -1,4 +1,4 @@
-//! What the tracer promises, from outside. One program, so that the tracer is linked once.
+//! Tests of the tracer's public API. One program, so that the tracer is linked once.
 
 #![allow(clippy::panic, clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! A compiled model that was changed on its way is refused, or it is another model: nothing in it leads the tracer astray.
+//! A changed compiled model is refused, or renders as another valid model.
 
 use std::sync::{Arc, LazyLock};
 
@@ -13,7 +13,7 @@ const SIDE: u32 = 24;
 
 static SCENE: LazyLock<(Scene, Arc<CompiledMesh>)> = LazyLock::new(|| crate::common::instanced(SIDE, SIDE));
 
-/// The instanced scene of the tests, with this mesh in place of its own; `false` where they do not fit.
+/// Renders the instanced scene of the tests with this mesh in place of its own; `false` where they do not fit.
 fn renders(bytes: &[u8]) -> bool {
     let Ok(mesh) = CompiledMesh::from_bytes(bytes) else { return false };
     let mut scene = SCENE.0.clone();
@@ -26,7 +26,7 @@ fn renders(bytes: &[u8]) -> bool {
 }
 
 #[test]
-fn unchanged_it_renders() {
+fn an_unchanged_model_renders() {
     assert!(renders(SCENE.1.bytes()));
 }
 

@@ -1,5 +1,5 @@
-//! The fast path against `reference`, the f64 oracle: pixels may differ only where the two see different sides of an
-//! edge, and those are counted.
+//! The fast path compared with `reference`, the f64 oracle. Pixels may differ only where the two hit different sides
+//! of an edge, and these are counted.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{Attenuation, FrameView, Scene, Sphere};
 
-/// Pixels with a channel that is off by more than one step.
+/// Number of pixels with a channel that differs by more than one step.
 fn off(a: &RgbImage, b: &RgbImage) -> usize {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let pairs = a.pixels.chunks_exact(3).zip(b.pixels.chunks_exact(3));
@@ -105,7 +105,8 @@ fn no_light_a_light_on_a_surface_one_at_the_camera_and_a_thousand() {
         assert_eq!(wrong, 0, "{} lights", scene.lights.len());
     }
 }
-/// The scene of the seed system's headline, where its mesh is at hand: every 97th pixel against the oracle.
+/// The benchmark scene of the 2009 system TheMatrixDistributed, if its mesh is available: every 97th pixel is
+/// compared with the oracle.
 #[test]
 fn workload_w1_every_97th_pixel() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/workloads/w1.toml");

@@ -1,4 +1,4 @@
-//! What is known without a tracer: radiances by hand, and pictures that must not change.
+//! Radiances with known values, and pictures that must not change.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -80,7 +80,7 @@ fn a_slanted_plane_follows_the_cosine() {
 }
 
 #[test]
-fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
+fn an_occluder_shades_unless_the_light_casts_no_shadows() {
     let mut scene = lit_sphere(Material {
         diffuse: Vec3::splat(0.5),
         specular: Vec3::ZERO,
@@ -97,7 +97,7 @@ fn a_thing_before_a_light_takes_it_away_unless_the_light_casts_no_shadows() {
 }
 
 #[test]
-fn what_stands_behind_a_light_takes_nothing_away() {
+fn objects_behind_a_light_do_not_shade() {
     let mut scene = lit_sphere(Material {
         diffuse: Vec3::splat(0.5),
         specular: Vec3::ZERO,
@@ -231,7 +231,7 @@ fn moved(scene: &Scene, place: impl Fn(DVec3) -> DVec3, factor: f64) -> Scene {
 }
 
 #[test]
-fn a_scene_far_from_the_origin_is_the_picture_of_the_near_one() {
+fn a_scene_far_from_the_origin_gives_the_same_picture() {
     let (scene, mesh) = instanced(96, 64);
     let meshes = [mesh];
     let (near, _) = render(&scene, &meshes, &FrameView::of(&scene));
@@ -258,7 +258,7 @@ fn a_frame_that_cannot_be_rendered_is_refused_with_the_limit() {
 }
 
 #[test]
-fn rendering_stops_when_it_is_told_to() {
+fn rendering_stops_when_cancelled() {
     let scene = analytic(16, 64);
     let compiled = Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap());
     let frame = PreparedFrame::new(compiled, &FrameView::of(&scene)).unwrap();
@@ -272,7 +272,7 @@ fn rendering_stops_when_it_is_told_to() {
     assert_eq!(asked.get(), 4);
 }
 
-/// A frame of one band: what is asked between tiles stops it there, however it is sampled.
+/// A frame of one band: cancellation between its tiles stops it, for every kind of sampling.
 #[test]
 fn rendering_stops_between_the_tiles_of_a_band() {
     let scene = analytic(128, 16);
@@ -295,7 +295,7 @@ fn rendering_stops_between_the_tiles_of_a_band() {
         for question in 0..questions {
             assert_eq!(stop_at(question, &mut vec![0; out.len()]), (Some(Cancelled), question + 1));
         }
-        // Cancelling leaves nothing behind: the frame is the same afterwards.
+        // Cancelling has no side effects: the frame renders as before.
         let mut again = vec![0; out.len()];
         render_rows(&frame, 0..16, &mut again, &|| false).unwrap();
         assert_eq!(again, out);
@@ -303,7 +303,7 @@ fn rendering_stops_between_the_tiles_of_a_band() {
 }
 
 #[test]
-fn a_scene_that_is_not_wanted_any_more_stops_wherever_its_compilation_is() {
+fn cancelled_compilation_stops_at_every_step() {
     let mut scene = analytic(16, 16);
     let material = scene.spheres[0].material;
     let sphere =

@@ -1,5 +1,6 @@
-//! The project's own scenes against the oracle, from outside, from within, and with lights where they hurt: near a surface,
-//! behind the camera, grazing, many. Every so many pixels: the oracle asks all triangles for each.
+//! The project's own scenes compared with the oracle, from outside, from within, and with difficult lights: near a
+//! surface, behind the camera, grazing, many. One pixel in N is compared, because the oracle tests all triangles for
+//! each.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +18,8 @@ fn loaded(name: &str) -> LoadedScene {
     load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(name)).unwrap()
 }
 
-/// Pixels that differ from the oracle's by more than one step of a channel; every `step`th is looked at.
+/// Number of compared pixels that differ from the oracle's by more than one step of a channel; every `step`th is
+/// compared.
 fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
     let scene = &loaded.scene;
     let (width, height, quality) = (WIDTH, HEIGHT, Quality::default());
@@ -35,7 +37,7 @@ fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
     (0..WIDTH * HEIGHT).step_by(step).filter(differs).count()
 }
 
-/// The camera of the scene, one amid its things, and one from the other side.
+/// The camera of the scene, one amid its objects, and one from the other side.
 fn cameras(loaded: &LoadedScene) -> [Camera; 3] {
     let own = loaded.scene.camera;
     let towards = own.look_at - own.position;
@@ -45,7 +47,7 @@ fn cameras(loaded: &LoadedScene) -> [Camera; 3] {
     [own, amid, opposite]
 }
 
-/// What the camera sees in the middle of its picture.
+/// The point that the camera sees in the middle of its picture.
 fn seen(loaded: &LoadedScene, camera: &Camera) -> DVec3 {
     let (meshes, textures) = (loaded.meshes.iter().cloned(), loaded.textures.iter().cloned());
     let compiled = Arc::new(CompiledScene::new(loaded.scene.clone(), meshes, textures).unwrap());
@@ -55,7 +57,7 @@ fn seen(loaded: &LoadedScene, camera: &Camera) -> DVec3 {
     camera.position + direction * t
 }
 
-/// Lights that are hard on the shadows of what `camera` sees.
+/// Lights that are difficult for the shadows that `camera` sees.
 fn hard_lights(loaded: &LoadedScene, camera: &Camera) -> Vec<(&'static str, Vec<Light>)> {
     let (eye, seen) = (camera.position, seen(loaded, camera));
     let to_eye = eye - seen;
@@ -107,26 +109,26 @@ fn check(name: &str, step: usize) {
 }
 
 #[test]
-fn the_room_is_the_oracles() {
+fn the_room_matches_the_oracle() {
     check("room.toml", 281);
 }
 
 #[test]
-fn the_lights_are_the_oracles() {
+fn the_lights_match_the_oracle() {
     check("lights.toml", 23);
 }
 
 #[test]
-fn the_textures_are_the_oracles() {
+fn the_textures_match_the_oracle() {
     check("textured.toml", 37);
 }
 
 #[test]
-fn the_instances_are_the_oracles() {
+fn the_instances_match_the_oracle() {
     check("instances.toml", 281);
 }
 
 #[test]
-fn the_product_is_the_oracles() {
+fn the_product_matches_the_oracle() {
     check("product.toml", 199);
 }

@@ -1,5 +1,5 @@
-//! No acne, no leaks: pixels that are darker than the oracle's although they are lit, or brighter although closed in, counted
-//! under grazing light, near and far, at all scales and far from the origin.
+//! No shadow acne and no light leaks: pixels darker or brighter than the oracle's are counted under grazing light,
+//! near and far, at all scales and far from the origin.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use rayfarm_tracer::scene::{
     Attenuation, FrameView, LightKind, Model, NormalMode, Plane, Scene, Sphere, compile_model,
 };
 
-/// Largest extent of a scene, and where it stands, in these extents.
+/// Largest extent of a scene, and its distance from the origin in extents.
 const PLACES: [(f64, f64); 4] = [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 1e4)];
 
 fn model(mesh: &CompiledMesh, normals: NormalMode) -> Model {
@@ -27,7 +27,7 @@ fn model(mesh: &CompiledMesh, normals: NormalMode) -> Model {
     }
 }
 
-/// The scene `scale` times as large, and moved.
+/// The scene scaled by `scale`, and moved.
 fn placed(scene: &Scene, scale: f64, offset: f64) -> Scene {
     let place = |p: DVec3| (p + DVec3::new(offset, -offset, offset * 0.5)) * scale;
     let mut scene = scene.clone();
@@ -48,7 +48,7 @@ fn placed(scene: &Scene, scale: f64, offset: f64) -> Scene {
     scene
 }
 
-/// Light from this far above the ground, in degrees: from infinitely far, from afar, and from near by.
+/// Lights at this elevation in degrees: from infinitely far, far and near.
 fn grazing(elevation: f64) -> [LightKind; 3] {
     let (s, c) = libm::sincos(elevation.to_radians());
     let to_light = DVec3::new(0.6 * c, s, 0.8 * c);
@@ -56,7 +56,7 @@ fn grazing(elevation: f64) -> [LightKind; 3] {
     [LightKind::Directional { direction: -to_light }, at(1e4), at(3.0)]
 }
 
-/// Pixels of `tested` that are darker and that are brighter than the oracle's, by more than two steps.
+/// Number of compared pixels, and of those that are darker and brighter than the oracle's by more than two steps.
 fn wrong(scene: &Scene, meshes: &[Arc<CompiledMesh>], step: usize) -> (usize, usize) {
     let view = FrameView::of(scene);
     let (image, _) = render(scene, meshes, &view);
@@ -72,7 +72,7 @@ fn wrong(scene: &Scene, meshes: &[Arc<CompiledMesh>], step: usize) -> (usize, us
     (darker, brighter)
 }
 
-/// Counts under all grazing lights and in all places: what is not zero.
+/// All counts that are not zero, under all grazing lights and in all places.
 fn wrong_anywhere(scene: &mut Scene, meshes: &[Arc<CompiledMesh>], step: usize) -> Vec<String> {
     let mut found = Vec::new();
     for elevation in [0.1, 1.0, 5.0] {
@@ -96,7 +96,7 @@ fn no_acne_on_a_plane_and_spheres_at_grazing_light() {
     let mut scene = empty(60, 45);
     scene.ambient = Vec3::ZERO;
     scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1 }];
-    // One rests on the ground, one is sunk into it, one is large and one is tiny.
+    // One is on the ground, one is sunk into it, one is large and one is tiny.
     for (x, y, z, radius) in
         [(-0.6, 0.4, 0.0, 0.4), (0.5, 0.0, 0.3, 0.3), (3.0, 1.0, -9.0, 4.0), (0.1, 0.01, 1.0, 0.01)]
     {
@@ -120,8 +120,8 @@ fn no_acne_on_meshes_at_grazing_light() {
     }
 }
 
-/// Seen from a thousand extents away, points have no digits left for the last 10^-3 of the mesh: shadow rays start that far off
-/// it, and lose the shadows of the smallest folds. Those pixels may be brighter, never darker.
+/// At a distance of a thousand extents, points have no digits left for the last 10^-3 of the mesh: shadow rays start
+/// that far off it, and the shadows of the smallest folds are lost. Those pixels may be brighter, never darker.
 #[test]
 fn no_acne_on_the_bunny_at_grazing_light_near_and_far() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/models/stanford-bunny.obj");
@@ -173,7 +173,7 @@ fn no_light_leaks_through_a_closed_mesh() {
         scene.background = rayfarm_tracer::scene::Background::Color(Vec3::ZERO);
         scene.models = vec![model(&mesh, NormalMode::Flat)];
         scene.planes = vec![Plane { point: DVec3::Y * -1.001, normal: DVec3::Y, material: 2 }];
-        // To an edge: facets stand inside the unit ball.
+        // Towards an edge: facets are inside the unit ball.
         let deepest = libm::cos(std::f64::consts::PI / f64::from(sectors)) * 0.9;
         let inside = [DVec3::ZERO, DVec3::new(0.3, -0.2, 0.1), DVec3::Y * 0.999, DVec3::X * deepest];
         let outside = [DVec3::new(0.0, 1.001, 0.0), DVec3::X * 1.0001, DVec3::new(3.0, 4.0, 5.0)];
@@ -195,9 +195,9 @@ fn no_light_leaks_through_a_closed_mesh() {
     assert!(found.is_empty(), "pixels lit: {found:#?}");
 }
 
-/// Points whose way to the light runs through edges and vertices of a wall of many triangles, all but exactly.
+/// Points whose segments to the light pass edges and vertices of a wall of many triangles, all but exactly.
 #[test]
-fn no_light_slips_through_the_seams_of_a_wall() {
+fn no_light_leaks_through_the_seams_of_a_wall() {
     let mut mesh = torus(3, 3);
     let n = 16;
     let at = |i: u32, j: u32| DVec3::new(f64::from(i) / 8.0 - 1.0, 0.5, f64::from(j) / 8.0 - 1.0);
@@ -217,7 +217,7 @@ fn no_light_slips_through_the_seams_of_a_wall() {
     scene.background = rayfarm_tracer::scene::Background::Color(Vec3::ZERO);
     scene.models = vec![Model { rotate: DVec3::ZERO, ..model(&mesh, NormalMode::Flat) }];
     scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 2 }];
-    // Straight from above, between floor and wall: pixels stand at multiples of 1/64.
+    // Straight from above, between floor and wall: pixels are at multiples of 1/64.
     scene.camera.position = DVec3::new(1.0 / 128.0, 0.25, 1.0 / 128.0);
     scene.camera.look_at = scene.camera.position - DVec3::Y;
     scene.camera.up = DVec3::Z;

@@ -1,4 +1,4 @@
-//! Textures: by what is known of single texels, and against the oracle.
+//! Textures: single texels with known values, and comparison with the oracle.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -27,14 +27,14 @@ fn four() -> Arc<Texture> {
     Arc::new(Texture::new(&RgbImage { width: 2, height: 2, pixels }).unwrap())
 }
 
-/// Texels without order, of the given size.
+/// Pseudo-random texels of the given size.
 fn noise(width: u32, height: u32) -> Arc<Texture> {
     let byte = |i: u32| (i.wrapping_mul(0x9e37_79b1).rotate_left(13).wrapping_mul(0x85eb_ca6b) >> 24) as u8;
     let pixels = (0..width * height * 3).map(byte).collect();
     Arc::new(Texture::new(&RgbImage { width, height, pixels }).unwrap())
 }
 
-/// A unit square in front of the camera, seen whole, lit by ambient light alone: what is rendered is the texture.
+/// A unit square that fills the picture, with ambient light only: the picture is the texture.
 fn square(uvs: [[f64; 2]; 4], texture: &Texture, filter: Filter) -> Scene {
     let mut scene = empty(64, 64);
     scene.ambient = Vec3::ONE;
@@ -55,19 +55,19 @@ fn square(uvs: [[f64; 2]; 4], texture: &Texture, filter: Filter) -> Scene {
 
 const WHOLE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
-/// The picture's colour at a place of the square, both from 0 to 1 and counted from the bottom left.
+/// The picture's colour at a position of the square, both coordinates from 0 to 1 from the bottom left.
 fn color_at(scene: &Scene, texture: &Arc<Texture>, x: f64, y: f64) -> [u8; 3] {
     let (picture, _) = render_textured(scene, &[], std::slice::from_ref(texture), &FrameView::of(scene));
     picture.pixel((x * 64.0) as u32, 63 - (y * 64.0) as u32).unwrap()
 }
 
-/// All at one place: a picture of one colour.
+/// A picture whose pixels are all at one position of the texture.
 fn color_of(texture: &Arc<Texture>, filter: Filter, uv: [f64; 2]) -> [u8; 3] {
     color_at(&square([uv; 4], texture, filter), texture, 0.4, 0.6)
 }
 
 #[test]
-fn v_rises_from_the_bottom_row_and_codes_come_back() {
+fn v_rises_from_the_bottom_row_and_codes_round_trip() {
     for filter in [Filter::Nearest, Filter::Bilinear] {
         for (uv, expected) in [
             ([0.25, 0.75], RED),
@@ -126,7 +126,7 @@ fn one_texel_is_one_colour_everywhere() {
     }
 }
 
-/// Pixels that differ by more than one step.
+/// Number of pixels that differ by more than one step.
 fn off(scene: &Scene, meshes: &[Arc<CompiledMesh>], texture: &Arc<Texture>, view: &FrameView) -> usize {
     let textures = std::slice::from_ref(texture);
     let (picture, _) = render_textured(scene, meshes, textures, view);
@@ -136,7 +136,7 @@ fn off(scene: &Scene, meshes: &[Arc<CompiledMesh>], texture: &Arc<Texture>, view
 }
 
 #[test]
-fn a_textured_square_is_the_oracles() {
+fn a_textured_square_matches_the_oracle() {
     let skewed = [[-1.3, 0.2], [2.1, -0.4], [1.7, 3.3], [-0.2, 1.1]];
     let far = skewed.map(|[u, v]| [u + 4000.0, v - 4000.0]);
     for (name, uvs) in [("whole", WHOLE), ("skewed", skewed), ("far", far)] {
@@ -145,7 +145,7 @@ fn a_textured_square_is_the_oracles() {
             let texture = noise(width, height);
             for filter in [Filter::Nearest, Filter::Bilinear] {
                 let mut scene = square(uvs, &texture, filter);
-                // Oblique, so that no pixel's centre lies on the edge of a texel.
+                // Oblique, so that no pixel's centre is on the edge of a texel.
                 scene.camera.position = DVec3::new(0.13, -0.21, 0.77);
                 scene.camera.up = DVec3::new(0.2, 1.0, 0.1);
                 scene.lights = vec![light(point(1.0, 2.0, 3.0), 0.7, Attenuation::None)];
@@ -161,7 +161,7 @@ fn a_textured_square_is_the_oracles() {
     }
 }
 
-/// A ball under a map of the world, with the seam that closes it: the last column of triangles ends at u = 1, not 0.
+/// A ball with a map of the world, with a closed seam: the last column of triangles ends at u = 1, not 0.
 fn globe() -> Arc<CompiledMesh> {
     let mut mesh = ball(12, 18);
     let uv = |p: DVec3| {
@@ -184,7 +184,7 @@ fn globe() -> Arc<CompiledMesh> {
 }
 
 #[test]
-fn textured_instances_are_the_oracles() {
+fn textured_instances_match_the_oracle() {
     let (mesh, texture) = (globe(), noise(64, 32));
     for filter in [Filter::Nearest, Filter::Bilinear] {
         let mut scene = empty(120, 90);
@@ -214,7 +214,7 @@ fn textured_instances_are_the_oracles() {
 }
 
 #[test]
-fn a_scene_with_files_is_the_oracles() {
+fn a_scene_with_files_matches_the_oracle() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/textured.toml");
     let LoadedScene { scene, meshes, textures, .. } = load(&path).unwrap();
     let view = FrameView { width: 60, height: 45, samples: 1, ..FrameView::of(&scene) };
@@ -227,7 +227,7 @@ fn a_scene_with_files_is_the_oracles() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_refused() {
+fn mismatched_meshes_and_textures_are_refused() {
     let texture = four();
     let mut scene = square(WHOLE, &texture, Filter::Nearest);
     let missing = CompiledScene::new(scene.clone(), [], [noise(1, 1)]).unwrap_err().to_string();
@@ -249,7 +249,7 @@ fn what_does_not_fit_together_is_refused() {
 }
 
 #[test]
-fn odd_coordinates_from_elsewhere_are_refused() {
+fn invalid_texture_coordinates_are_refused() {
     let texture = four();
     let mut scene = square(WHOLE, &texture, Filter::Nearest);
     scene.validate().unwrap();

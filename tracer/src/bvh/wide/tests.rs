@@ -19,7 +19,7 @@ fn node(children: &[u32]) -> WideNode {
 }
 
 #[test]
-fn every_primitive_stands_in_one_block_inside_the_boxes_above() {
+fn every_primitive_is_in_one_block_inside_the_boxes_above() {
     for count in [1, 2, 16, 17, 300, 5000] {
         let all = boxes(count);
         let tree = build_wide(&all, WIDTH, BuildQuality::Default, &never).unwrap();
@@ -42,13 +42,13 @@ fn nodes_are_well_filled() {
 }
 
 #[test]
-fn two_thousand_boxes_in_one_place_stay_shallow() {
+fn two_thousand_equal_boxes_give_a_shallow_tree() {
     let tree = build_wide(&[(Vec3::ZERO, Vec3::ONE); 2_000], WIDTH, BuildQuality::Default, &never).unwrap();
     assert!(tree.depth as usize <= MAX_WIDE_DEPTH, "depth {}", tree.depth);
 }
 
 #[test]
-fn what_would_lead_a_walk_astray_is_named() {
+fn faults_of_trees_are_named() {
     let mut infinite = node(&[LEAF]);
     infinite.hi[1].0[0] = f32::INFINITY;
     let mut crowded = node(&[LEAF]);
@@ -60,13 +60,13 @@ fn what_would_lead_a_walk_astray_is_named() {
         (vec![], 0, "no root"),
         (vec![node(&[])], 0, "0 children"),
         (vec![crowded], 1, "17 children"),
-        (vec![node(&[0])], 0, "comes after"),
-        (vec![node(&[7])], 0, "comes after"),
-        (vec![node(&[1, 1]), node(&[LEAF])], 1, "comes after"),
+        (vec![node(&[0])], 0, "a later node"),
+        (vec![node(&[7])], 0, "a later node"),
+        (vec![node(&[1, 1]), node(&[LEAF])], 1, "a later node"),
         (vec![node(&[LEAF, LEAF])], 1, "two parents"),
-        (vec![node(&[LEAF | 5])], 1, "not there"),
-        (vec![node(&[LEAF])], 2, "hangs nowhere"),
-        (vec![node(&[LEAF]), node(&[LEAF | 1])], 2, "no node names it"),
+        (vec![node(&[LEAF | 5])], 1, "missing"),
+        (vec![node(&[LEAF])], 2, "has no parent"),
+        (vec![node(&[LEAF]), node(&[LEAF | 1])], 2, "no node's child"),
         (vec![infinite], 1, "not finite"),
         (vec![hidden], 1, "without a child"),
         (chain, 0, "deeper than"),

@@ -1,4 +1,4 @@
-//! Colours: from bytes to the opponent space that is filtered in, from there to L*a*b*, and their difference.
+//! Colours: from bytes to the opponent space of the filters, from there to L*a*b*, and their difference.
 
 use glam::{DMat3, DVec2, DVec3, Mat3, Vec3, Vec3Swizzles};
 
@@ -8,13 +8,13 @@ use crate::srgb;
 const PRIMARIES: [DVec2; 3] = [DVec2::new(0.64, 0.33), DVec2::new(0.30, 0.60), DVec2::new(0.15, 0.06)];
 const WHITE: DVec2 = DVec2::new(0.3127, 0.3290);
 
-/// q_c: what large differences of colour are made smaller by.
+/// q_c, the exponent that compresses large colour differences.
 const EXPONENT: f32 = 0.7;
-/// Errors below p_c of the greatest take p_t of the range.
+/// p_c and p_t: errors below p_c of the largest one take p_t of the range.
 const LOW: f32 = 0.4;
 const LOW_RANGE: f32 = 0.95;
 
-/// sRGB and what follows from it.
+/// The sRGB colour space.
 pub(super) struct ColorSpace {
     /// From linear RGB to X, Y and Z, each as a share of white's.
     from_rgb: Mat3,
@@ -27,7 +27,7 @@ impl ColorSpace {
         let [r, g, b] = PRIMARIES.map(xyz);
         let primaries = DMat3::from_cols(r, g, b);
         let white = xyz(WHITE);
-        // All three together are white.
+        // The sum of the three primaries is white.
         let amounts = primaries.inverse() * white;
         let from_rgb = DMat3::from_diagonal(1.0 / white) * primaries * DMat3::from_diagonal(amounts);
         Self { from_rgb: from_rgb.as_mat3(), to_rgb: from_rgb.inverse().as_mat3() }
@@ -40,8 +40,8 @@ impl ColorSpace {
         Vec3::new(116.0 * xyz.y - 16.0, 500.0 * (xyz.x - xyz.y), 200.0 * (xyz.y - xyz.z))
     }
 
-    /// Y, Cx and Cz as L*, a* and b* with Hunt's adjustment: colours count less where it is dark. Filtered colours that no
-    /// monitor can show become the next ones that it can.
+    /// Y, Cx and Cz as L*, a* and b* with Hunt's adjustment: dark colours count less. Filtered colours outside of the
+    /// gamut are clamped to it.
     pub(super) fn seen(&self, opponent: Vec3) -> Vec3 {
         let y = (opponent.x + 16.0) / 116.0;
         let xyz = Vec3::new(opponent.y / 500.0 + y, y, y - opponent.z / 200.0);
@@ -55,21 +55,21 @@ impl ColorSpace {
     }
 }
 
-/// CIE's cube root, which is a line near zero.
+/// Cube root of CIE L*a*b*, linear near zero.
 fn lightness(share: f32) -> f32 {
     const BEND: f32 = 6.0 / 29.0;
     if share > BEND * BEND * BEND { share.cbrt() } else { share / (3.0 * BEND * BEND) + 4.0 / 29.0 }
 }
 
-/// The difference of colours that are apart: HyAB (Abasi, Tehran, Fairchild 2020).
+/// HyAB, a difference of distant colours (Abasi, Tehran, Fairchild 2020).
 fn hyab(a: Vec3, b: Vec3) -> f32 {
     let difference = a - b;
     difference.x.abs() + difference.yz().length()
 }
 
-/// Delta E_c.
+/// Delta E_c, the colour error.
 pub(super) struct ColorError {
-    /// Of green against blue: no two colours of a monitor are farther apart.
+    /// Error of green compared with blue, the largest one on a monitor.
     greatest: f32,
 }
 
@@ -78,7 +78,7 @@ impl ColorError {
         Self { greatest: hyab(space.adjusted(Vec3::Y), space.adjusted(Vec3::Z)).powf(EXPONENT) }
     }
 
-    /// The error, 0..1, of one Hunt-adjusted colour against another.
+    /// The error, 0..1, of one Hunt-adjusted colour compared with another.
     pub(super) fn of(&self, a: Vec3, b: Vec3) -> f32 {
         let error = hyab(a, b).powf(EXPONENT);
         let low = LOW * self.greatest;

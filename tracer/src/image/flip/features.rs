@@ -1,13 +1,14 @@
-//! Edges and points, found by the first and the second derivative of a Gaussian along both axes (the paper's section 4.2).
+//! Edges and points, detected by the first and second derivative of a Gaussian along both axes (the paper's section
+//! 4.2).
 
 use super::plane::{Plane, sampled};
 
 /// The width of an edge detector in degrees, w: two standard deviations.
 const WIDTH: f64 = 0.082;
-/// q_f.
+/// q_f, the exponent of the feature difference.
 const EXPONENT: f32 = 0.5;
 
-/// Detectors for one distance from the monitor. Each is its taps along one axis and the Gaussian along the other.
+/// Detectors for one viewing distance: taps along one axis and the Gaussian along the other.
 pub(super) struct Detectors {
     gaussian: Vec<f32>,
     edge: Vec<f32>,
@@ -26,14 +27,14 @@ impl Detectors {
         }
     }
 
-    /// Pixels that the detectors reach to each side.
+    /// Radius of the detectors in pixels.
     pub(super) fn radius(&self) -> usize {
         self.gaussian.len() / 2
     }
 
-    /// How much of an edge, and how much of a point, each pixel of the `rows` rows in the middle of the channel Y is.
+    /// Strengths of edges and of points at each pixel of the `rows` middle rows of the channel Y.
     pub(super) fn find(&self, y: &Plane, rows: usize) -> (Plane, Plane) {
-        // The paper takes luminance from 0 to 1.
+        // The paper uses luminance from 0 to 1.
         let luminance =
             Plane { width: y.width, values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect() };
         let smooth = luminance.across(&self.gaussian);
@@ -45,12 +46,12 @@ impl Detectors {
     }
 }
 
-/// Delta E_f, 0..1, from the greater difference of the two features.
+/// Delta E_f, 0..1, from the larger difference of the two features.
 pub(super) fn error(difference: f32) -> f32 {
     (difference * std::f32::consts::FRAC_1_SQRT_2).powf(EXPONENT).min(1.0)
 }
 
-/// The taps above zero with the sum 1, those below with the sum -1.
+/// Taps with the positive ones scaled to the sum 1, the negative ones to -1.
 fn balanced(taps: &[f64]) -> Vec<f32> {
     let above: f64 = taps.iter().filter(|tap| **tap > 0.0).sum();
     let below: f64 = -taps.iter().filter(|tap| **tap < 0.0).sum::<f64>();

@@ -1,8 +1,8 @@
-//! The errors of all pixels, as numbers and as a picture.
+//! The error of each pixel, as numbers and as a picture.
 
 use super::super::RgbImage;
 
-/// The error of each pixel, 0 (nobody sees it) to 1 (green for blue).
+/// The error of each pixel, from 0 (invisible) to 1 (green compared with blue).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlipMap {
     /// Pixels per row.
@@ -13,8 +13,8 @@ pub struct FlipMap {
     pub errors: Vec<f32>,
 }
 
-/// From no error to the greatest, in equal steps: black, violet, red, orange, a pale yellow. Each is lighter than the one
-/// before, so the order survives in grey and for whoever sees colours differently.
+/// Colours from no error to the largest, in equal steps: black, violet, red, orange, pale yellow. Lightness increases
+/// monotonically, so the order is visible in grey and to colour-blind viewers.
 const COLORS: [[f32; 3]; 6] = [
     [0.0, 0.0, 0.0],
     [52.0, 16.0, 104.0],
@@ -25,13 +25,13 @@ const COLORS: [[f32; 3]; 6] = [
 ];
 
 impl FlipMap {
-    /// The mean over all pixels; 0 for a picture without any.
+    /// Mean over all pixels; 0 for an empty picture.
     pub fn mean(&self) -> f64 {
         let sum: f64 = self.errors.iter().copied().map(f64::from).sum();
         sum / self.errors.len().max(1) as f64
     }
 
-    /// The map as a picture: black where there is no error, the lighter the greater it is.
+    /// The map as a picture: black for no error, lighter for larger errors.
     pub fn picture(&self) -> RgbImage {
         RgbImage {
             width: self.width,
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn greater_errors_are_lighter() {
+    fn larger_errors_are_lighter() {
         let luma = |error: f32| {
             let [r, g, b] = color(error).map(f32::from);
             0.299 * r + 0.587 * g + 0.114 * b
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_is_over_all_pixels_and_the_picture_has_each_in_its_place() {
+    fn the_mean_covers_all_pixels_and_the_picture_shows_each() {
         let map = FlipMap { width: 2, height: 2, errors: vec![0.0, 1.0, 0.5, 0.5] };
         assert_eq!(map.mean(), 0.5);
         let picture = map.picture();

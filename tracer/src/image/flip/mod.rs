@@ -1,9 +1,9 @@
-//! FLIP: how much two pictures differ to somebody who flips between them (LDR-FLIP of Andersson, Nilsson, Akenine-Möller,
-//! Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating Images", HPG 2020).
+//! FLIP: the visible difference of two pictures that are shown alternately (LDR-FLIP of Andersson, Nilsson,
+//! Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating Images", HPG 2020).
 //!
-//! For each pixel: what the eye cannot see at that distance is filtered off ([`contrast`]), what is left is a difference of
-//! colours ([`color`]), and it counts more where an edge or a point is in one picture only ([`features`]). All of this is
-//! local, so pictures are cut into strips of rows, with as many rows around each as the filters reach.
+//! For each pixel: details below the visible contrast are filtered out ([`contrast`]), the remaining difference of
+//! colours is computed ([`color`]) and amplified where an edge or a point is in one picture only ([`features`]). All
+//! steps are local, so pictures are processed in strips of rows, with margins of the filters' radius.
 
 mod color;
 mod contrast;
@@ -24,21 +24,21 @@ use super::{ImageError, RgbImage};
 
 pub use map::FlipMap;
 
-/// Of a monitor 3840 pixels and 0.7 m wide, seen from 0.7 m away: what the paper's authors take.
+/// Pixels per degree of a monitor 3840 pixels and 0.7 m wide, seen from 0.7 m away: the value of the paper's authors.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
 
-/// What [`flip`] knows: below the first, no filter is wider than a pixel; above the second, a pixel is a hundredth of what the
-/// sharpest eye tells apart.
+/// Range of [`flip`]: below it, no filter is wider than a pixel; above it, a pixel is a hundredth of the resolution
+/// of the eye.
 const KNOWN_PIXELS_PER_DEGREE: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 
-/// Rows that are worked on together; their filters' margins fit into the cache with them.
+/// Rows per strip; with the filters' margins they fit into the cache.
 const STRIP_ROWS: usize = 64;
 
-/// The error of each pixel of `test` against `reference`, 0..1, as seen from where `pixels_per_degree` pixels are one degree
-/// ([`PIXELS_PER_DEGREE`] for a monitor on a desk). It does not matter which of the two is which.
+/// The error of each pixel of `test` compared with `reference`, 0..1, as seen at `pixels_per_degree`
+/// ([`PIXELS_PER_DEGREE`] for a monitor on a desk). The measure is symmetric.
 ///
 /// # Errors
-/// Pictures of different sizes, or whose buffers do not fit their sizes; pixels per degree that are not from 1 to 1000.
+/// Pictures of different sizes, or whose buffers do not match their sizes; pixels per degree outside of 1 to 1000.
 pub fn flip(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Result<FlipMap, ImageError> {
     reference.check_against(test)?;
     if !KNOWN_PIXELS_PER_DEGREE.contains(&pixels_per_degree) {
@@ -53,7 +53,7 @@ pub fn flip(reference: &RgbImage, test: &RgbImage, pixels_per_degree: f64) -> Re
     Ok(FlipMap { width: reference.width, height: reference.height, errors })
 }
 
-/// Somebody before a monitor.
+/// An observer at a distance from the monitor: the filters and the colour space.
 struct Observer {
     space: ColorSpace,
     contrast: Contrast,
@@ -61,13 +61,13 @@ struct Observer {
     color_error: ColorError,
 }
 
-/// What is seen of some pixels of one picture.
+/// Filtered rows of one picture.
 struct Seen {
-    /// Without what is too fine to be seen, in Hunt-adjusted L*a*b*.
+    /// Hunt-adjusted L*a*b* without invisible contrast.
     colors: Vec<Vec3>,
-    /// How much of an edge each pixel is.
+    /// Strength of an edge at each pixel.
     edges: Plane,
-    /// How much of a point each pixel is.
+    /// Strength of a point at each pixel.
     points: Plane,
 }
 
@@ -82,7 +82,7 @@ impl Observer {
         }
     }
 
-    /// The errors of the rows from `first` on, as many as `out` holds.
+    /// The errors of the rows from `first` on, as many as `out` has.
     fn compare(&self, reference: &RgbImage, test: &RgbImage, first: usize, out: &mut [f32]) {
         let rows = out.len() / reference.width as usize;
         let (a, b) = (self.look(reference, first, rows), self.look(test, first, rows));
@@ -103,7 +103,8 @@ impl Observer {
         Seen { colors: (0..y.values.len()).map(color).collect(), edges, points }
     }
 
-    /// The channels Y, Cx and Cz of `rows` rows with `margin` more on both sides; beyond the picture, its outermost rows go on.
+    /// The channels Y, Cx and Cz of `rows` rows with `margin` more on both sides; outside of the picture its
+    /// outermost rows repeat.
     fn opponent(&self, picture: &RgbImage, first: usize, rows: usize, margin: usize) -> [Plane; 3] {
         let (width, height) = (picture.width as usize, picture.height as usize);
         let mut planes = [(); 3].map(|()| Plane::with_capacity(width, rows + 2 * margin));

@@ -1,13 +1,13 @@
-//! One channel of some rows, and filters along its two directions.
+//! One channel of some rows, with filters along its two axes.
 
-/// Values, row by row.
+/// Values of one channel, row by row.
 pub(super) struct Plane {
     pub(super) width: usize,
     pub(super) values: Vec<f32>,
 }
 
 impl Plane {
-    /// Without rows, with room for so many.
+    /// An empty plane with room for `rows` rows.
     pub(super) fn with_capacity(width: usize, rows: usize) -> Self {
         Self { width, values: Vec::with_capacity(width * rows) }
     }
@@ -20,8 +20,7 @@ impl Plane {
         self.values.len() / self.width
     }
 
-    /// Each value becomes the sum of its neighbours in the row times an odd number of taps; beyond the ends, the outermost
-    /// values go on.
+    /// Convolves each row with an odd number of taps; beyond the ends, the outermost values repeat.
     pub(super) fn across(&self, taps: &[f32]) -> Self {
         let radius = taps.len() / 2;
         let mut out = Self::zero(self.width, self.rows());
@@ -37,8 +36,8 @@ impl Plane {
         out
     }
 
-    /// Likewise down the columns, for the `rows` rows in the middle: there are at least as many above and below them as the
-    /// taps reach.
+    /// Convolves the columns, for the `rows` middle rows: there are at least as many above and below them as the
+    /// radius of the taps.
     pub(super) fn down(&self, taps: &[f32], rows: usize) -> Self {
         let above = (self.rows() - rows) / 2 - taps.len() / 2;
         let mut out = Self::zero(self.width, rows);
@@ -65,7 +64,7 @@ fn add_scaled(out: &mut [f32], factor: f32, values: &[f32]) {
     }
 }
 
-/// Values of a function at whole numbers from `-radius` to `radius`, as taps.
+/// Samples of a function at the integers from `-radius` to `radius`, as taps.
 pub(super) fn sampled(radius: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
     let radius = radius as i32;
     (-radius..=radius).map(|x| function(f64::from(x))).collect()

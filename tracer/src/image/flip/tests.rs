@@ -1,4 +1,4 @@
-//! FLIP against values that follow from the paper, and against those of its authors' own program.
+//! FLIP compared with values that follow from the paper, and with those of its authors' program.
 
 use proptest::prelude::*;
 
@@ -29,8 +29,8 @@ fn mean(a: &RgbImage, b: &RgbImage) -> f64 {
     flip(a, b, PIXELS_PER_DEGREE).unwrap().mean()
 }
 
-/// The error of one colour for another, in `f64`, from the equations: no filter changes a uniform picture, and it has no features.
-/// The matrix is the standard's, to seven digits.
+/// The error of one colour compared with another, in `f64`, from the equations: no filter changes a uniform picture,
+/// and it has no features. The matrix is the standard's, to seven digits.
 fn by_hand(a: [u8; 3], b: [u8; 3]) -> f64 {
     let xyz = |rgb: [f64; 3]| {
         [
@@ -70,14 +70,15 @@ fn equal_pictures_have_no_error_whatever_their_size() {
 }
 
 #[test]
-fn green_for_blue_is_the_greatest_error() {
+fn green_for_blue_is_the_largest_error() {
     let error = mean(&uniform([0, 255, 0]), &uniform([0, 0, 255]));
     assert!((error - 1.0).abs() < 1e-4, "{error}");
 }
 
-/// What the authors' own program says (version 1.7 of the Python package flip-evaluator) of pictures that formulas tell.
+/// Results of the authors' program (version 1.7 of the Python package flip-evaluator) for pictures that formulas
+/// define.
 #[test]
-fn it_says_what_the_authors_program_says() {
+fn errors_match_the_authors_program() {
     let (width, height) = (96, 64);
     let original = |x: u32, y: u32| {
         [(5 * x + y) as u8, (3 * y + x * x / 16) as u8, ((x / 8 + y / 8) % 2 * 160 + 40) as u8]
@@ -111,9 +112,9 @@ fn it_says_what_the_authors_program_says() {
     }
 }
 
-/// Far from a difference nothing is seen of it, and it looks the same wherever the picture's strips are cut.
+/// A difference is visible only near it, and its error is independent of the strips.
 #[test]
-fn a_dot_is_seen_around_itself_in_every_row() {
+fn a_dot_is_visible_around_itself_in_every_row() {
     let (width, height) = (41, 300);
     let dotted = |row| picture(width, height, |x, y| if (x, y) == (20, row) { [255; 3] } else { [90; 3] });
     let plain = picture(width, height, |_, _| [90; 3]);
@@ -131,7 +132,7 @@ fn a_dot_is_seen_around_itself_in_every_row() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused() {
+fn incomparable_pictures_are_refused() {
     let image = uniform([1, 2, 3]);
     let message = flip(&image, &noise(7, 9, 1), 67.0).unwrap_err().to_string();
     assert!(message.contains("9 x 7") && message.contains("7 x 9"), "{message}");
@@ -149,7 +150,7 @@ proptest! {
     }
 
     #[test]
-    fn it_does_not_matter_which_is_which(seed in any::<u32>()) {
+    fn the_measure_is_symmetric(seed in any::<u32>()) {
         let (a, b) = (noise(23, 19, seed), noise(23, 19, seed ^ 0xffff));
         prop_assert_eq!(flip(&a, &b, PIXELS_PER_DEGREE).unwrap(), flip(&b, &a, PIXELS_PER_DEGREE).unwrap());
         let errors = flip(&a, &b, PIXELS_PER_DEGREE).unwrap().errors;

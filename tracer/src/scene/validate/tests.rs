@@ -1,7 +1,8 @@
 use glam::Vec2;
 
-use super::super::{Filter, NormalMode, Plane, Sphere, TextureMap};
 use super::*;
+use crate::scene::data::{NormalMode, Plane, Sphere};
+use crate::texture::Filter;
 
 fn scene() -> Scene {
     let direction = DVec3::NEG_Y;

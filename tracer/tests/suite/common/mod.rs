@@ -1,4 +1,4 @@
-//! Scenes made of nothing, for tests.
+//! Generated scenes for tests.
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
@@ -11,7 +11,7 @@ use rayfarm_tracer::scene::{
 use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts, render_rows};
 
-/// Nothing but a background, a camera at z = 4 that looks at the origin, and three materials.
+/// An empty scene with a background, a camera at z = 4 that looks at the origin, and three materials.
 pub(crate) fn empty(width: u32, height: u32) -> Scene {
     let material =
         |diffuse, specular, exponent| Material { diffuse, specular, exponent, ..Material::NEUTRAL };
@@ -153,7 +153,7 @@ pub(crate) fn render(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameVi
     render_textured(scene, meshes, &[], view)
 }
 
-/// Likewise, with textures.
+/// Renders all rows of a scene with textures.
 pub(crate) fn render_textured(
     scene: &Scene,
     meshes: &[Arc<CompiledMesh>],

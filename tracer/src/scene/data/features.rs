@@ -1,0 +1,129 @@
+//! Features that a scene uses: everything else is neither computed nor worth a knob.
+
+use super::{NormalMode, Quality, Scene, Shading};
+use crate::material::Material;
+use crate::texture::Filter;
+
+/// Features that a scene uses. Only materials that are assigned to some geometry count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneFeatures {
+    /// A material has a specular colour: directions to the viewer are needed.
+    pub specular: bool,
+    /// A specular material has an exponent for which [`super::ExponentPrecision`] makes a difference.
+    pub powers: bool,
+    /// A material has a texture.
+    pub textured: bool,
+    /// There is a texture on a material, and one that is not looked up at the nearest texel.
+    pub filtered: bool,
+    /// A material takes the colours of vertices.
+    pub vertex_colors: bool,
+    /// A material emits light.
+    pub emissive: bool,
+    /// A material is unlit.
+    pub unlit: bool,
+    /// A material is cut out by alpha.
+    pub cut_out: bool,
+    /// A model has interpolated normals, which differ from the geometric ones.
+    pub smooth: bool,
+    /// A light casts shadows.
+    pub shadows: bool,
+}
+
+impl SceneFeatures {
+    /// Features of a scene, in time linear in its objects.
+    pub fn of(scene: &Scene) -> Self {
+        let any = |has: fn(&Material) -> bool| {
+            assigned(scene).any(|index| scene.materials.get(index as usize).is_some_and(has))
+        };
+        let textured = any(|material| material.texture.is_some() || material.emission_texture.is_some());
+        Self {
+            specular: any(Material::is_specular),
+            powers: any(|material| material.is_specular() && !material.has_squared_highlight()),
+            textured,
+            filtered: textured && scene.textures.iter().any(|map| map.filter != Filter::Nearest),
+            vertex_colors: any(|material| material.vertex_colors),
+            emissive: any(Material::is_emissive),
+            unlit: any(|material| material.unlit),
+            cut_out: any(|material| material.cutout.is_some()),
+            smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
+            shadows: scene.lights.iter().any(|light| light.shadows),
+        }
+    }
+
+    /// Features that remain after applying a quality setting.
+    #[must_use]
+    pub fn at(self, quality: &Quality) -> Self {
+        let full = quality.shading == Shading::Full;
+        Self {
+            specular: self.specular && full,
+            powers: self.powers && full,
+            filtered: self.filtered && quality.filter != Some(Filter::Nearest),
+            shadows: self.shadows && quality.shadows,
+            ..self
+        }
+    }
+}
+
+/// Indices of the materials that are assigned to geometry, with repetitions.
+fn assigned(scene: &Scene) -> impl Iterator<Item = u32> {
+    let on_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
+    on_models
+        .chain(scene.spheres.iter().map(|sphere| sphere.material))
+        .chain(scene.planes.iter().map(|plane| plane.material))
+        .chain(scene.triangles.iter().map(|triangle| triangle.material))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::super::{
+        Attenuation, Background, Camera, ExponentPrecision, Light, LightKind, RenderSettings, Sphere,
+    };
+    use super::*;
+
+    fn scene(material: Material, assigned: bool) -> Scene {
+        let sphere = Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 };
+        let position = DVec3::Y;
+        Scene {
+            ambient: Vec3::ZERO,
+            render: RenderSettings::default(),
+            camera: Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+            background: Background::Color(Vec3::ZERO),
+            lights: vec![Light {
+                kind: LightKind::Point { position },
+                color: Vec3::ONE,
+                attenuation: Attenuation::None,
+                shadows: true,
+            }],
+            materials: vec![material],
+            textures: Vec::new(),
+            models: Vec::new(),
+            spheres: if assigned { vec![sphere] } else { Vec::new() },
+            planes: Vec::new(),
+            triangles: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn only_assigned_materials_count() {
+        let glossy = Material { exponent: 10.5, ..Material::NEUTRAL };
+        let features = SceneFeatures::of(&scene(glossy, true));
+        assert!(features.specular && features.powers && features.shadows);
+        assert!(!features.textured && !features.filtered && !features.smooth && !features.emissive);
+        let unused = SceneFeatures::of(&scene(glossy, false));
+        assert!(!unused.specular && !unused.powers);
+        let squared = SceneFeatures::of(&scene(Material::NEUTRAL, true));
+        assert!(squared.specular && !squared.powers, "whole exponents are squared");
+    }
+
+    #[test]
+    fn quality_removes_features() {
+        let features = SceneFeatures::of(&scene(Material { exponent: 0.5, ..Material::NEUTRAL }, true));
+        let quality = Quality { shading: Shading::Diffuse, shadows: false, ..Quality::default() };
+        let left = features.at(&quality);
+        assert!(!left.specular && !left.powers && !left.shadows);
+        let fast = Quality { exponent: ExponentPrecision::Fast, ..Quality::default() };
+        assert_eq!(features.at(&fast), features);
+    }
+}

@@ -1,0 +1,50 @@
+//! The scene as plain data: no file handles, no acceleration structures, nothing derived.
+
+mod features;
+mod light;
+mod objects;
+mod quality;
+mod scale;
+mod setting;
+mod view;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+pub use features::SceneFeatures;
+pub use light::{Attenuation, Light, LightKind};
+pub use objects::{Model, NormalMode, Plane, Sphere, Triangle};
+pub use quality::{ColorDepth, ExponentPrecision, Quality, Shading, word_of};
+pub use scale::RenderScale;
+pub use setting::Setting;
+pub use view::{Background, Camera, FrameView, RenderSettings};
+
+use crate::material::Material;
+use crate::texture::TextureMap;
+
+/// A whole scene, with every reference resolved to an index or a hash.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scene {
+    /// I_a, linear RGB, added once per hit, times the diffuse colour.
+    pub ambient: Vec3,
+    /// Picture size and sampling; the command line may override them.
+    pub render: RenderSettings,
+    /// Initial camera.
+    pub camera: Camera,
+    /// Radiance of rays that hit nothing.
+    pub background: Background,
+    /// Lights; never empty after loading (a scene without one gets the default light).
+    pub lights: Vec<Light>,
+    /// Materials; the range of every material index of the scene.
+    pub materials: Vec<Material>,
+    /// Textures; the range of every texture index of the materials.
+    pub textures: Vec<TextureMap>,
+    /// Instances of compiled meshes.
+    pub models: Vec<Model>,
+    /// Analytic spheres.
+    pub spheres: Vec<Sphere>,
+    /// Infinite planes.
+    pub planes: Vec<Plane>,
+    /// Single triangles of the scene file.
+    pub triangles: Vec<Triangle>,
+}

@@ -1,0 +1,100 @@
+//! Values of the knobs that trade accuracy for speed.
+//!
+//! Every value has a word, the same in scene files, on the command line and in reports.
+
+use serde::{Deserialize, Serialize};
+
+use crate::texture::Filter;
+
+/// Accuracy of a frame. The default is full quality: everything that the scene requests, exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Whether lights that cast shadows do. Without, no shadow ray is traced.
+    pub shadows: bool,
+    /// Whether pixels without edges are sampled sparsely.
+    pub adaptive: bool,
+    /// Terms of the shading equation.
+    pub shading: Shading,
+    /// Filter of all textures; `None` leaves each texture its own.
+    pub filter: Option<Filter>,
+    /// Precision of (N.H)^p.
+    pub exponent: ExponentPrecision,
+    /// Colours that a pixel can have.
+    pub colors: ColorDepth,
+    /// Whether pixels are dithered where light is quantised to bytes, which replaces bands by a pattern.
+    pub dither: bool,
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            shadows: true,
+            adaptive: false,
+            shading: Shading::Full,
+            filter: None,
+            exponent: ExponentPrecision::Exact,
+            colors: ColorDepth::Exact,
+            dither: false,
+        }
+    }
+}
+
+/// Terms of the shading equation that are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Shading {
+    /// All terms that the materials have.
+    Full,
+    /// The diffuse and the ambient term: no specular term, and no vectors to the viewer.
+    Diffuse,
+}
+
+/// Precision of the power (N.H)^p of a highlight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ExponentPrecision {
+    /// Within the rounding of `f32`, and in `f64` where exponents are large.
+    Exact,
+    /// By an approximation with a known error.
+    Fast,
+}
+
+/// Colours that a pixel can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ColorDepth {
+    /// All of RGB8.
+    Exact,
+    /// Those of RGB 5-6-5: 16 bits per pixel on the wire.
+    Reduced,
+}
+
+impl Shading {
+    /// Each value with its word.
+    pub const WORDS: [(&'static str, Self); 2] = [("full", Self::Full), ("diffuse", Self::Diffuse)];
+}
+
+impl ExponentPrecision {
+    /// Each value with its word.
+    pub const WORDS: [(&'static str, Self); 2] = [("exact", Self::Exact), ("fast", Self::Fast)];
+}
+
+impl ColorDepth {
+    /// Each value with its word.
+    pub const WORDS: [(&'static str, Self); 2] = [("exact", Self::Exact), ("reduced", Self::Reduced)];
+}
+
+/// The word of a value; empty for a value that is not in the list.
+pub fn word_of<T: PartialEq>(words: &[(&'static str, T)], value: &T) -> &'static str {
+    words.iter().find(|(_, known)| known == value).map_or("", |(word, _)| word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_lead_back_to_their_values() {
+        assert_eq!(word_of(&Shading::WORDS, &Shading::Diffuse), "diffuse");
+        assert_eq!(word_of(&ExponentPrecision::WORDS, &ExponentPrecision::Exact), "exact");
+        assert_eq!(word_of(&ColorDepth::WORDS, &ColorDepth::Reduced), "reduced");
+        assert_eq!(word_of(&Filter::WORDS, &Filter::Nearest), "nearest");
+    }
+}

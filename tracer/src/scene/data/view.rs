@@ -1,0 +1,159 @@
+//! What a frame shows and at which size: camera, background, picture size and sampling.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use super::{Quality, RenderScale, Scene, Setting};
+
+/// Picture size and sampling.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderSettings {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Rays per pixel: a square number, n * n on a regular grid.
+    pub samples: u32,
+    /// Bounces of reflection and transmission. No material reflects or transmits yet, so no picture depends on it.
+    pub max_depth: u32,
+    /// A bounce that can add less than this is not traced.
+    pub min_contribution: f32,
+    /// Quality knobs.
+    pub quality: Quality,
+    /// Share of width and height that is rendered.
+    pub scale: RenderScale,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            width: 1024,
+            height: 768,
+            samples: 1,
+            max_depth: 5,
+            min_contribution: 0.004,
+            quality: Quality::default(),
+            scale: RenderScale::Full,
+        }
+    }
+}
+
+impl RenderSettings {
+    /// Sample count, scale and knobs.
+    pub fn setting(&self) -> Setting {
+        Setting { samples: self.samples, scale: self.scale, quality: self.quality }
+    }
+
+    /// The same with another setting.
+    #[must_use]
+    pub fn with_setting(self, Setting { samples, scale, quality }: Setting) -> Self {
+        Self { samples, scale, quality, ..self }
+    }
+}
+
+/// A pinhole camera. `look_at` differs from `position`, and `up` is not parallel to the view direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// World position.
+    pub position: DVec3,
+    /// The point at the centre of the picture; the centre of orbits.
+    pub look_at: DVec3,
+    /// Up direction in the picture; any length, not necessarily perpendicular to the view direction.
+    pub up: DVec3,
+    /// Vertical field of view in degrees, inside (0, 180).
+    pub fov: f64,
+    /// Divides the view plane's size.
+    pub zoom: f64,
+}
+
+/// Radiance of rays that hit nothing, linear RGB.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Background {
+    /// A constant colour.
+    Color(Vec3),
+    /// From `bottom` (a ray straight down, -Y) to `top` (straight up), linear in (d.y + 1) / 2 of the unit direction d.
+    Gradient {
+        /// Colour at d.y = -1.
+        bottom: Vec3,
+        /// Colour at d.y = +1.
+        top: Vec3,
+    },
+}
+
+/// The part of a frame that changes while the scene stays the same: under 200 bytes on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameView {
+    /// Camera of this frame.
+    pub camera: Camera,
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Rays per pixel, a square number.
+    pub samples: u32,
+    /// Degrees by which every model is rotated about the +Y axis through its own origin, after its own rotation.
+    pub spin: f64,
+    /// Quality knobs.
+    pub quality: Quality,
+}
+
+impl FrameView {
+    /// Whether adaptive sampling takes effect: enabled, with more than one sample per pixel.
+    pub fn is_adaptive(&self) -> bool {
+        self.quality.adaptive && self.samples > 1
+    }
+
+    /// The frame that the scene requests, at full scale.
+    pub fn of(scene: &Scene) -> Self {
+        let RenderSettings { width, height, samples, quality, .. } = scene.render;
+        Self { camera: scene.camera, width, height, samples, spin: 0.0, quality }
+    }
+
+    /// Sample count and knobs, with the scale at which the view is rendered.
+    pub fn setting(&self, scale: RenderScale) -> Setting {
+        Setting { samples: self.samples, scale, quality: self.quality }
+    }
+
+    /// The view as it is rendered at a setting: its sample count and knobs, and the size at its scale.
+    #[must_use]
+    pub fn at(&self, setting: &Setting) -> Self {
+        let Setting { samples, scale, quality } = *setting;
+        Self { width: scale.of(self.width), height: scale.of(self.height), samples, quality, ..*self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera =
+        Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 };
+
+    #[test]
+    fn settings_round_trip() {
+        let settings = RenderSettings { samples: 9, scale: RenderScale::Third, ..RenderSettings::default() };
+        assert_eq!(RenderSettings::default().with_setting(settings.setting()), settings);
+        let setting =
+            Setting { quality: Quality { adaptive: true, ..Quality::default() }, ..settings.setting() };
+        assert_eq!(settings.with_setting(setting).setting(), setting);
+    }
+
+    #[test]
+    fn a_view_has_the_size_samples_and_knobs_of_its_setting() {
+        let view = FrameView {
+            camera: CAMERA,
+            width: 101,
+            height: 60,
+            samples: 1,
+            spin: 5.0,
+            quality: Quality::default(),
+        };
+        let quality = Quality { adaptive: true, ..Quality::default() };
+        let setting = Setting { samples: 4, scale: RenderScale::Half, quality };
+        let rendered = view.at(&setting);
+        assert_eq!(rendered, FrameView { width: 51, height: 30, samples: 4, quality, ..view });
+        assert!(rendered.is_adaptive() && !view.is_adaptive());
+        assert!(!FrameView { samples: 1, ..rendered }.is_adaptive());
+        assert_eq!(rendered.setting(RenderScale::Half), setting);
+    }
+}

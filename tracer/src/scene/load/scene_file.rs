@@ -1,0 +1,147 @@
+//! Loading of scene files: parsing, models, textures, and defaults for what the file leaves open.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::LoadedScene;
+use super::framing;
+use super::instances::{Models, named};
+use super::limits::LoadLimits;
+use super::textures::Textures;
+use crate::mesh::CompiledMesh;
+use crate::scene::data::{Camera, Scene};
+use crate::scene::import::{LoadOptions, MAX_SCENE_BYTES, SceneError, bytes};
+use crate::scene::toml::{self, Aim, CameraText, Fault, SceneText, TextureText, TexturesText};
+
+/// Loads a scene file and everything that it names.
+pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
+    refuse_for_scene(path, options)?;
+    let content = bytes(path, MAX_SCENE_BYTES)?;
+    let text = text_of(path, &content)?;
+    let locate = |fault: Fault| {
+        let (line, column) = toml::place(text, fault.at);
+        SceneError::InScene { path: path.to_owned(), line, column, message: fault.message }
+    };
+    let read = toml::read(text).map_err(locate)?;
+    let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| locate(w).to_string()).collect();
+    let mut models = Models::open(path, &read.models, &read.textures, options, limits).map_err(locate)?;
+    let mut loaded = assemble(path, read, &mut models, &locate)?;
+    warnings.append(&mut models.warnings);
+    loaded.warnings = warnings;
+    Ok(loaded)
+}
+
+/// Refuses options for which a scene file has keys of its own.
+fn refuse_for_scene(path: &Path, options: LoadOptions) -> Result<(), SceneError> {
+    let refused = |option: &str, key: &str| {
+        let message =
+            format!("{option} is for a model by itself: write {key} in [[model]] of the scene file");
+        Err(SceneError::in_file(path, message))
+    };
+    if options.up.is_some() {
+        return refused("--up", "`up = \"z\"`");
+    }
+    if options.crease_angle.is_some() {
+        return refused("--crease-angle", "`crease_angle`");
+    }
+    Ok(())
+}
+
+/// The text of a scene file, which is UTF-8.
+fn text_of<'b>(path: &Path, content: &'b [u8]) -> Result<&'b str, SceneError> {
+    std::str::from_utf8(content).map_err(|e| {
+        let before = String::from_utf8_lossy(content.get(..e.valid_up_to()).unwrap_or_default());
+        let (line, column) = toml::place(&before, before.len());
+        let message = "not valid UTF-8: save the scene file in that encoding".to_owned();
+        SceneError::InScene { path: path.to_owned(), line, column, message }
+    })
+}
+
+/// Builds the scene of a parsed file, and decides what the file leaves open.
+fn assemble(
+    path: &Path,
+    text: SceneText,
+    models: &mut Models,
+    locate: &impl Fn(Fault) -> SceneError,
+) -> Result<LoadedScene, SceneError> {
+    let size = (text.render.width, text.render.height);
+    let mut scene = Scene {
+        ambient: text.ambient,
+        render: text.render,
+        camera: framing::camera_showing(None, models.options.size.unwrap_or(size)),
+        background: text.background,
+        lights: text.lights,
+        materials: text.materials,
+        textures: Vec::new(),
+        models: Vec::new(),
+        spheres: text.spheres,
+        planes: text.planes,
+        triangles: text.triangles,
+    };
+    for model in &text.models {
+        let instance = models.instance(model, &mut scene.materials, &text.textures, locate)?;
+        scene.models.push(instance);
+    }
+    load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(locate)?;
+    let (maps, textures, notes) = models.textures.take_parts();
+    scene.textures = maps;
+    models.warnings.extend(notes);
+    let meshes = models.take_meshes();
+    let file_of = |mesh: &Arc<CompiledMesh>| {
+        let mut files = scene.models.iter().zip(&text.models);
+        files.find(|(model, _)| model.mesh == mesh.id()).map(|(_, text)| PathBuf::from(&text.file))
+    };
+    let mesh_files = meshes.iter().map(|mesh| file_of(mesh).unwrap_or_default()).collect();
+    let bounds = framing::bounds(&scene, &meshes);
+    scene.camera = match text.camera {
+        Some(camera) => aimed(camera, bounds),
+        None if bounds.is_none() => {
+            let message = "[camera] is missing, and the scene has nothing finite to frame; add one with `position` and `look_at`";
+            return Err(SceneError::in_file(path, message));
+        }
+        None => framing::camera_showing(bounds, models.options.size.unwrap_or(size)),
+    };
+    if scene.lights.is_empty() {
+        scene.lights.push(framing::default_light(&scene.camera));
+    }
+    Ok(LoadedScene { scene, meshes, mesh_files, textures, warnings: Vec::new() })
+}
+
+/// Loads the textures of the scene file's own materials, as far as these are assigned to geometry.
+fn load_textures(
+    folder: &Path,
+    texts: &BTreeMap<u32, TexturesText>,
+    scene: &mut Scene,
+    textures: &mut Textures,
+) -> Result<(), Fault> {
+    let of_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
+    let used: BTreeSet<u32> =
+        of_models.chain(scene.triangles.iter().map(|triangle| triangle.material)).collect();
+    let mut list = |text: &TextureText| {
+        let listed = textures.add(&named(folder, &text.file), text.filter, text.tiling);
+        listed.map_err(|reason| Fault {
+            at: text.at,
+            message: format!("the texture: {reason} (paths are relative to the scene file)"),
+        })
+    };
+    for (index, text) in texts.iter().filter(|(index, _)| used.contains(index)) {
+        let Some(material) = scene.materials.get_mut(*index as usize) else { continue };
+        let texture = text.diffuse.as_ref().map(&mut list).transpose()?;
+        material.texture = texture.map(|listed| listed.index);
+        material.cutout = texture.filter(|listed| listed.cuts).map(|listed| listed.index);
+        material.emission_texture =
+            text.emission.as_ref().map(&mut list).transpose()?.map(|listed| listed.index);
+    }
+    Ok(())
+}
+
+/// The camera of the file with its look-at point.
+fn aimed(text: CameraText, bounds: Option<framing::Bounds>) -> Camera {
+    let CameraText { position, aim, up, fov, zoom } = text;
+    let look_at = match aim {
+        Aim::Point(point) => point,
+        Aim::Direction(direction) => framing::point_on_axis(position, direction, bounds),
+    };
+    Camera { position, look_at, up, fov, zoom }
+}

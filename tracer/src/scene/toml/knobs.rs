@@ -1,0 +1,169 @@
+//! The knobs of `[render]`, read by a loop over the table of knobs.
+
+use super::fault::{Fault, Read};
+use super::table::Table;
+use super::value::Value;
+use crate::scene::data::{RenderScale, Setting};
+use crate::scene::knobs::{KNOBS, Knob, KnobForm, KnobValue};
+use crate::scene::validate::is_sample_count;
+
+/// The setting of a `[render]` table: `default` where it has no key of a knob.
+pub(super) fn setting(table: Table<'_>, default: Setting) -> Read<Setting> {
+    let mut setting = default;
+    for knob in KNOBS {
+        if let Some(value) = table.get(knob.key) {
+            read(knob, value)?.apply(&mut setting);
+        }
+    }
+    match table.get("adaptive").filter(|_| setting.quality.adaptive && setting.samples == 1) {
+        Some(value) => Err(nothing_to_adapt(&value)),
+        None => Ok(setting),
+    }
+}
+
+fn nothing_to_adapt(value: &Value<'_>) -> Fault {
+    value.fault(
+        "`adaptive = true` leaves out samples, but there is only one a pixel: set `samples` to 4, 9, 16, ...",
+    )
+}
+
+/// The value of a knob, written in the knob's form.
+fn read(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
+    match knob.form {
+        KnobForm::Switch => find(knob, value, if value.boolean()? { "on" } else { "off" }),
+        KnobForm::Word => word(knob, value),
+        KnobForm::Count => find(knob, value, &count(value)?.to_string()),
+        KnobForm::Fraction => fraction(knob, value),
+    }
+}
+
+/// The value of a knob with this word.
+fn find(knob: &'static Knob, value: Value<'_>, word: &str) -> Read<&'static KnobValue> {
+    knob.value(word).ok_or_else(|| {
+        let words: Vec<&str> = knob.words().collect();
+        value.must_be(&format!("one of {}", words.join(", ")))
+    })
+}
+
+fn word(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
+    let best_first = knob.values.iter().rev();
+    let words: Vec<(&str, &KnobValue)> = best_first.filter_map(|known| Some((known.word?, known))).collect();
+    value.word(&words)
+}
+
+/// A sample count.
+fn count(value: Value<'_>) -> Read<u32> {
+    let expected = "that is a square from 1 to 256 (1, 4, 9, 16, ...)";
+    let samples = value.whole(expected, 1..=u32::MAX)?;
+    let square = is_sample_count(samples).then_some(samples);
+    square.ok_or_else(|| value.must_be(&format!("a whole number {expected}")))
+}
+
+/// A scale, as a number or as a fraction in quotes.
+fn fraction(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
+    if value.value.get_ref().is_str() {
+        return word(knob, value);
+    }
+    let expected = "that is 1, 0.75, 0.5 or 0.25, or one of \"3/4\", \"1/2\", \"1/3\", \"1/4\"";
+    let known = |number: f64| RenderScale::ALL.into_iter().find(|scale| is_written(*scale, number));
+    let number = value.number(expected, |number| known(number).is_some())?;
+    let scale = known(number).ok_or_else(|| value.must_be(&format!("a number {expected}")))?;
+    find(knob, value, scale.word())
+}
+
+/// Whether a number means a scale. One third has infinitely many digits, so two of them are enough.
+fn is_written(scale: RenderScale, number: f64) -> bool {
+    match scale {
+        RenderScale::Third => (number - scale.factor()).abs() < 0.0034,
+        _ => number == scale.factor(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{place, read};
+    use super::*;
+    use crate::scene::data::{ColorDepth, ExponentPrecision, Quality, RenderSettings, Shading};
+    use crate::texture::Filter;
+
+    fn render(keys: &str) -> Result<RenderSettings, String> {
+        let text = format!("[render]\n{keys}");
+        read(&text).map(|scene| scene.render).map_err(|fault| {
+            let (line, column) = place(&text, fault.at);
+            format!("{line}:{column} {}", fault.message)
+        })
+    }
+
+    #[test]
+    fn every_knob_is_read() {
+        let all = "samples = 4\nadaptive = true\nshadows = false\nshading = \"diffuse\"\nfilter = \"nearest\"\nexponent = \"fast\"\n\
+                   pixels = \"reduced\"\nscale = 0.75\ndither = true";
+        let reduced = Quality {
+            shadows: false,
+            adaptive: true,
+            shading: Shading::Diffuse,
+            filter: Some(Filter::Nearest),
+            exponent: ExponentPrecision::Fast,
+            colors: ColorDepth::Reduced,
+            dither: true,
+        };
+        let render_all = render(all).unwrap();
+        assert_eq!((render_all.quality, render_all.scale), (reduced, RenderScale::ThreeQuarters));
+        let full = "adaptive = false\nshadows = true\nshading = \"full\"\nexponent = \"exact\"\npixels = \"exact\"\nscale = 1\ndither = false";
+        assert_eq!(render(full), render(""));
+        assert_eq!(render("").unwrap().quality, Quality::default());
+        assert_eq!(render("scale = 0.5").unwrap().scale, RenderScale::Half);
+        assert_eq!(render("scale = 1.0").unwrap().scale, RenderScale::Full);
+        for third in ["0.33", "0.333", "0.3333333333333333", "\"1/3\""] {
+            assert_eq!(render(&format!("scale = {third}")).unwrap().scale, RenderScale::Third, "{third}");
+        }
+        for (word, scale) in RenderScale::WORDS {
+            assert_eq!(render(&format!("scale = \"{word}\"")).unwrap().scale, scale);
+        }
+        assert_eq!(render("scale = 0.25").unwrap().scale, RenderScale::Quarter);
+    }
+
+    #[test]
+    fn other_values_are_refused_with_their_place() {
+        for (key, place, words) in [
+            ("adaptive = true", "2:12 ", "set `samples` to 4, 9"),
+            ("adaptive = 4", "2:12 ", "true or false, but is 4"),
+            ("shadows = \"off\"", "2:11 ", "true or false, but is \"off\""),
+            ("shading = \"difuse\"", "2:11 ", "did you mean `diffuse`?"),
+            ("filter = \"linear\"", "2:10 ", "did you mean `bilinear`?"),
+            ("exponent = \"exat\"", "2:12 ", "did you mean `exact`?"),
+            ("exponent = 3", "2:12 ", "one of \"exact\", \"fast\", but is 3"),
+            ("pixels = \"565\"", "2:10 ", "known here: `exact`, `reduced`"),
+            (
+                "scale = 2",
+                "2:9 ",
+                "that is 1, 0.75, 0.5 or 0.25, or one of \"3/4\", \"1/2\", \"1/3\", \"1/4\", but is 2",
+            ),
+            ("scale = nan", "2:9 ", "but is nan"),
+            ("scale = 0.3", "2:9 ", "but is 0.3"),
+            ("scale = \"1/5\"", "2:9 ", "did you mean `1/2`?"),
+            ("scael = 1", "2:1 ", "did you mean `scale`?"),
+        ] {
+            let message = render(key).unwrap_err();
+            assert!(message.starts_with(place) && message.contains(words), "{key}: {message}");
+        }
+    }
+
+    #[test]
+    fn every_value_of_the_table_is_read_by_its_key() {
+        for knob in KNOBS {
+            for known in knob.values {
+                let Some(word) = known.word else { continue };
+                let written = match knob.form {
+                    KnobForm::Switch => (word == "on").to_string(),
+                    KnobForm::Word | KnobForm::Fraction => format!("\"{word}\""),
+                    KnobForm::Count => word.to_owned(),
+                };
+                // With several samples, so that adaptive sampling is accepted.
+                let samples = if knob.key == "samples" { "" } else { "samples = 9\n" };
+                let settings = render(&format!("{samples}{} = {written}", knob.key)).unwrap();
+                assert!(known.is_of(&settings.setting()), "{} = {written}", knob.key);
+            }
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! The scene file: TOML to plain data with positions for messages. No other file is opened here.
+//!
+//! The text is parsed into tables whose values have positions, and each table is read with the list of its keys. So
+//! every unknown key is a fault, and every fault has a line and a column.
+
+mod fault;
+mod knobs;
+mod light;
+mod material;
+mod objects;
+mod table;
+mod value;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use fault::{FirstFault, Read};
+use material::Materials;
+use table::{Table, tables_of};
+use value::Value;
+
+use crate::material::Material;
+use crate::scene::data::{Background, Light, Plane, RenderSettings, Sphere, Triangle};
+use crate::scene::validate::{
+    MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
+};
+
+pub(super) use fault::{Fault, place};
+pub(super) use material::{TextureText, TexturesText};
+pub(super) use objects::ModelText;
+pub(super) use view::{Aim, CameraText};
+
+const KEYS: &[&str] = &[
+    "ambient",
+    "render",
+    "camera",
+    "background",
+    "light",
+    "material",
+    "model",
+    "sphere",
+    "plane",
+    "triangle",
+];
+
+/// The content of a scene file. Models are not loaded; what the file leaves open is left to the loader.
+#[derive(Clone, Debug)]
+pub(super) struct SceneText {
+    /// I_a; zero if absent.
+    pub(super) ambient: Vec3,
+    pub(super) render: RenderSettings,
+    pub(super) camera: Option<CameraText>,
+    /// Background; black if absent.
+    pub(super) background: Background,
+    pub(super) lights: Vec<Light>,
+    pub(super) materials: Vec<Material>,
+    /// Textures by the index of their material.
+    pub(super) textures: BTreeMap<u32, TexturesText>,
+    pub(super) models: Vec<ModelText>,
+    pub(super) spheres: Vec<Sphere>,
+    pub(super) planes: Vec<Plane>,
+    pub(super) triangles: Vec<Triangle>,
+    /// Accepted input that is probably a mistake.
+    pub(super) warnings: Vec<Fault>,
+}
+
+/// Collects warnings while the text is read.
+#[derive(Default)]
+struct Reading {
+    warnings: Vec<Fault>,
+}
+
+impl Reading {
+    fn warn(&mut self, at: usize, message: String) {
+        self.warnings.push(Fault { at, message });
+    }
+}
+
+/// Reads a scene file's text.
+///
+/// # Errors
+/// The first fault in the text: no TOML, an unknown key, a value of the wrong type or out of range, an unknown
+/// material, an unsupported feature.
+pub(super) fn read(text: &str) -> Read<SceneText> {
+    check_size(text)?;
+    let document = DeTable::parse(text).map_err(|e| {
+        let at = e.span().map_or(0, |span| span.start);
+        let message = e.message().trim().replace('\n', ", ");
+        let hint = if has_escape(text, at) { format!("; {}", value::ESCAPES) } else { String::new() };
+        Fault { at, message: format!("not valid TOML: {message}{hint}") }
+    })?;
+    let top = Table::of("the scene file", 0, document.get_ref(), KEYS)?;
+    let mut first = FirstFault::default();
+    let scene = read_sections(top, &mut first);
+    first.into_result()?;
+    // Without a fault every section has been read.
+    scene.ok_or_else(|| top.fault("the scene file cannot be read"))
+}
+
+/// Whether the line at an offset has a back slash in double quotes, before the offset or just behind.
+fn has_escape(text: &str, at: usize) -> bool {
+    let start = text.get(..at).and_then(|before| before.rfind('\n')).map_or(0, |end| end + 1);
+    let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
+    let mut quote = None;
+    line.chars().any(|c| {
+        match quote {
+            None if matches!(c, '"' | '\'') => quote = Some(c),
+            Some(open) if open == c => quote = None,
+            _ => {}
+        }
+        c == '\\' && quote == Some('"')
+    })
+}
+
+/// Largest number of values of a scene file, including tables and lists. Each takes some hundred bytes when parsed.
+const MAX_VALUES: usize = 1 << 24;
+
+/// Refuses a text whose parsed form would take far more memory than the text: 60 MB of `{}` take gigabytes. Every
+/// value except the first follows one of these characters; those in strings and comments are counted as well.
+fn check_size(text: &str) -> Read<()> {
+    let begins_value = |byte: u8| matches!(byte, b'=' | b',' | b'[' | b'{');
+    let mut places = text.bytes().enumerate().filter(|(_, byte)| begins_value(*byte)).map(|(at, _)| at);
+    match places.nth(MAX_VALUES) {
+        Some(at) => Err(Fault {
+            at,
+            message: format!(
+                "more than {MAX_VALUES} values in a scene file; write meshes as models (`.obj`) and name them here"
+            ),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Reads all sections, so that the first fault in the text is found; `None` if there is one.
+fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
+    let mut reading = Reading::default();
+    let reading = &mut reading;
+    let ambient = first.keep(top.read("ambient", |value| value.color(MAX_LIGHT)));
+    let render = section(top, "render", "[render]", &view::render_keys(), view::render, first);
+    let camera = |table: Table<'_>| view::camera(table, reading);
+    let camera = section(top, "camera", "[camera]", view::CAMERA_KEYS, camera, first);
+    let background =
+        section(top, "background", "[background]", view::BACKGROUND_KEYS, view::background, first);
+    let light = |table: Table<'_>| light::light(table, reading);
+    let lights = list(top, "light", "[[light]]", (light::LIGHT_KEYS, MAX_LIGHTS), light, first);
+    let mut materials = read_materials(top, first);
+    let model = |table: Table<'_>| objects::model(table, &materials, reading);
+    let models = list(top, "model", "[[model]]", (objects::MODEL_KEYS, MAX_MODELS), model, first);
+    let sphere = |table: Table<'_>| objects::sphere(table, &mut materials);
+    let spheres = list(top, "sphere", "[[sphere]]", (objects::SPHERE_KEYS, MAX_SPHERES), sphere, first);
+    let plane = |table: Table<'_>| objects::plane(table, &mut materials);
+    let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
+    let triangle = |table: Table<'_>| objects::triangle(table, &mut materials, reading);
+    let triangles =
+        list(top, "triangle", "[[triangle]]", (objects::TRIANGLE_KEYS, MAX_TRIANGLES), triangle, first);
+    reading.warnings.sort_by_key(|warning| warning.at);
+    let (materials, textures) = materials.into_parts();
+    Some(SceneText {
+        ambient: ambient?.unwrap_or(Vec3::ZERO),
+        render: render?.unwrap_or_default(),
+        camera: camera?,
+        background: background?.unwrap_or(Background::Color(Vec3::ZERO)),
+        lights,
+        materials,
+        textures,
+        models,
+        spheres,
+        planes,
+        triangles: triangles.into_iter().flatten().collect(),
+        warnings: std::mem::take(&mut reading.warnings),
+    })
+}
+
+/// Reads an optional table; the outer `None` means a fault.
+fn section<'t, T>(
+    top: Table<'t>,
+    key: &'static str,
+    name: &'t str,
+    known: &[&str],
+    read: impl FnOnce(Table<'t>) -> Read<T>,
+    first: &mut FirstFault,
+) -> Option<Option<T>> {
+    first.keep(top.read(key, |value| read(Table::open(name, value.value, known)?)))
+}
+
+/// Reads each table of a list of at most `most` tables; tables with a fault are left out of the result.
+fn list<'t, T>(
+    top: Table<'t>,
+    key: &'static str,
+    name: &'t str,
+    (known, most): (&[&str], usize),
+    mut read: impl FnMut(Table<'t>) -> Read<T>,
+    first: &mut FirstFault,
+) -> Vec<T> {
+    let tables =
+        first.keep(tables_of(top.get(key)).and_then(|tables| within(tables, name, most))).unwrap_or_default();
+    tables
+        .into_iter()
+        .filter_map(|value| first.keep(Table::open(name, value, known).and_then(&mut read)))
+        .collect()
+}
+
+/// Refuses a list that is too long, before any entry is built.
+fn within<'t>(
+    tables: Vec<&'t Spanned<DeValue<'t>>>,
+    name: &str,
+    most: usize,
+) -> Read<Vec<&'t Spanned<DeValue<'t>>>> {
+    match tables.get(most) {
+        Some(first_beyond) => {
+            let count = tables.len();
+            Err(Fault::at_value(first_beyond, format!("{count} times {name}, at most {most} are allowed")))
+        }
+        None => Ok(tables),
+    }
+}
+
+/// Reads all materials. All names are collected first, so that a fault in one material hides none in its users.
+fn read_materials(top: Table<'_>, first: &mut FirstFault) -> Materials {
+    let Some(value) = top.get("material") else { return Materials::default() };
+    let Some(entries) = first.keep(material_tables(value)) else { return Materials::default() };
+    let mut materials = Materials::named(entries.iter().map(|(name, _)| name.to_string()).collect());
+    for (index, (name, value)) in entries.into_iter().enumerate() {
+        let name = format!("[material.{}]", fault::shortened(name));
+        let read = || material::material(Table::open(&name, value, material::MATERIAL_KEYS)?);
+        if let Some(material) = first.keep(read()) {
+            materials.define(index, material);
+        }
+    }
+    materials
+}
+
+fn material_tables<'t>(value: Value<'t>) -> Read<Vec<(&'t str, &'t Spanned<DeValue<'t>>)>> {
+    match value.value.get_ref() {
+        DeValue::Table(entries) if entries.len() > MAX_MATERIALS => {
+            let count = entries.len();
+            Err(value.fault(format!("{count} materials, at most {MAX_MATERIALS} are allowed")))
+        }
+        DeValue::Table(entries) => {
+            Ok(entries.iter().map(|(name, value)| (name.get_ref().as_ref(), value)).collect())
+        }
+        _ => Err(value.fault("materials are tables with a name: write [material.NAME]")),
+    }
+}

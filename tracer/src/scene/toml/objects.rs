@@ -1,0 +1,126 @@
+//! The tables `[[model]]`, `[[sphere]]`, `[[plane]]` and `[[triangle]]`.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+use super::Reading;
+use super::fault::Read;
+use super::material::Materials;
+use super::table::Table;
+use super::value::Value;
+use crate::scene::data::{NormalMode, Plane, Sphere, Triangle};
+use crate::scene::import::Up;
+use crate::scene::validate::MAX_COORDINATE;
+use crate::texture::without_repeats;
+
+pub(super) const MODEL_KEYS: &[&str] =
+    &["file", "material", "normals", "translate", "rotate", "scale", "up", "crease_angle"];
+pub(super) const SPHERE_KEYS: &[&str] = &["center", "radius", "material"];
+pub(super) const PLANE_KEYS: &[&str] = &["point", "normal", "material"];
+pub(super) const TRIANGLE_KEYS: &[&str] = &["vertices", "uvs", "material"];
+
+/// A model whose file has not been loaded.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ModelText {
+    /// As the scene file names it, relative to that file.
+    pub(crate) file: PathBuf,
+    /// Offset of the file's name in the text, for messages.
+    pub(crate) at: usize,
+    /// Material that replaces the model's own materials.
+    pub(crate) material: Option<u32>,
+    /// Offset of that material's name in the text.
+    pub(crate) material_at: usize,
+    pub(crate) normals: NormalMode,
+    /// Crease angle in degrees, and the offset of its value in the text.
+    pub(crate) crease_angle: Option<(f64, usize)>,
+    pub(crate) translate: DVec3,
+    /// Rotation in degrees, including the one that rotates the file upright.
+    pub(crate) rotate: DVec3,
+    /// Scale along the axes of the file.
+    pub(crate) scale: DVec3,
+}
+
+pub(super) fn model(table: Table<'_>, materials: &Materials, reading: &mut Reading) -> Read<ModelText> {
+    let file = table.required("file")?;
+    let name = file.file_name("the name of a model file")?;
+    let modes = [("smooth", NormalMode::Smooth), ("flat", NormalMode::Flat)];
+    let normals = table.read("normals", |value| value.word(&modes))?.unwrap_or(NormalMode::Smooth);
+    let crease_angle = table.read("crease_angle", |value| {
+        Ok((value.number("of degrees from 0 to 180", |n| (0.0..=180.0).contains(&n))?, value.start()))
+    })?;
+    if let (Some((_, at)), NormalMode::Flat) = (crease_angle, normals) {
+        let message = "`crease_angle` in [[model]] has no effect where `normals` is \"flat\"".to_owned();
+        reading.warn(at, message);
+    }
+    let rotate = table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
+    let scale = table.read("scale", scale)?.unwrap_or(DVec3::ONE);
+    let up = table.read("up", |value| value.word(&Up::WORDS))?.unwrap_or_default();
+    let (rotate, scale) = up.before(rotate, scale);
+    Ok(ModelText {
+        file: PathBuf::from(name),
+        at: file.start(),
+        material: materials.referred(table)?,
+        material_at: table.get("material").map_or(0, |value| value.start()),
+        normals,
+        crease_angle,
+        translate: table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
+        rotate,
+        scale,
+    })
+}
+
+fn scale(value: Value<'_>) -> Read<DVec3> {
+    let expected = "one number, or three in an array, none of them 0";
+    let scale = if value.value.get_ref().is_array() {
+        value.vector()?
+    } else {
+        let fits = |n: f64| n.abs() <= MAX_COORDINATE;
+        DVec3::splat(value.number("(or an array of three), not 0 and up to 1e30", fits)?)
+    };
+    let flat = scale.to_array().contains(&0.0);
+    if flat { Err(value.must_be(expected)) } else { Ok(scale) }
+}
+
+pub(super) fn sphere(table: Table<'_>, materials: &mut Materials) -> Read<Sphere> {
+    Ok(Sphere {
+        center: table.required("center")?.vector()?,
+        radius: table.required("radius")?.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)?,
+        material: materials.referred_plain(table, "use a material with a colour")?,
+    })
+}
+
+pub(super) fn plane(table: Table<'_>, materials: &mut Materials) -> Read<Plane> {
+    Ok(Plane {
+        point: table.required("point")?.vector()?,
+        normal: table.required("normal")?.direction()?,
+        material: materials
+            .referred_plain(table, "use a material with a colour, or two triangles with `uvs`")?,
+    })
+}
+
+/// Reads a triangle; `None` for one without an area, which is invisible.
+pub(super) fn triangle(
+    table: Table<'_>,
+    materials: &mut Materials,
+    reading: &mut Reading,
+) -> Read<Option<Triangle>> {
+    let value = table.required("vertices")?;
+    let vertices = value.three_points()?;
+    let uvs = table.read("uvs", |value| value.three_uvs())?;
+    let material = match uvs {
+        Some(_) => materials.referred_or_neutral(table)?,
+        None => materials.referred_plain(table, "add `uvs`, or use a material with a colour")?,
+    };
+    // Checked above: a triangle with a texture has coordinates.
+    let uvs = uvs.filter(|_| materials.has_texture(material)).map(|uvs| {
+        let near = without_repeats(uvs).filter(|_| !materials.distinguishes_repeats(material));
+        near.unwrap_or(uvs.map(|uv| uv.as_vec2()))
+    });
+    let [a, b, c] = vertices;
+    if a == b || b == c || c == a {
+        reading.warn(value.start(), format!("{value} has no area: the triangle is left out"));
+        return Ok(None);
+    }
+    Ok(Some(Triangle { vertices, uvs, material }))
+}

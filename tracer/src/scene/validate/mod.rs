@@ -1,0 +1,304 @@
+//! Checks of untrusted scenes: every index in range, every number finite and within its bounds, every list bounded. A
+//! scene that passes can be compiled and traced without further checks.
+
+use std::collections::BTreeSet;
+
+use glam::{DVec3, Vec3};
+
+use super::data::{
+    Attenuation, Background, Camera, FrameView, Light, LightKind, Model, RenderSettings, Scene, Triangle,
+};
+use crate::image::MAX_SIDE;
+use crate::material::{MAX_EXPONENT, Material};
+use crate::mesh::MeshId;
+use crate::texture::{self, TextureId, TextureMap};
+
+/// Largest number of lights.
+pub const MAX_LIGHTS: usize = 4096;
+/// Largest number of materials, including those of the models' files.
+pub const MAX_MATERIALS: usize = 1 << 18;
+/// Largest number of textures.
+pub const MAX_TEXTURES: usize = 4096;
+/// Largest number of mesh instances.
+pub const MAX_MODELS: usize = 1 << 16;
+/// Largest number of spheres.
+pub const MAX_SPHERES: usize = 1 << 20;
+/// Largest number of infinite planes; every ray tests all of them.
+pub const MAX_PLANES: usize = 1024;
+/// Largest number of single triangles; larger sets belong into a model.
+pub const MAX_TRIANGLES: usize = 1 << 20;
+/// Largest number of material slots of one model.
+pub const MAX_SLOTS: usize = 1 << 16;
+/// Largest number of rays per pixel.
+pub const MAX_SAMPLES: u32 = 256;
+/// Largest number of bounces of a ray.
+pub const MAX_DEPTH: u32 = 64;
+/// Largest magnitude of a coordinate, radius, scale factor or degree: squares and their products stay finite in
+/// `f64`.
+pub const MAX_COORDINATE: f64 = 1e30;
+/// Largest channel of a light or an emission: finite in `f32` after multiplication with an attenuation.
+pub const MAX_LIGHT: f32 = 1e30;
+
+/// Reason why a scene cannot be rendered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ValidateError {
+    /// A list is longer than allowed.
+    #[error("the scene has {count} {what}; {limit} are allowed")]
+    TooMany {
+        /// The listed items.
+        what: &'static str,
+        /// Their number.
+        count: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// A number or vector is out of bounds.
+    #[error("{what} must be {expected}")]
+    Unfit {
+        /// Path of the number in the scene.
+        what: String,
+        /// The bounds.
+        expected: &'static str,
+    },
+    /// A material index is out of range.
+    #[error("{what} names material {index}, but the scene has {count}")]
+    NoSuchMaterial {
+        /// Path of the object with the index.
+        what: String,
+        /// The index.
+        index: u32,
+        /// Number of materials of the scene.
+        count: usize,
+    },
+}
+
+type Check = Result<(), ValidateError>;
+
+impl Scene {
+    /// Hashes of the meshes of all models.
+    pub fn mesh_ids(&self) -> BTreeSet<MeshId> {
+        self.models.iter().map(|model| model.mesh).collect()
+    }
+
+    /// Hashes of all textures.
+    pub fn texture_ids(&self) -> BTreeSet<TextureId> {
+        self.textures.iter().map(|map| map.texture).collect()
+    }
+
+    /// Checks a scene from an untrusted source, such as the wire.
+    ///
+    /// # Errors
+    /// The first list that is too long, number that is out of bounds, or index that is out of range.
+    pub fn validate(&self) -> Result<(), ValidateError> {
+        self.check_counts()?;
+        require(is_color(self.ambient, MAX_LIGHT), || "ambient".into(), "finite and not negative")?;
+        check_render(&self.render)?;
+        check_camera(&self.camera)?;
+        check_background(&self.background)?;
+        each("lights", &self.lights, check_light)?;
+        each("textures", &self.textures, check_texture)?;
+        each("materials", &self.materials, |material, name| self.check_material(material, name))?;
+        each("models", &self.models, |model, name| self.check_model(model, name))?;
+        each("spheres", &self.spheres, |sphere, name| {
+            require(is_point(sphere.center), || format!("{name}.center"), FINITE)?;
+            require(is_positive(sphere.radius), || format!("{name}.radius"), "above zero and finite")?;
+            self.check_plain_material(sphere.material, name)
+        })?;
+        each("planes", &self.planes, |plane, name| {
+            require(is_point(plane.point), || format!("{name}.point"), FINITE)?;
+            require(is_unit(plane.normal), || format!("{name}.normal"), UNIT)?;
+            self.check_plain_material(plane.material, name)
+        })?;
+        each("triangles", &self.triangles, |triangle, name| self.check_triangle(triangle, name))
+    }
+
+    fn check_counts(&self) -> Check {
+        for (what, count, limit) in [
+            ("lights", self.lights.len(), MAX_LIGHTS),
+            ("materials", self.materials.len(), MAX_MATERIALS),
+            ("textures", self.textures.len(), MAX_TEXTURES),
+            ("models", self.models.len(), MAX_MODELS),
+            ("spheres", self.spheres.len(), MAX_SPHERES),
+            ("planes", self.planes.len(), MAX_PLANES),
+            ("single triangles", self.triangles.len(), MAX_TRIANGLES),
+        ] {
+            if count > limit {
+                return Err(ValidateError::TooMany { what, count, limit });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_model(&self, model: &Model, name: &str) -> Check {
+        let (what, count, limit) = ("material slots in one model", model.materials.len(), MAX_SLOTS);
+        if count > limit {
+            return Err(ValidateError::TooMany { what, count, limit });
+        }
+        model.materials.iter().try_for_each(|index| self.check_material_index(*index, name))?;
+        require(is_point(model.translate), || format!("{name}.translate"), FINITE)?;
+        require(is_point(model.rotate), || format!("{name}.rotate"), FINITE)?;
+        let scale = is_point(model.scale) && model.scale.to_array().iter().all(|s| *s != 0.0);
+        require(scale, || format!("{name}.scale"), "finite and not zero along any axis")
+    }
+
+    fn check_triangle(&self, triangle: &Triangle, name: &str) -> Check {
+        let finite = triangle.vertices.iter().all(|v| is_point(*v));
+        require(finite, || format!("{name}.vertices"), FINITE)?;
+        let Some(uvs) = triangle.uvs else { return self.check_plain_material(triangle.material, name) };
+        require(uvs.into_iter().all(texture::is_usable), || format!("{name}.uvs"), "finite and small")?;
+        self.check_material_index(triangle.material, name)
+    }
+
+    fn check_material(&self, material: &Material, name: &str) -> Check {
+        check_material(material, name)?;
+        let listed = material.textures().all(|index| (index as usize) < self.textures.len());
+        require(listed, || format!("{name}.texture"), "one of the scene's textures")
+    }
+
+    /// Checks the material of an object without texture coordinates.
+    fn check_plain_material(&self, index: u32, name: &str) -> Check {
+        self.check_material_index(index, name)?;
+        let plain = self.materials[index as usize].textures().next().is_none();
+        require(plain, || format!("{name}.material"), "without a texture: there are no texture coordinates")
+    }
+
+    fn check_material_index(&self, index: u32, name: &str) -> Check {
+        let count = self.materials.len();
+        if (index as usize) < count {
+            Ok(())
+        } else {
+            Err(ValidateError::NoSuchMaterial { what: name.into(), index, count })
+        }
+    }
+}
+
+impl FrameView {
+    /// Checks a view from an untrusted source.
+    ///
+    /// # Errors
+    /// An invalid camera, a size or sample count out of bounds.
+    pub fn validate(&self) -> Result<(), ValidateError> {
+        check_camera(&self.camera)?;
+        check_size(self.width, self.height, self.samples)?;
+        require(is_coordinate(self.spin), || "spin".into(), FINITE)
+    }
+}
+
+const FINITE: &str = "finite and at most 1e30 in magnitude";
+const UNIT: &str = "of unit length";
+
+fn require(holds: bool, what: impl FnOnce() -> String, expected: &'static str) -> Check {
+    if holds { Ok(()) } else { Err(ValidateError::Unfit { what: what(), expected }) }
+}
+
+fn each<T>(list: &str, items: &[T], check: impl Fn(&T, &str) -> Check) -> Check {
+    items.iter().enumerate().try_for_each(|(i, item)| check(item, &format!("{list}[{i}]")))
+}
+
+fn check_render(render: &RenderSettings) -> Check {
+    check_size(render.width, render.height, render.samples)?;
+    require(render.max_depth <= MAX_DEPTH, || "render.max_depth".into(), "at most 64")?;
+    let share = (0.0..=1.0).contains(&render.min_contribution);
+    require(share, || "render.min_contribution".into(), "from 0 to 1")
+}
+
+fn check_size(width: u32, height: u32, samples: u32) -> Check {
+    let fits = |side| (1..=MAX_SIDE).contains(&side);
+    require(fits(width), || "width".into(), "from 1 to 16384 pixels")?;
+    require(fits(height), || "height".into(), "from 1 to 16384 pixels")?;
+    require(is_sample_count(samples), || "samples".into(), "a square number from 1 to 256")
+}
+
+fn check_camera(camera: &Camera) -> Check {
+    require(is_point(camera.position), || "camera.position".into(), FINITE)?;
+    require(is_point(camera.look_at), || "camera.look_at".into(), FINITE)?;
+    require(is_point(camera.up), || "camera.up".into(), FINITE)?;
+    require(camera.fov > 0.0 && camera.fov < 180.0, || "camera.fov".into(), "above 0 and below 180 degrees")?;
+    require(is_positive(camera.zoom), || "camera.zoom".into(), "above zero and finite")?;
+    let fault = view_fault(camera.look_at - camera.position, camera.up);
+    require(fault.is_none(), || "camera".into(), fault.unwrap_or_default())
+}
+
+/// The fault of a camera that looks along `direction`, both vectors of any length.
+pub(in crate::scene) fn view_fault(direction: DVec3, up: DVec3) -> Option<&'static str> {
+    let (Some(direction), Some(up)) = (direction.try_normalize(), up.try_normalize()) else {
+        return Some("somewhere else than what it looks at, with an `up` that is not zero");
+    };
+    // The cross product of two parallel unit vectors is zero up to a few roundings.
+    let parallel = direction.cross(up).length() <= 8.0 * f64::EPSILON;
+    parallel.then_some("turned so that `up` is not parallel to the view direction")
+}
+
+fn check_background(background: &Background) -> Check {
+    let fits = match background {
+        Background::Color(color) => is_color(*color, 1.0),
+        Background::Gradient { bottom, top } => is_color(*bottom, 1.0) && is_color(*top, 1.0),
+    };
+    require(fits, || "background".into(), "from 0 to 1 in every channel")
+}
+
+fn check_light(light: &Light, name: &str) -> Check {
+    let color = is_color(light.color, MAX_LIGHT);
+    require(color, || format!("{name}.color"), "finite, not negative, at most 1e30")?;
+    if let Attenuation::Polynomial { constant, linear, quadratic } = light.attenuation {
+        let terms = [constant, linear, quadratic];
+        let fits = terms.iter().all(|t| is_coordinate(*t) && *t >= 0.0) && terms.iter().any(|t| *t > 0.0);
+        require(fits, || format!("{name}.attenuation"), "not negative, and above zero in one term")?;
+    }
+    match light.kind {
+        LightKind::Point { position } => require(is_point(position), || format!("{name}.position"), FINITE),
+        LightKind::Directional { direction } => {
+            require(is_unit(direction), || format!("{name}.direction"), UNIT)
+        }
+        LightKind::Spot { position, direction, beam_angle, penumbra } => {
+            require(is_point(position), || format!("{name}.position"), FINITE)?;
+            require(is_unit(direction), || format!("{name}.direction"), UNIT)?;
+            let beam = beam_angle > 0.0 && beam_angle <= 360.0;
+            require(beam, || format!("{name}.beam_angle"), "above 0 and at most 360 degrees")?;
+            let penumbra = (0.0..=beam_angle / 2.0).contains(&penumbra);
+            require(penumbra, || format!("{name}.penumbra"), "from 0 to half the beam angle")
+        }
+    }
+}
+
+fn check_texture(map: &TextureMap, name: &str) -> Check {
+    require(map.tiling.is_usable(), || format!("{name}.tiling"), "made of finite numbers up to 1e6")
+}
+
+fn check_material(material: &Material, name: &str) -> Check {
+    require(is_color(material.diffuse, 1.0), || format!("{name}.diffuse"), "from 0 to 1")?;
+    require(is_color(material.specular, 1.0), || format!("{name}.specular"), "from 0 to 1")?;
+    let emission = is_color(material.emission, MAX_LIGHT);
+    require(emission, || format!("{name}.emission"), "finite, not negative, at most 1e30")?;
+    let exponent = (0.0..=MAX_EXPONENT).contains(&material.exponent);
+    require(exponent, || format!("{name}.exponent"), "from 0 to 1e6")
+}
+
+/// Whether a pixel can have this number of samples: 1, 4, 9, ... 256.
+pub(in crate::scene) fn is_sample_count(samples: u32) -> bool {
+    let root = samples.isqrt();
+    (1..=MAX_SAMPLES).contains(&samples) && root * root == samples
+}
+
+fn is_coordinate(value: f64) -> bool {
+    value.abs() <= MAX_COORDINATE
+}
+
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && is_coordinate(value)
+}
+
+fn is_point(point: DVec3) -> bool {
+    point.to_array().into_iter().all(is_coordinate)
+}
+
+fn is_unit(direction: DVec3) -> bool {
+    (direction.length_squared() - 1.0).abs() <= 16.0 * f64::EPSILON
+}
+
+fn is_color(color: Vec3, limit: f32) -> bool {
+    color.to_array().iter().all(|c| (0.0..=limit).contains(c))
+}
+
+#[cfg(test)]
+mod tests;

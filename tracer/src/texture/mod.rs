@@ -1,0 +1,66 @@
+//! Textures: pictures on surfaces, and how they are looked up.
+//!
+//! A texture is one immutable blob of bytes, named by its BLAKE3 hash like a compiled mesh. The master makes it of a picture,
+//! and every worker receives it as it is.
+
+mod blob;
+mod map;
+mod uv;
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+pub use blob::{FORMAT_VERSION, MAGIC, Texture};
+pub use map::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};
+pub use uv::{MAX_UV, are_usable, split_repeats, without_repeats};
+
+pub(crate) use blob::LEAST_ALPHA;
+#[cfg(feature = "import")]
+pub(crate) use blob::check_size;
+pub(crate) use uv::is_usable;
+
+/// Most texels of one texture: 8192 x 8192, 192 MiB.
+pub const MAX_TEXELS: u64 = 1 << 26;
+
+/// The name of a texture: BLAKE3 of its bytes.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct TextureId(pub [u8; 32]);
+
+impl fmt::Display for TextureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl fmt::Debug for TextureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "TextureId({:02x}{:02x}{:02x}{:02x})", self.0[0], self.0[1], self.0[2], self.0[3])
+    }
+}
+
+/// Why a picture cannot be a texture, or bytes are none.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TextureError {
+    /// More texels than a texture may have.
+    #[error(
+        "a texture of {width} x {height} texels; at most {MAX_TEXELS} (8192 x 8192) are allowed: make the picture smaller"
+    )]
+    TooLarge {
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// No texel at all.
+    #[error("a texture of {width} x {height} texels; it needs at least one")]
+    Empty {
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The bytes are no texture of this version.
+    #[error("not a texture that this version reads: {0}")]
+    Format(String),
+}
