@@ -14,6 +14,29 @@
 //!    have hand-laid heads and their bytes are never copied on the way out.
 //! 4. [`passing`]: assets from worker to worker, over connections of their own.
 //! 5. [`session`]: one task that writes (control before bulk), one that reads, bounded queues between them and the user.
+//!
+//! # Example
+//!
+//! A message as bytes on the wire, and back:
+//!
+//! ```
+//! use rayfarm_protocol::envelope::{read_body, read_header};
+//! use rayfarm_protocol::message::Message;
+//! use rayfarm_protocol::{FrameId, Lease, ToWorker};
+//!
+//! # #[tokio::main(flavor = "current_thread")]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let lease = Lease { frame: FrameId(7), segment: 3, attempt: 0, first_row: 48, row_count: 16 };
+//! let mut wire = Vec::new();
+//! ToWorker::Segment(lease).to_envelope()?.write(&mut wire).await?;
+//!
+//! let mut stream = wire.as_slice();
+//! let header = read_header(&mut stream).await?.ok_or("the stream is empty")?;
+//! let body = read_body(&mut stream, header).await?;
+//! assert_eq!(ToWorker::from_body(header.kind, body)?, ToWorker::Segment(lease));
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod address;
 pub mod codec;

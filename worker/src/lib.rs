@@ -12,6 +12,42 @@
 //! 6. `render_pool` cuts leases into bands (`job_queue`) and renders them; finished leases go back as pixels.
 //!
 //! What is drawn, and how, is behind [`Renderer`]; the real one is [`TracerRenderer`].
+//!
+//! # Example
+//!
+//! A worker in the caller's process, which ends with its master:
+//!
+//! ```
+//! use rayfarm_worker::{Ending, Share, WorkerOptions, run};
+//! # use rayfarm_protocol::{Reconnect, ToMaster, ToWorker, Welcome, handshake, session};
+//!
+//! # #[tokio::main]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;
+//! # let address = listener.local_addr()?;
+//! # tokio::spawn(async move {
+//! #     let (mut stream, _) = listener.accept().await.unwrap();
+//! #     handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
+//! #     let (sender, _receiver, _) = session::spawn::<_, ToWorker, ToMaster>(stream);
+//! #     let goodbye = ToWorker::Goodbye { reason: "done".into(), reconnect: Reconnect::Never };
+//! #     sender.send(goodbye).await.unwrap();
+//! #     std::future::pending::<()>().await;
+//! # });
+//! let options = WorkerOptions {
+//!     master: address.to_string(),
+//!     threads: None,                // one per core
+//!     name: "embedded".to_owned(),
+//!     reconnect: false,
+//!     once: true,
+//!     asset_cache_bytes: 1 << 30,
+//!     disk_cache: None,
+//!     compress: None,
+//!     share: Share::Auto,
+//! };
+//! run(options, Ending::new()).await?;
+//! # Ok(())
+//! # }
+//! ```
 
 mod asset_store;
 mod buffers;
