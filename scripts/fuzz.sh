@@ -3,7 +3,7 @@
 #
 # Needs cargo-fuzz (`cargo install cargo-fuzz --locked`) and a C++ compiler. libFuzzer's instrumentation needs options of the
 # compiler that are not stable; RUSTC_BOOTSTRAP lets a stable one take them, so that no nightly is needed.
-# What is found lies in tests/fuzz/artifacts, and inputs that reached new code in target/fuzz/corpus.
+# Inputs that fail are written to tests/fuzz/artifacts, inputs that reach new code to target/fuzz/corpus.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export RUSTC_BOOTSTRAP=1

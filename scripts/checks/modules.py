@@ -54,7 +54,7 @@ class Module:
     def owners(self, path, steps=0):
         """The modules that `path`, as written in this module, leads through to an item.
 
-        The last one has the item; the ones before it pass it on by `use`. Empty for paths to other crates.
+        The last one has the item; the others re-export it. Empty for paths to other crates.
         """
         if steps > MOST_STEPS or not path:
             return []
@@ -231,7 +231,7 @@ class Parser:
                 Parser(child, folder).parse()
 
     def base(self):
-        """How many names of the module's path the file itself stands for."""
+        """Number of names in the path of the module that is the file itself."""
         outermost = self.open_modules[0][1] if self.open_modules else self.module
         return len(outermost.path)
 

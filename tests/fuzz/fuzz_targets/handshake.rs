@@ -1,4 +1,4 @@
-//! The bytes of a peer in a handshake, read by a master and by a worker. An odd first byte stands for a right preamble.
+//! The bytes of a peer in a handshake, read by a master and by a worker. After an odd first byte, a correct preamble is sent first.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
