@@ -1,4 +1,4 @@
-//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] one colour, exactly rounded; [`encode_lanes`] sixteen colours at
+//! Linear light to 8-bit sRGB (IEC 61966-2-1): [`encode`] one colour, exactly rounded; `encode_lanes` sixteen colours at
 //! once by a polynomial, exact but within 10^-4 of a step of a threshold. Pictures take the
 //! second, the oracle and its tests the first.
 //!

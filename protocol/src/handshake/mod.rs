@@ -5,8 +5,8 @@
 //! 3. The worker sends [`Hello`], the master answers [`Welcome`], a refusal with its reason, or a goodbye where it may
 //!    take the worker later.
 //!
-//! All of it has one deadline, [`limits::HANDSHAKE_DEADLINE`], and no envelope in it is longer than
-//! [`limits::MAX_CONTROL_BYTES`]. Not a byte behind the handshake is read.
+//! All of it has one deadline, [`crate::limits::HANDSHAKE_DEADLINE`], and no envelope in it is longer than
+//! [`crate::limits::MAX_CONTROL_BYTES`]. Not a byte behind the handshake is read.
 
 mod preamble;
 
