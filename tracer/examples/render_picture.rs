@@ -28,7 +28,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // A band of whole tiles is the smallest piece of a frame that costs no ray twice.
     let band_rows = tile_rows(&view);
     let band_bytes = band_rows as usize * view.width as usize * 3;
-    picture.pixels.par_chunks_mut(band_bytes).zip(0_u32..).try_for_each(|(pixels, band)| {
+    let bands = (0..view.height.div_ceil(band_rows)).into_par_iter();
+    picture.pixels.par_chunks_mut(band_bytes).zip(bands).try_for_each(|(pixels, band)| {
         let first = band * band_rows;
         let rows = first..(first + band_rows).min(view.height);
         render_rows(&frame, rows, pixels, &|| false).map(|_| ())
