@@ -20,6 +20,7 @@ mod farm;
 mod models;
 mod picture;
 mod plot;
+mod shell;
 mod simulate;
 mod tradeoff;
 mod values;
@@ -29,6 +30,7 @@ pub(crate) use farm::FarmArgs;
 pub(crate) use models::ModelArgs;
 pub(crate) use picture::{PictureArgs, QualityArgs};
 pub(crate) use plot::PlotArgs;
+pub(crate) use shell::{CompletionsArgs, ManArgs, Program};
 pub(crate) use simulate::{Profile, SimulateArgs};
 pub(crate) use tradeoff::TradeoffArgs;
 
@@ -112,6 +114,10 @@ pub(crate) enum Command {
     CheckNumerics(CheckNumericsArgs),
     /// Measure what each setting of the tracer costs and how far its picture is from the best one; write table, plot and pictures.
     Tradeoff(TradeoffArgs),
+    /// Print a script that completes the options of a program in a shell.
+    Completions(CompletionsArgs),
+    /// Write manual pages of both programs.
+    Man(ManArgs),
 }
 
 /// `view`.

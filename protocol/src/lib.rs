@@ -16,6 +16,29 @@
 //!
 //! The feature `transport`, on by default, has everything that reads or writes a connection. Without it the crate has
 //! ids, limits, messages and their bytes, and pixels, and depends on no async runtime.
+//!
+//! # Example
+//!
+//! A message as bytes on the wire, and back:
+//!
+//! ```
+//! use rayfarm_protocol::envelope::{read_body, read_header};
+//! use rayfarm_protocol::message::Message;
+//! use rayfarm_protocol::{FrameId, Lease, ToWorker};
+//!
+//! # #[tokio::main(flavor = "current_thread")]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let lease = Lease { frame: FrameId(7), segment: 3, attempt: 0, first_row: 48, row_count: 16 };
+//! let mut wire = Vec::new();
+//! ToWorker::Segment(lease).to_envelope()?.write(&mut wire).await?;
+//!
+//! let mut stream = wire.as_slice();
+//! let header = read_header(&mut stream).await?.ok_or("the stream is empty")?;
+//! let body = read_body(&mut stream, header).await?;
+//! assert_eq!(ToWorker::from_body(header.kind, body)?, ToWorker::Segment(lease));
+//! # Ok(())
+//! # }
+//! ```
 
 #[cfg(feature = "transport")]
 pub mod address;

@@ -65,7 +65,7 @@ install() {
     new=$folder/rayfarm-worker.$name.new
     have=$(size_of "$part")
     if [ "$have" -ge "$size" ]; then
-        case $how in gzip) unpack="gzip -dc" ;; *) unpack=cat ;; esac
+        case $how in gzip) unpack="gzip -dc" ;; *) unpack="cat" ;; esac
         problem=$($unpack <"$part" 2>&1 >"$new") || case $problem in
             *space* | *quota* | *denied*) rm -f "$new"; give_up "cannot write $new: $problem" ;;
         esac

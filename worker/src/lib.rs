@@ -12,6 +12,42 @@
 //!
 //! A [`Renderer`] decodes scenes and renders rows. [`TracerRenderer`] is the one of `rayfarm_tracer`; tests have another.
 //! Folders depend on each other in one direction: app, session, scenes and render pool, peer.
+//!
+//! # Example
+//!
+//! A worker in the caller's process, which ends with its master:
+//!
+//! ```
+//! use rayfarm_worker::{ShutdownHandle, Share, WorkerOptions, run};
+//! # use rayfarm_protocol::{Reconnect, ToMaster, ToWorker, Welcome, handshake, session};
+//!
+//! # #[tokio::main]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await?;
+//! # let address = listener.local_addr()?;
+//! # tokio::spawn(async move {
+//! #     let (mut stream, _) = listener.accept().await.unwrap();
+//! #     handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
+//! #     let (sender, _receiver, _) = session::spawn::<_, ToWorker, ToMaster>(stream);
+//! #     let disconnect = ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never };
+//! #     sender.send(disconnect).await.unwrap();
+//! #     std::future::pending::<()>().await;
+//! # });
+//! let options = WorkerOptions {
+//!     master: address.to_string(),
+//!     threads: None,                // one per core
+//!     name: "embedded".to_owned(),
+//!     reconnect: false,
+//!     once: true,
+//!     asset_cache_bytes: 1 << 30,
+//!     disk_cache: None,
+//!     compress: None,
+//!     share: Share::Auto,
+//! };
+//! run(options, ShutdownHandle::new()).await?;
+//! # Ok(())
+//! # }
+//! ```
 
 mod app;
 mod cancel;

@@ -14,7 +14,7 @@ use crate::scheduler::{Action, Cost, Event, WorkerId};
 /// Workers that may leave during one frame with an account of their own; beyond that, they share one.
 const MAX_GONE: usize = 1024;
 
-/// What the workers did with their time while a frame was made: see [`crate::accounting`].
+/// What the workers did with their time while a frame was made: see the module `accounting`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameAccount {
     /// Each worker that was there, in the order in which they came.

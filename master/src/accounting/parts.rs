@@ -7,7 +7,7 @@ pub(crate) const PART_COUNT: usize = 7;
 pub(crate) const PART_NAMES: [&str; PART_COUNT] =
     ["trace", "wait", "encode", "send", "decode", "idle_tail", "scene"];
 
-/// What threads did, in nanoseconds of thread time. See [`crate::accounting`] for what each part is.
+/// What threads did, in nanoseconds of thread time. See the module `accounting` for what each part is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Parts {
     /// Rendering.

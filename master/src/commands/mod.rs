@@ -9,6 +9,7 @@ mod ladder;
 mod oversight;
 mod plot;
 mod render;
+mod shell;
 mod simulate;
 mod source;
 mod tradeoff;
@@ -35,6 +36,8 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Explain(args) => explain::run(&args),
         Command::CheckNumerics(args) => check_numerics::run(&args),
         Command::Tradeoff(args) => tradeoff::run(&args),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::man(&args),
     }
 }
 

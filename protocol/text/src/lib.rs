@@ -3,6 +3,13 @@
 //! Names, reasons and errors of peers, and keys, words and names of files are printed. [`printable`] escapes
 //! characters that move a cursor, forge a line, are invisible, reorder their neighbours or pile up;
 //! [`printable_within`] limits the length as well. All other text is unchanged, in every script.
+//!
+//! ```
+//! use rayfarm_text::{printable, printable_within};
+//!
+//! assert_eq!(printable("mill\n2\u{202e}"), r"mill\n2\u{202e}");
+//! assert_eq!(printable_within("a long name", 8), "a lon…");
+//! ```
 
 mod invisible;
 

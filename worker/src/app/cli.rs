@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, ValueEnum};
+use clap::{Args, CommandFactory, Parser, ValueEnum};
 use rayfarm_protocol::address;
 use tracing_subscriber::EnvFilter;
 
@@ -130,6 +130,11 @@ impl WorkerArgs {
         let limit_bytes = self.cache_limit << 20;
         Some(DiskCacheOptions { folder, limit_bytes, within_machine: self.cache.is_some() })
     }
+}
+
+/// Definition of the worker's command line, for completions and manual pages.
+pub fn command_line() -> clap::Command {
+    Cli::command()
 }
 
 /// Runs the program: parses `args` (the first is the program's name), logs to standard error, and renders. The exit code
