@@ -15,7 +15,7 @@ use bytes::Bytes;
 use rayfarm_protocol::{
     AssetId, FrameAnnounce, FrameId, Lease, Reconnect, ToMaster, ToWorker, Welcome, handshake, session,
 };
-use rayfarm_worker::{Cancelled, Counts, Ending, Renderer, Share, WorkerOptions, run_with};
+use rayfarm_worker::{Cancelled, RayCounts, ShutdownHandle, Renderer, Share, WorkerOptions, run_with};
 use tokio::net::TcpListener;
 
 const WIDTH: u32 = 64;
@@ -80,8 +80,8 @@ impl Renderer for Gradient {
         _rows: Range<u32>,
         out: &mut [u8],
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<Counts, Cancelled> {
-        let mut counts = Counts::default();
+    ) -> Result<RayCounts, Cancelled> {
+        let mut counts = RayCounts::default();
         for row in out.chunks_exact_mut(frame.width as usize * 3) {
             if cancelled() {
                 return Err(Cancelled);
