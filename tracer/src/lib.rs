@@ -26,36 +26,33 @@
 //! # }
 //! ```
 
+mod bsdf;
 mod bvh;
-mod camera;
 mod cancel;
 mod compile;
-mod cutout;
 pub mod files;
+mod film;
 mod frame;
 pub mod image;
+mod integrator;
+mod intersect;
 mod light;
 pub mod mesh;
 pub mod numerics;
-mod plane;
+mod rays;
 pub mod reference;
-mod render;
 pub mod scene;
-mod shade;
+mod shape;
 mod simd;
-mod sphere;
 pub mod srgb;
-mod stage;
+mod surface;
 pub mod texture;
-mod tile;
-mod trace;
-mod triangle;
 
-pub use camera::Basis;
 pub use cancel::{Cancelled, IsCancelled};
 pub use compile::{CompileError, CompiledScene, Features};
-pub use frame::{PreparedFrame, tile_rows};
-pub use render::{RayCounts, TILE_SIZE, render_rows, render_rows_watched};
+pub use film::PixelFormat;
+pub use frame::{Basis, PreparedFrame};
+pub use integrator::{Stage, Watch, render_rows, render_rows_watched};
+pub use intersect::{Primitive, RayHit, RaySegment};
+pub use rays::{RayCounts, TILE_SIZE, tile_rows};
 pub use simd::best_name as simd_level;
-pub use stage::{Stage, Watch};
-pub use trace::{Primitive, RayHit};

@@ -5,8 +5,8 @@ use glam::{DVec3, Vec3};
 
 use super::oracle::{affordable, ask, chosen};
 use super::{Check, Effort, Outcome, Subject};
-use crate::camera::Basis;
 use crate::compile::CompileError;
+use crate::frame::Basis;
 use crate::scene::{Attenuation, Light, LightKind, Scene};
 
 /// Degrees above a ground that lies flat before the camera.

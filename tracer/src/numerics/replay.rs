@@ -9,10 +9,10 @@ use super::seams::Seams;
 use super::{Effort, Subject};
 use crate::compile::CompileError;
 use crate::frame::PreparedFrame;
+use crate::intersect::{Primitive, RayHit};
 use crate::mesh::CompiledMesh;
 use crate::reference::Oracle;
 use crate::scene::{Camera, FrameView};
-use crate::trace::{Primitive, RayHit};
 
 /// What is known of a ray that [`super::leaks`] shoots, told by the number that a failure names, in lines; `None` where the scene
 /// has no models.
