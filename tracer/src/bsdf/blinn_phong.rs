@@ -5,7 +5,26 @@ use super::binomial;
 use crate::scene::{ExponentPrecision, is_squared};
 use crate::simd::math::{exp2, log2};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat};
+use crate::simd::{Lanes, Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat};
+use crate::surface::Materials;
+
+/// Reflectance times N.L: c_d N.L + c_s (N.H)^p, sixteen points at a time. The highlight is skipped without `to_viewer`, and in
+/// blocks without a specular colour.
+#[inline(always)]
+pub(crate) fn eval<S: Simd>(
+    simd: S,
+    materials: &Materials<S>,
+    normals: Vec3x16<S>,
+    (to_light, n_dot_l): (Vec3x16<S>, f32x16<S>),
+    to_viewer: Option<&[Lanes; 3]>,
+    precision: ExponentPrecision,
+) -> Vec3x16<S> {
+    let diffuse = materials.diffuse.scale(n_dot_l);
+    let (Some(to_viewer), true) = (to_viewer, materials.any_specular) else { return diffuse };
+    let to_viewer = Vec3x16::load(simd, to_viewer);
+    let highlight = highlight(simd, normals, to_light, to_viewer, materials.exponent, precision);
+    diffuse.add(materials.specular.scale(highlight))
+}
 
 /// Largest exponent for which the rounding of N.H to `f32` stays below a fifth of a step of the 8-bit picture.
 const SINGLE: f32 = 2000.0;
@@ -13,7 +32,7 @@ const SINGLE: f32 = 2000.0;
 /// max(0, N.H)^p with H = (L + V) / |L + V|, in single precision where that is precise, else in double precision. The fast
 /// variant is in single precision always, by a series where that is shorter; its error is at most 0.0021.
 #[inline(always)]
-pub(crate) fn highlight<S: Simd>(
+fn highlight<S: Simd>(
     simd: S,
     normals: Vec3x16<S>,
     to_light: Vec3x16<S>,

@@ -111,7 +111,7 @@ impl PreparedFrame {
     }
 
     /// The index of a primitive of the scene; one that the scene does not have equals no primitive of a hit.
-    fn id_of(&self, primitive: Primitive) -> PrimitiveId {
+    pub(super) fn id_of(&self, primitive: Primitive) -> PrimitiveId {
         let item = match primitive {
             Primitive::Model { model, triangle } => {
                 return PrimitiveId { item: self.items.index_of(Item::Model(model)), triangle };

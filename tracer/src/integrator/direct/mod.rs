@@ -149,14 +149,9 @@ fn unoccluded<S: Simd>(
         return 0;
     }
     let materials = Materials::gather(simd, frame.scene(), surfaces, block);
-    let mut reflectance = materials.diffuse.scale(n_dot_l);
-    if frame.features.specular && materials.any_specular {
-        let to_viewer = Vec3x16::load(simd, &surface.to_viewer);
-        let (to_light, exponents) = (incidence.direction, materials.exponent);
-        let precision = frame.view().quality.exponent;
-        let highlight = bsdf::highlight(simd, normals, to_light, to_viewer, exponents, precision);
-        reflectance = reflectance.add(materials.specular.scale(highlight));
-    }
+    let to_viewer = if frame.features.specular { Some(&surface.to_viewer) } else { None };
+    let (light_at, precision) = ((incidence.direction, n_dot_l), frame.view().quality.exponent);
+    let reflectance = bsdf::eval(simd, &materials, normals, light_at, to_viewer, precision);
     let contribution = incidence.radiance.mul(reflectance);
     contribution.store(&mut scratch.contributions[block]);
     let [r, g, b] = contribution.0;

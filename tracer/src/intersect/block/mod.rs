@@ -3,6 +3,9 @@
 //! Rays of bounces have neither origins nor directions in common, so each walks the trees by itself, and the sixteen
 //! children of a node fill the lanes. A block is dispatched to its level of SIMD once.
 
+#[cfg(test)]
+mod tests;
+
 use super::Hit;
 use crate::frame::PreparedFrame;
 use crate::rays::{HitBlock, RayBlock, RaySource};

@@ -13,6 +13,7 @@ use crate::scene::{
     Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
     Triangle,
 };
+use crate::shape::ShearedRay;
 
 /// The closest hit: its t and its primitive.
 fn closest(frame: &PreparedFrame, ray: &Ray, t_max: f64) -> Option<(f64, PrimitiveId)> {
