@@ -25,6 +25,20 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! The way of the data while rows are rendered, each folder importing only those before it:
+//!
+//! ```text
+//!   compile      scene, meshes, textures and the shape of the scene's tree
+//!   frame        the scene in eye space, with a camera
+//!   rays         tiles of the camera and of lights, blocks of any sixteen rays
+//!   intersect    rays to hits
+//!   surface      hits to points, normals, materials
+//!   light, bsdf  incident light, reflection
+//!   film         samples to pixels
+//!   integrator   the loop over tiles, and the shading equation
+//!   reference    the same in f64, by brute force
+//! ```
 
 mod bsdf;
 mod bvh;

@@ -1,4 +1,4 @@
-//! What all sources of rays have in common.
+//! Traits of ray sources.
 //!
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.

@@ -1,4 +1,4 @@
-//! Contrast of pixels, and the samples that they need besides those at their corners.
+//! Contrast of pixels, and the samples that they need in addition to their corners.
 
 use std::ops::Range;
 
@@ -74,8 +74,8 @@ impl Contrasts {
         let at = self.at(column, row);
         let load = |at: usize| f32x16::from_slice(simd, &self.steps[at..at + LANES]);
         let own = load(at);
-        let beside = load(at - 1).max(load(at + 1));
-        let around = beside.max(load(at - self.stride)).max(load(at + self.stride));
+        let neighbours = load(at - 1).max(load(at + 1));
+        let around = neighbours.max(load(at - self.stride)).max(load(at + self.stride));
         let all = bits(own.simd_ge(splat(simd, limit)));
         let one = own.simd_ge(splat(simd, FAINT)) | around.simd_ge(splat(simd, STRONG));
         Needs { one: bits(one) & !all, all }

@@ -7,6 +7,7 @@
 mod tests;
 
 use super::Hit;
+use super::single::{Stack, with_stack};
 use crate::frame::PreparedFrame;
 use crate::rays::{HitBlock, RayBlock, RaySource};
 use crate::simd::{Simd, dispatch, each_bit};
@@ -15,13 +16,20 @@ impl PreparedFrame {
     /// The closest hits of the live rays of a block.
     pub(crate) fn closest_hits_of(&self, block: &RayBlock<'_>) -> HitBlock {
         let mut hits = HitBlock::NONE;
-        dispatch!(self.level, simd => self.find_closest(simd, block, &mut hits));
+        with_stack(|stack| dispatch!(self.level, simd => self.find_nearest(simd, stack, block, &mut hits)));
+        for lane in each_bit(hits.coincident) {
+            let (nearest, starts_on) = (hits.slot(lane), block.starts_on(0, lane));
+            let (preferred, others) =
+                self.preferred(&block.ray(0, lane), nearest, block.t_max(lane), starts_on);
+            hits.coincident &= !(u32::from(!others) << lane);
+            hits.set(lane, preferred);
+        }
         hits
     }
 
     /// Bits of the live rays of a block that hit anything.
     pub(crate) fn any_hits_of(&self, block: &RayBlock<'_>) -> u32 {
-        dispatch!(self.level, simd => self.find_any(simd, block))
+        with_stack(|stack| dispatch!(self.level, simd => self.find_any(simd, stack, block)))
     }
 
     /// The exact hit of a ray whose primitive is known.
@@ -29,24 +37,25 @@ impl PreparedFrame {
         self.hit_of(&block.ray(0, lane), hits.primitive(lane)?, block.starts_on(0, lane))
     }
 
+    /// Finds the nearest hits; `coincident` has the rays whose hit may coincide with others.
     #[inline(always)]
-    fn find_closest<S: Simd>(&self, simd: S, block: &RayBlock<'_>, hits: &mut HitBlock) {
+    fn find_nearest<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>, hits: &mut HitBlock) {
         for lane in each_bit(block.live(0)) {
-            let ray = block.ray(0, lane);
-            let found = self.closest_primitive(simd, &ray, block.t_max(lane), block.starts_on(0, lane));
-            if let Some((primitive, coincident)) = found {
+            let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
+            let found = self.nearest(simd, stack.above(), &ray, block.t_max(lane), starts_on);
+            if let Some((primitive, tied)) = found {
                 hits.set(lane, primitive);
-                hits.coincident |= u32::from(coincident) << lane;
+                hits.coincident |= u32::from(tied) << lane;
             }
         }
     }
 
     #[inline(always)]
-    fn find_any<S: Simd>(&self, simd: S, block: &RayBlock<'_>) -> u32 {
+    fn find_any<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>) -> u32 {
         let mut occluded = 0;
         for lane in each_bit(block.live(0)) {
-            let ray = block.ray(0, lane);
-            let hit = self.hits_any(simd, &ray, block.t_max(lane), block.starts_on(0, lane));
+            let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
+            let hit = self.hits_any(simd, stack.above(), &ray, block.t_max(lane), starts_on);
             occluded |= u32::from(hit) << lane;
         }
         occluded

@@ -1,7 +1,6 @@
-//! A ray against sixteen triangles, in `f32`: what is certain, what is not, what is out of the query.
+//! Filter of one ray against sixteen triangles in `f32`: certain hits, possible hits and misses.
 //!
-//! The test is Woop's, as in `triangle.rs`, with a bound for what roundings may cost: whatever the exact test would say
-//! lies within it.
+//! The test is that of [`crate::shape::ShearedRay`], with error bounds that contain the result of the exact test.
 
 use super::near_ray::NearRay;
 use crate::bvh::WIDTH;

@@ -21,7 +21,7 @@ mod traversal;
 
 use query::{Any, Closest};
 pub(super) use query::{Candidate, RayQuery};
-use traversal::with_stack;
+pub(super) use traversal::{Stack, with_stack};
 
 use super::Hit;
 use crate::frame::PreparedFrame;
@@ -31,27 +31,34 @@ use crate::simd::{Simd, dispatch};
 impl PreparedFrame {
     /// The closest hit with 0 < t < `t_max` of a ray that may start on a primitive.
     pub(crate) fn closest(&self, ray: &Ray, t_max: f64, starts_on: Option<PrimitiveId>) -> Option<Hit> {
-        let found = dispatch!(self.level, simd => self.closest_primitive(simd, ray, t_max, starts_on));
-        let (primitive, _) = found?;
+        let nearest = with_stack(
+            |stack| dispatch!(self.level, simd => self.nearest(simd, stack, ray, t_max, starts_on)),
+        );
+        let (mut primitive, tied) = nearest?;
+        if tied {
+            (primitive, _) = self.preferred(ray, primitive, t_max, starts_on);
+        }
         self.hit_of(ray, primitive, starts_on)
     }
 
     /// Whether anything is hit within 0 < t < `t_max` by a ray that may start on a primitive.
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f64, starts_on: Option<PrimitiveId>) -> bool {
-        dispatch!(self.level, simd => self.hits_any(simd, ray, t_max, starts_on))
+        with_stack(|stack| dispatch!(self.level, simd => self.hits_any(simd, stack, ray, t_max, starts_on)))
     }
 
-    /// The primitive of the closest hit, and whether hits of others coincide with it.
+    /// The primitive of the nearest hit, and whether others may coincide with it: then [`PreparedFrame::preferred`] decides,
+    /// after the thread's stack is free again.
     #[inline(always)]
-    pub(super) fn closest_primitive<S: Simd>(
+    pub(super) fn nearest<S: Simd>(
         &self,
         simd: S,
+        stack: Stack,
         ray: &Ray,
         t_max: f64,
         starts_on: Option<PrimitiveId>,
     ) -> Option<(PrimitiveId, bool)> {
         let mut closest = Closest::new(self, ray, t_max, starts_on);
-        let _ = with_stack(|stack| self.search(simd, ray, stack, &mut closest));
+        let _ = self.search(simd, ray, stack, &mut closest);
         closest.found()
     }
 
@@ -60,12 +67,13 @@ impl PreparedFrame {
     pub(super) fn hits_any<S: Simd>(
         &self,
         simd: S,
+        stack: Stack,
         ray: &Ray,
         t_max: f64,
         starts_on: Option<PrimitiveId>,
     ) -> bool {
         let mut any = Any { frame: self, ray, t_max, starts_on };
-        with_stack(|stack| self.search(simd, ray, stack, &mut any)).is_break()
+        self.search(simd, ray, stack, &mut any).is_break()
     }
 
     /// Passes every primitive that the ray may hit to a query, those in nearer boxes first.

@@ -31,8 +31,8 @@ pub(in crate::intersect) trait RayQuery {
     fn consider(&mut self, candidate: Candidate) -> ControlFlow<()>;
 }
 
-/// Query for the closest hit in (0, `t_max`): the one with the lowest t, of equal ones that of the lowest rank, or one that
-/// coincides with it.
+/// Query for the nearest hit in (0, `t_max`): the one with the lowest t, of equal ones that of the lowest rank. It notes whether
+/// others may coincide with it.
 pub(super) struct Closest<'a> {
     frame: &'a PreparedFrame,
     ray: &'a Ray,
@@ -56,13 +56,9 @@ impl<'a> Closest<'a> {
         Self { frame, ray, t_max, starts_on, best: None, tied: false, low: t_max, high: t_max }
     }
 
-    /// The primitive that is hit, and whether hits of others coincide with it.
+    /// The primitive of the nearest hit, and whether hits of others may coincide with it.
     pub(super) fn found(&self) -> Option<(PrimitiveId, bool)> {
-        let best = self.best?;
-        if self.tied {
-            return Some(self.frame.preferred(self.ray, best, self.t_max, self.starts_on));
-        }
-        Some((best, false))
+        Some((self.best?, self.tied))
     }
 
     #[cold]

@@ -121,14 +121,15 @@ thread_local! {
     static KEYS: RefCell<[u64; ROOM]> = const { RefCell::new([0; ROOM]) };
 }
 
-/// Calls a function with the thread's stack, which is not initialised for each ray.
+/// Calls a function with the thread's stack, which is not initialised for each ray. Dispatch to a level inside of `with`: it is a
+/// closure, which is compiled for no level. `with` must not call this function.
 #[inline(always)]
-pub(super) fn with_stack<R>(with: impl FnOnce(Stack) -> R) -> R {
+pub(in crate::intersect) fn with_stack<R>(with: impl FnOnce(Stack) -> R) -> R {
     KEYS.with_borrow_mut(|keys| with(Stack { keys, bottom: 0, len: 0 }))
 }
 
 /// Children that are still to be visited, the nearest of each node on top.
-pub(super) struct Stack<'a> {
+pub(in crate::intersect) struct Stack<'a> {
     /// A child and the distance of its entry as one number, so that the nearer child has the lower one: bits of numbers that
     /// are not negative compare as the numbers do.
     keys: &'a mut [u64; ROOM],
@@ -140,7 +141,7 @@ pub(super) struct Stack<'a> {
 impl Stack<'_> {
     /// A stack that starts at the end of this one.
     #[inline(always)]
-    pub(super) fn above(&mut self) -> Stack<'_> {
+    pub(in crate::intersect) fn above(&mut self) -> Stack<'_> {
         Stack { keys: &mut *self.keys, bottom: self.len, len: self.len }
     }
 
