@@ -1,19 +1,19 @@
-//! Work that can be cancelled: it asks from time to time whether its result is still wanted.
+//! Cancellation of long work, by polling.
 
-/// Work was told to stop; it has no result.
+/// Error of cancelled work: it has no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the work was cancelled")]
 pub struct Cancelled;
 
-/// Whether work is cancelled: asked by any thread, often. It costs next to nothing, and never says `false` again after `true`.
+/// Whether work is cancelled. Any thread polls it, often, so a call must be cheap; after `true` it never returns `false`.
 pub type IsCancelled<'a> = dyn Fn() -> bool + Sync + 'a;
 
-/// Never cancelled.
+/// The [`IsCancelled`] of work that is never cancelled.
 pub(crate) fn never() -> bool {
     false
 }
 
-/// `Ok` while the work is wanted.
+/// Returns [`Cancelled`] if the work is cancelled.
 pub(crate) fn go_on(cancelled: &IsCancelled<'_>) -> Result<(), Cancelled> {
     if cancelled() { Err(Cancelled) } else { Ok(()) }
 }

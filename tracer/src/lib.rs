@@ -27,41 +27,52 @@
 //! # }
 //! ```
 //!
+//! The way of the data while rows are rendered, each folder importing only those before it:
+//!
+//! ```text
+//!   compile      scene, meshes, textures and the shape of the scene's tree
+//!   frame        the scene in eye space, with a camera
+//!   rays         tiles of the camera and of lights, blocks of any sixteen rays
+//!   intersect    rays to hits
+//!   surface      hits to points, normals, materials
+//!   light, bsdf  incident light, reflection
+//!   film         samples to pixels
+//!   integrator   the loop over tiles, and the shading equation
+//!   reference    the same in f64, by brute force
+//! ```
+//!
 //! Features, all of them enabled by default: `import` loads scene files and models, `pictures` decodes and saves picture files.
 //! Without both, the crate renders a [`scene::Scene`] with compiled meshes and textures.
 
+mod bsdf;
 mod bvh;
-mod camera;
 mod cancel;
 mod compile;
-mod cutout;
 pub mod files;
+mod film;
 mod frame;
 pub mod image;
+mod integrator;
+mod intersect;
 mod light;
 mod material;
 pub mod mesh;
 pub mod numerics;
-mod plane;
+mod rays;
 pub mod reference;
-mod render;
 pub mod rotation;
 pub mod scene;
-mod shade;
+mod shape;
 mod simd;
-mod sphere;
 pub mod srgb;
-mod stage;
+mod surface;
 pub mod texture;
-mod tile;
-mod trace;
-mod triangle;
 
-pub use camera::Basis;
 pub use cancel::{Cancelled, IsCancelled};
 pub use compile::{CompileError, CompiledScene};
-pub use frame::{PreparedFrame, tile_rows};
-pub use render::{RayCounts, TILE_SIZE, render_rows, render_rows_watched};
+pub use film::PixelFormat;
+pub use frame::{Basis, PreparedFrame};
+pub use integrator::{Stage, Watch, render_rows, render_rows_watched};
+pub use intersect::{Primitive, RayHit, RaySegment};
+pub use rays::{RayCounts, TILE_SIZE, tile_rows};
 pub use simd::best_name as simd_level;
-pub use stage::{Stage, Watch};
-pub use trace::{Primitive, RayHit};

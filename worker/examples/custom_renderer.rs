@@ -70,7 +70,7 @@ impl Renderer for Gradient {
         Ok(Frame { width: announce.width, color: *scene })
     }
 
-    fn is_narrow(&self, _frame: &Frame) -> bool {
+    fn is_rgb565(&self, _frame: &Frame) -> bool {
         false
     }
 

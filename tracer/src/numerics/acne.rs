@@ -6,8 +6,8 @@ use glam::{DVec3, Vec3};
 
 use super::oracle::{affordable, chosen, compare};
 use super::{Check, Effort, Outcome, Subject};
-use crate::camera::Basis;
 use crate::compile::CompileError;
+use crate::frame::Basis;
 use crate::scene::{Attenuation, Light, LightKind, Scene};
 
 /// Elevations of a sun, in degrees above the horizontal plane.

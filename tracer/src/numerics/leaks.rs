@@ -15,8 +15,9 @@ use super::{Check, Effort, Outcome, Subject};
 use crate::compile::Item;
 use crate::compile::{CompileError, orientation};
 use crate::frame::PreparedFrame;
-use crate::trace::PrimitiveId;
-use crate::triangle::ShearedRay;
+use crate::intersect::Hit;
+use crate::rays::PrimitiveId;
+use crate::shape::ShearedRay;
 
 /// Scales of the scene, and distances by which it is moved, in extents.
 pub(super) const PLACES: [(f64, f64); 7] =
@@ -259,7 +260,7 @@ impl Piece<'_> {
     /// of it, or by another primitive that coincides with it.
     pub(super) fn stops(&self, frame: &PreparedFrame, shot: &Aimed) -> bool {
         let Some(ray) = frame.to_eye(shot.origin, shot.direction) else { return false };
-        let Some((t, primitive)) = frame.closest(&ray, f64::INFINITY) else { return false };
+        let Some(Hit { t, primitive }) = frame.closest(&ray, f64::INFINITY, None) else { return false };
         t < 1.0
             || self.touches(frame, shot, primitive)
             || t <= self.exactly(frame, shot) + frame.slack(&ray, primitive, t)

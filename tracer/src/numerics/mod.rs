@@ -29,8 +29,8 @@ use std::sync::Arc;
 
 use crate::compile::{CompileError, CompiledScene};
 use crate::frame::PreparedFrame;
+use crate::integrator::render_rows;
 use crate::mesh::CompiledMesh;
-use crate::render::render_rows;
 #[cfg(feature = "import")]
 use crate::scene::LoadedScene;
 use crate::scene::{FrameView, Scene};

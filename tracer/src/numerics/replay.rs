@@ -9,10 +9,10 @@ use super::seams::Seams;
 use super::{Effort, Subject};
 use crate::compile::CompileError;
 use crate::frame::PreparedFrame;
+use crate::intersect::{Primitive, RayHit};
 use crate::mesh::CompiledMesh;
 use crate::reference::Oracle;
 use crate::scene::{Camera, FrameView};
-use crate::trace::{Primitive, RayHit};
 
 /// A report, in lines, of the ray of [`super::leaks`] with the number of a failure; `None` where the scene has no
 /// models.

@@ -1,4 +1,4 @@
-//! Functions of sixteen lanes, made of plain operations: the same bits on every level.
+//! Elementary functions of sixteen lanes, of plain operations: the same bits on every level.
 
 use super::{Bytes, Simd, SimdBase, SimdFloat, f32x16, i32x16, select, splat, u8x64, u32x16};
 
@@ -8,7 +8,7 @@ use super::{Bytes, Simd, SimdBase, SimdFloat, f32x16, i32x16, select, splat, u8x
 #[inline(always)]
 pub(crate) fn log2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let bits: i32x16<S> = x.bitcast();
-    // The bits of sqrt(1/2): subtracting them puts the boundary between powers where we want it.
+    // Subtracting the bits of sqrt(1/2) moves the boundary between powers there.
     let exponent = (bits - i32x16::splat(simd, 0x3f35_04f3)) >> 23;
     let k = simd.cvt_f32_i32x16(exponent);
     let m: f32x16<S> = (bits - (exponent << 23)).bitcast();
@@ -24,7 +24,7 @@ pub(crate) fn log2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     k + sum * s
 }
 
-/// 2^x for x in [-126, 127]; relative error below 2e-7. Lower x give 0.
+/// 2^x for x in [-126, 127], relative error below 2e-7; 0 for lower x.
 #[inline(always)]
 pub(crate) fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let whole = x.round_ties_even();
@@ -43,12 +43,12 @@ pub(crate) fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
 
 /// Linear light in [0, 1] to sRGB in [0, 255], not yet rounded (IEC 61966-2-1); error below 1.5e-4.
 ///
-/// x^(1 / 2.4) of x = 2^k m is 2^(k / 2.4), of which there are ten, times a polynomial in m.
+/// x^(1 / 2.4) of x = 2^k m is 2^(k / 2.4), looked up in a table, times a polynomial in m.
 #[inline(always)]
 pub(crate) fn srgb255<S: Simd>(simd: S, linear: f32x16<S>) -> f32x16<S> {
     let threshold = splat(simd, 0.003_130_8);
     let low = linear * splat(simd, 12.92 * 255.0);
-    // Below the threshold the other branch counts.
+    // Clamped: below the threshold the linear branch is selected.
     let bits: u32x16<S> = linear.max(threshold).bitcast();
     let m = (bits & u32x16::splat(simd, 0x007f_ffff)) | u32x16::splat(simd, 0x3f80_0000);
     let m = m.bitcast::<f32x16<S>>() - splat(simd, 1.5);
@@ -69,10 +69,10 @@ pub(crate) fn srgb255<S: Simd>(simd: S, linear: f32x16<S>) -> f32x16<S> {
     select(linear.simd_le(threshold), low, high)
 }
 
-/// 1.055 * 255 * 2^(k / 2.4) for numbers with exponent k in [-15, 0], told by their bits.
+/// 1.055 * 255 * 2^(k / 2.4) for numbers with exponent k in [-15, 0], given as bits.
 #[inline(always)]
 fn power_of_root<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
-    // In the order of the exponent's last four bits: k + 15.
+    // Indexed by the exponent's last four bits: k + 15.
     const POWERS: [f32; 16] = [
         3.534_721_1,
         4.718_287,
@@ -91,7 +91,7 @@ fn power_of_root<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
         201.541_03,
         269.025,
     ];
-    // Four times the place in the table, as each of its bytes; then the places of all four bytes.
+    // Four times the index in each byte, then the positions of the four bytes.
     const SPREAD: [u8; 64] = {
         let mut spread = [0; 64];
         let mut byte = 0;
@@ -107,8 +107,8 @@ fn power_of_root<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
     f32x16::load_array_ref(simd, &POWERS).swizzle_dyn(places + bytes)
 }
 
-/// A power of two that brings these numbers into [1, 2), exactly: they are not negative, and not subnormal if anything is
-/// to be made of them.
+/// The power of two that scales each number into [1, 2), exactly. Numbers must not be negative; the result is unusable for
+/// subnormal ones.
 #[inline(always)]
 pub(crate) fn to_unit<S: Simd>(simd: S, size: f32x16<S>) -> f32x16<S> {
     let exponent = size.bitcast::<u32x16<S>>() & u32x16::splat(simd, 0x7f80_0000);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn they_are_accurate_and_the_same_on_every_level() {
+    fn functions_are_accurate_and_equal_on_every_level() {
         let exact = [libm::log2, libm::exp2, srgb];
         for (which, from, to, tolerance) in [
             (0, 0.5, 2.0, 3e-7),

@@ -1,12 +1,12 @@
-//! The lane vocabulary: sixteen lanes at a time, on whatever the machine has.
+//! Vectors of sixteen lanes, with run-time dispatch to the machine's level of SIMD.
 //!
-//! Algorithms are written once, generic over the level `S`, and compiled for each: AVX-512 does sixteen lanes in one
-//! register, AVX2 in two, SSE2 and NEON in four, the portable level one by one. The level is chosen once, at run time.
+//! Algorithms are written once, generic over the level `S`, and compiled for each level: AVX-512 holds sixteen lanes in one
+//! register, AVX2 in two, SSE2 and NEON in four, the portable level one by one. The level is selected once, at run time.
 //!
-//! Two kinds of arithmetic, never mixed up:
-//! - *Filters* decide what is certain and leave the rest to exact code. They may use [`fma`], which is fused on some
-//!   levels and not on others: it never changes a decision, only how often the exact code is asked.
-//! - *Values* that reach a pixel use plain operations only (+, -, *, /, sqrt), which IEEE 754 fixes to the last bit.
+//! Two kinds of arithmetic, never mixed:
+//! - *Filters* find what is certain within error bounds, and leave the rest to exact code. They may use [`fma`], which is fused
+//!   on some levels only: it never changes a result, only how often the exact code runs.
+//! - *Values* that reach a pixel use plain operations only (+, -, *, /, sqrt), which IEEE 754 defines to the last bit.
 
 pub(crate) mod math;
 pub(crate) mod vector;
@@ -15,7 +15,7 @@ use std::sync::LazyLock;
 
 pub(crate) use fearless_simd::{Level, Simd, f32x16, i32x16, mask32x16, prelude::*, u8x64, u32x16};
 
-/// Lanes of every vector here.
+/// Lanes of every vector.
 pub(crate) const LANES: usize = 16;
 
 /// Sixteen numbers in memory, aligned for a full-width load.
@@ -68,42 +68,43 @@ impl Indices {
     }
 }
 
-/// a * b + c, rounded once or twice: for filters only.
+/// a * b + c, rounded once or twice, for filters only.
 #[inline(always)]
 pub(crate) fn fma<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> f32x16<S> {
     a.mul_add(b, c)
 }
 
+/// A number in all lanes.
 #[inline(always)]
 pub(crate) fn splat<S: Simd>(simd: S, value: f32) -> f32x16<S> {
     f32x16::splat(simd, value)
 }
 
-/// `a` where the mask is set, else `b`.
+/// `a` in the lanes of the mask, else `b`.
 #[inline(always)]
 pub(crate) fn select<S: Simd>(mask: mask32x16<S>, a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
     mask.select(a, b)
 }
 
-/// `a` where the mask is set, else `b`.
+/// `a` in the lanes of the mask, else `b`.
 #[inline(always)]
 pub(crate) fn select_indices<S: Simd>(mask: mask32x16<S>, a: u32x16<S>, b: u32x16<S>) -> u32x16<S> {
     mask.select(a, b)
 }
 
-/// The mask of these bits.
+/// The mask with these bits.
 #[inline(always)]
 pub(crate) fn mask_of<S: Simd>(simd: S, bits: u32) -> mask32x16<S> {
     mask32x16::from_bitmask(simd, u64::from(bits))
 }
 
-/// One bit a lane.
+/// The bits of a mask, one a lane.
 #[inline(always)]
 pub(crate) fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// Has a value brought into the cache: a hint, and nothing where there is no such instruction.
+/// Prefetches a value into the cache. Compiles to nothing on machines without such an instruction.
 #[inline(always)]
 pub(crate) fn prefetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
@@ -115,13 +116,13 @@ pub(crate) fn prefetch<T>(value: &T) {
     }
 }
 
-/// Goes through the bits that are set, lowest first.
+/// Iterates over the set bits, lowest first.
 #[inline(always)]
 pub(crate) fn each_bit(bits: u32) -> Bits {
     Bits(bits)
 }
 
-/// See [`each_bit`].
+/// Iterator of [`each_bit`].
 pub(crate) struct Bits(u32);
 
 impl Iterator for Bits {
@@ -138,8 +139,8 @@ impl Iterator for Bits {
     }
 }
 
-/// `three!(i => f(i))` is `[f(0), f(1), f(2)]`. `array::map` would do the same, but closures and the library's own loops
-/// are not compiled for the level, and often not inlined either: each is then a call that empties all vector registers.
+/// `three!(i => f(i))` is `[f(0), f(1), f(2)]`. Unlike the closure of `array::map`, it is always compiled for the level: a call
+/// that is not inlined spills all vector registers.
 macro_rules! three {
     ($i:ident => $value:expr) => {
         [
@@ -160,8 +161,8 @@ macro_rules! three {
 }
 pub(crate) use three;
 
-/// Compiles an operation for each level that is used, and runs the one for `level`, which [`used`] has given. The library's own
-/// macro compiles SSE4.2 as well: one more of four copies of the tracer, for x86 processors without AVX2, which use SSE2 here.
+/// Compiles an operation for each level that is used, and runs the copy for [`used`] of `level`. The macro of `fearless_simd`
+/// also compiles SSE4.2: a fourth copy of the tracer, for x86 processors without AVX2, which use SSE2 here.
 macro_rules! dispatch {
     ($level:expr, $simd:pat => $op:expr) => {
         match $crate::simd::used($level) {
@@ -175,7 +176,7 @@ macro_rules! dispatch {
             $crate::simd::Level::Neon(token) => $crate::simd::run!(token, $simd => $op),
             #[cfg(any(feature = "portable", not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
             $crate::simd::Level::Fallback(token) => $crate::simd::run!(token, $simd => $op),
-            _ => unreachable!("`used` gives no other level"),
+            _ => unreachable!("`used` returns no other level"),
         }
     };
 }
@@ -194,7 +195,7 @@ macro_rules! run {
 }
 pub(crate) use run;
 
-/// The level that stands in for one that is not compiled.
+/// The level itself, or the compiled one below it.
 #[inline]
 pub(crate) fn used(level: Level) -> Level {
     #[cfg(target_arch = "x86_64")]
@@ -210,11 +211,12 @@ pub(crate) fn best() -> Level {
     *BEST
 }
 
-/// Its name, as workers report it.
+/// Name of the best level of this machine, as workers report it.
 pub fn best_name() -> &'static str {
     name(best())
 }
 
+/// Name of a level.
 pub(crate) fn name(level: Level) -> &'static str {
     dispatch!(level, simd => name_of(simd))
 }
@@ -230,8 +232,8 @@ fn name_of<S: Simd>(_: S) -> &'static str {
     }
 }
 
-/// All levels that this machine has, the lowest last: they are held against each other. With the feature `portable` the
-/// last one does lanes one by one.
+/// All levels of this machine, the lowest last, for tests that compare them. With the feature `portable` the last one computes
+/// lanes one by one.
 pub(crate) fn all() -> Vec<Level> {
     let mut levels = vec![best()];
     #[cfg(target_arch = "x86_64")]

@@ -1,11 +1,11 @@
-//! Three-vectors of sixteen lanes, made of plain operations.
+//! Three-vectors of sixteen lanes, of plain operations.
 
 use fearless_simd::{Simd, SimdBase, SimdFloat, f32x16};
 
 use super::math::to_unit;
 use super::{Lanes, splat, three};
 
-/// a b - c d with both roundings made up for (Kahan).
+/// a b - c d without cancellation (Kahan's algorithm).
 #[inline(always)]
 fn difference<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>, d: f32x16<S>) -> f32x16<S> {
     let cd = c * d;
@@ -61,29 +61,29 @@ impl<S: Simd> Vec3x16<S> {
         x + y + z
     }
 
-    /// Slivers keep their normals.
+    /// The cross product, precise even for nearly parallel vectors.
     #[inline(always)]
     pub(crate) fn cross(self, other: Self) -> Self {
         let ([ax, ay, az], [bx, by, bz]) = (self.0, other.0);
         Self([difference(ay, bz, az, by), difference(az, bx, ax, bz), difference(ax, by, ay, bx)])
     }
 
-    /// Largest component in magnitude.
+    /// Magnitude of the largest component.
     #[inline(always)]
     pub(crate) fn size(self) -> f32x16<S> {
         let [x, y, z] = self.0;
         x.abs().max(y.abs()).max(z.abs())
     }
 
-    /// Unit length; NaN for vectors of no length.
+    /// The unit vector; NaN for vectors of length zero.
     #[inline(always)]
     pub(crate) fn normalize(self, simd: S) -> Self {
-        // First by a power of two: squares of small numbers would vanish.
+        // Scaled by a power of two first: squares of small numbers underflow.
         let near_one = self.scale(to_unit(simd, self.size()));
         near_one.scale(splat(simd, 1.0) / near_one.dot(near_one).sqrt())
     }
 
-    /// A matrix, given by its columns, times this.
+    /// The product of a matrix, given by its columns, and this vector.
     #[inline(always)]
     pub(crate) fn transform(self, simd: S, columns: &[[f32; 3]; 3]) -> Self {
         let [x, y, z] = self.0;

@@ -1,0 +1,249 @@
+//! A frame ready to trace: the scene in *eye space*.
+//!
+//! Eye space has its origin at the camera, keeps the world's axes, and is scaled by a power of two so that the scene spans
+//! about one unit. A scene far from the world's origin therefore loses no digits, and a scene scaled by 2^k gives the same
+//! numbers, bit for bit.
+//!
+//! ```text
+//!   camera     pixels to directions, and the camera's map from eye space to its picture
+//!   affine     the maps
+//!   instance   placed meshes
+//!   rounding   error bounds of placed geometry
+//! ```
+
+mod affine;
+mod camera;
+mod instance;
+mod rounding;
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use crate::bvh::WideNode;
+use crate::cancel::{IsCancelled, go_on, never};
+use crate::compile::{CompileError, CompiledScene, Item, Items, transformed_bounds};
+use crate::light::EyeLight;
+use crate::scene::{Camera, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
+use crate::shape::{EyePlane, EyeSphere};
+use crate::simd::{self, Level};
+use crate::texture::Texture;
+
+pub(crate) use affine::Affine;
+pub use camera::Basis;
+pub(crate) use camera::PinholeRays;
+pub(crate) use instance::Instance;
+use instance::ToEye;
+use rounding::placement_rounding;
+pub(crate) use rounding::{F64_ERROR, corner_rounding, mesh_rounding};
+
+/// Padding of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
+const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
+
+/// One frame of a scene: immutable, shared between render threads.
+#[derive(Debug)]
+pub struct PreparedFrame {
+    scene: Arc<CompiledScene>,
+    view: FrameView,
+    /// Eye units per world unit: a power of two.
+    pub(crate) per_unit: f64,
+    pub(crate) rays: PinholeRays,
+    /// Map from eye space to the camera's picture: see [`PinholeRays::to_picture`].
+    pub(crate) to_picture: Affine,
+    pub(crate) items: Items,
+    pub(crate) instances: Vec<Instance>,
+    pub(crate) spheres: Vec<EyeSphere>,
+    pub(crate) triangles: Vec<EyeTriangle>,
+    pub(crate) planes: Vec<EyePlane>,
+    /// Largest error bound of any surface, in eye units.
+    pub(crate) coarsest: f64,
+    pub(crate) lights: Vec<EyeLight>,
+    /// The scene's tree, with the boxes of this frame.
+    pub(crate) nodes: Vec<WideNode>,
+    pub(crate) features: SceneFeatures,
+    /// The level of SIMD that renders the frame.
+    pub(crate) level: Level,
+}
+
+/// A triangle of the scene file, in eye space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EyeTriangle {
+    pub corners: [DVec3; 3],
+    /// Unit normal on the side from which the corners are in counter-clockwise order.
+    pub normal: DVec3,
+    /// Error bound of its position, in eye units.
+    pub error: f64,
+    /// Whether alpha cuts it out.
+    pub cut: bool,
+}
+
+impl PreparedFrame {
+    /// Places a compiled scene in eye space. The cost grows with the number of instances, not of triangles.
+    ///
+    /// # Errors
+    /// [`CompileError::Frame`]: size, samples or camera of the view are out of range.
+    pub fn new(scene: Arc<CompiledScene>, view: &FrameView) -> Result<Self, CompileError> {
+        Self::new_unless(scene, view, &never)
+    }
+
+    /// [`PreparedFrame::new`] with cancellation. `cancelled` is polled between steps, each of which visits every instance
+    /// at most once.
+    ///
+    /// # Errors
+    /// As [`PreparedFrame::new`], and [`CompileError::Cancelled`].
+    pub fn new_unless(
+        scene: Arc<CompiledScene>,
+        view: &FrameView,
+        cancelled: &IsCancelled<'_>,
+    ) -> Result<Self, CompileError> {
+        view.validate()?;
+        go_on(cancelled)?;
+        let source = scene.scene();
+        let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
+        let rays = PinholeRays::new(view);
+        let to_picture = rays.to_picture();
+        let mut instances: Vec<Instance> = source
+            .models
+            .iter()
+            .zip(scene.meshes())
+            .zip(scene.attributes())
+            .map(|((model, mesh), attributes)| {
+                Instance::new(model, mesh, attributes, view.spin, &to_eye, &to_picture)
+            })
+            .collect();
+        go_on(cancelled)?;
+        let (triangles, planes) = (triangles(source, &to_eye), planes(source, &to_eye));
+        let coarsest = coarsest(&instances, &triangles, &planes);
+        instances.iter_mut().for_each(|instance| instance.set_drift(coarsest));
+        let mut frame = Self {
+            view: *view,
+            per_unit: 1.0 / to_eye.unit,
+            rays,
+            to_picture,
+            items: Items::of(source),
+            instances,
+            spheres: spheres(source, &to_eye),
+            triangles,
+            planes,
+            coarsest,
+            lights: lights(source, &view.quality, &to_eye),
+            nodes: Vec::new(),
+            features: scene.features().at(&view.quality),
+            level: simd::best(),
+            scene,
+        };
+        go_on(cancelled)?;
+        frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
+        Ok(frame)
+    }
+
+    /// The view that is rendered.
+    pub fn view(&self) -> &FrameView {
+        &self.view
+    }
+
+    /// Pixels per row.
+    pub fn width(&self) -> u32 {
+        self.view.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.view.height
+    }
+
+    /// World bounds of all finite primitives.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.scene.bounds()
+    }
+
+    /// The scene as plain data.
+    pub fn scene(&self) -> &Scene {
+        self.scene.scene()
+    }
+
+    /// The scene's textures with their maps.
+    pub(crate) fn textures(&self) -> &[(Arc<Texture>, TextureMap)] {
+        self.scene.textures()
+    }
+
+    /// The items in a leaf of the scene's tree.
+    pub(crate) fn items_of(&self, block: u32) -> &[u32] {
+        &self.scene.tree().blocks[block as usize]
+    }
+
+    /// Bounds of an item in eye space, padded.
+    fn item_bounds(&self, item: Item) -> (Vec3, Vec3) {
+        let (lo, hi) = match item {
+            Item::Model(i) => {
+                let instance = &self.instances[i];
+                let (lo, hi) = instance.mesh.root_bounds();
+                transformed_bounds((lo.as_dvec3(), hi.as_dvec3()), instance.linear, instance.translation)
+            }
+            Item::Sphere(i) => {
+                let EyeSphere { center, radius } = self.spheres[i];
+                (center - radius, center + radius)
+            }
+            Item::Triangle(i) => {
+                let [a, b, c] = self.triangles[i].corners;
+                (a.min(b).min(c), a.max(b).max(c))
+            }
+        };
+        ((lo - BOX_PADDING).as_vec3(), (hi + BOX_PADDING).as_vec3())
+    }
+}
+
+/// World units per eye unit: the power of two next to the distance from the camera to the far end of all finite primitives.
+/// Scaling the world by a power of two scales the unit by the same factor.
+fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
+    let reach = match scene.bounds() {
+        Some((lo, hi)) => (lo - camera.position).abs().max((hi - camera.position).abs()).max_element(),
+        None => (camera.look_at - camera.position).length(),
+    };
+    if !(reach > 0.0 && reach.is_finite()) {
+        return 1.0;
+    }
+    let (_, exponent) = libm::frexp(reach);
+    libm::exp2(f64::from(exponent))
+}
+
+fn lights(scene: &Scene, quality: &Quality, to_eye: &ToEye) -> Vec<EyeLight> {
+    let cast = |light: &Light| Light { shadows: light.shadows && quality.shadows, ..*light };
+    let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
+    scene.lights.iter().map(place).collect()
+}
+
+fn spheres(scene: &Scene, to_eye: &ToEye) -> Vec<EyeSphere> {
+    let place = |sphere: &crate::scene::Sphere| EyeSphere {
+        center: to_eye.point(sphere.center),
+        radius: sphere.radius / to_eye.unit,
+    };
+    scene.spheres.iter().map(place).collect()
+}
+
+fn triangles(scene: &Scene, to_eye: &ToEye) -> Vec<EyeTriangle> {
+    let place = |triangle: &crate::scene::Triangle| {
+        let corners @ [a, b, c] = triangle.vertices.map(|vertex| to_eye.point(vertex));
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let cut = triangle.uvs.is_some() && scene.materials[triangle.material as usize].cutout.is_some();
+        let error = placement_rounding(&triangle.vertices, &corners, to_eye.unit);
+        EyeTriangle { corners, normal, error, cut }
+    };
+    scene.triangles.iter().map(place).collect()
+}
+
+fn planes(scene: &Scene, to_eye: &ToEye) -> Vec<EyePlane> {
+    let place = |plane: &crate::scene::Plane| {
+        let (normal, point) = (plane.normal.normalize_or_zero(), to_eye.point(plane.point));
+        let error = placement_rounding(&[plane.point], &[point], to_eye.unit);
+        EyePlane { normal, offset: normal.dot(point), error }
+    };
+    scene.planes.iter().map(place).collect()
+}
+
+fn coarsest(instances: &[Instance], triangles: &[EyeTriangle], planes: &[EyePlane]) -> f64 {
+    let of_instances = instances.iter().map(|instance| mesh_rounding(&instance.linear) + instance.error);
+    let of_triangles = triangles.iter().map(|triangle| triangle.error);
+    let of_planes = planes.iter().map(|plane| plane.error);
+    of_instances.chain(of_triangles).chain(of_planes).fold(0.0, f64::max)
+}

@@ -1,0 +1,63 @@
+//! Closest hits and any hits of blocks of any sixteen rays.
+//!
+//! Rays of bounces have neither origins nor directions in common, so each walks the trees by itself, and the sixteen
+//! children of a node fill the lanes. A block is dispatched to its level of SIMD once.
+
+#[cfg(test)]
+mod tests;
+
+use super::Hit;
+use super::single::{Stack, with_stack};
+use crate::frame::PreparedFrame;
+use crate::rays::{HitBlock, RayBlock, RaySource};
+use crate::simd::{Simd, dispatch, each_bit};
+
+impl PreparedFrame {
+    /// The closest hits of the live rays of a block.
+    pub(crate) fn closest_hits_of(&self, block: &RayBlock<'_>) -> HitBlock {
+        let mut hits = HitBlock::NONE;
+        with_stack(|stack| dispatch!(self.level, simd => self.find_nearest(simd, stack, block, &mut hits)));
+        for lane in each_bit(hits.coincident) {
+            let (nearest, starts_on) = (hits.slot(lane), block.starts_on(0, lane));
+            let (preferred, others) =
+                self.preferred(&block.ray(0, lane), nearest, block.t_max(lane), starts_on);
+            hits.coincident &= !(u32::from(!others) << lane);
+            hits.set(lane, preferred);
+        }
+        hits
+    }
+
+    /// Bits of the live rays of a block that hit anything.
+    pub(crate) fn any_hits_of(&self, block: &RayBlock<'_>) -> u32 {
+        with_stack(|stack| dispatch!(self.level, simd => self.find_any(simd, stack, block)))
+    }
+
+    /// The exact hit of a ray whose primitive is known.
+    pub(crate) fn hit_in(&self, block: &RayBlock<'_>, hits: &HitBlock, lane: usize) -> Option<Hit> {
+        self.hit_of(&block.ray(0, lane), hits.primitive(lane)?, block.starts_on(0, lane))
+    }
+
+    /// Finds the nearest hits; `coincident` has the rays whose hit may coincide with others.
+    #[inline(always)]
+    fn find_nearest<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>, hits: &mut HitBlock) {
+        for lane in each_bit(block.live(0)) {
+            let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
+            let found = self.nearest(simd, stack.above(), &ray, block.t_max(lane), starts_on);
+            if let Some((primitive, tied)) = found {
+                hits.set(lane, primitive);
+                hits.coincident |= u32::from(tied) << lane;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn find_any<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>) -> u32 {
+        let mut occluded = 0;
+        for lane in each_bit(block.live(0)) {
+            let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
+            let hit = self.hits_any(simd, stack.above(), &ray, block.t_max(lane), starts_on);
+            occluded |= u32::from(hit) << lane;
+        }
+        occluded
+    }
+}

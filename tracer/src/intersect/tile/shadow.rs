@@ -1,0 +1,50 @@
+//! The points of a tile that a light does not reach.
+//!
+//! Shadow rays from the points of a tile to a point light have that end in common: they are a tile with an uneven grid. So
+//! are the parallel rays of a directional light, whose common end is infinitely far away. A point is occluded as soon as one
+//! triangle is certain to be in its way.
+//!
+//! ```text
+//!   light_projection   a projection from the light whose picture suits the points
+//!   points             the points in that picture, and which of them are occluded
+//!   occlusion          boxes and triangles against them
+//! ```
+
+use super::light_projection::Extent;
+use super::occlusion::OcclusionQuery;
+use super::{Picture, Scratch};
+use crate::rays::{BLOCKS, ShadowTile};
+use crate::simd::Simd;
+
+impl ShadowTile<'_> {
+    /// Bits of the live points that are occluded.
+    #[inline(always)]
+    pub(crate) fn occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [u32; BLOCKS] {
+        let Scratch { scene_frontier, mesh_frontier, projected, shadow_rays: rays, points, .. } = scratch;
+        points.open = self.live;
+        points.occluded = [0; BLOCKS];
+        let extent = Extent::of(simd, self.points, self.grid, &self.live);
+        let Some(projection) = extent.projection(self.light) else {
+            OcclusionQuery::new(self, rays, points).test_scene();
+            return points.occluded;
+        };
+        points.project(simd, self.points, &extent, &projection, rays);
+        let picture = Picture { projection: &projection, rays };
+        let mut query = OcclusionQuery::new(self, rays, points);
+        scene_frontier.find(simd, &self.frame.nodes, picture, &query);
+        for leaf in &scene_frontier.leaves {
+            if leaf.z_most < query.points.least_of_all {
+                continue;
+            }
+            for &item in self.frame.items_of(leaf.index) {
+                query.turn_to(item);
+                query.cover_item(simd, &projection, mesh_frontier, projected);
+            }
+        }
+        for plane in 0..self.frame.planes.len() as u32 {
+            query.turn_to(self.frame.items.first_plane() + plane);
+            query.test_item();
+        }
+        points.occluded
+    }
+}

@@ -1,0 +1,32 @@
+//! Where rays come from: tiles of the camera, tiles of a light, blocks of any sixteen rays.
+//!
+//! ```text
+//!   ray          single rays
+//!   hit          the primitives that sixteen rays hit, or start on
+//!   source       what all sources have in common
+//!   projection   a point or a direction to project along, and the picture seen from there
+//!   tile         256 rays in such a picture
+//!   eye          tiles of the camera
+//!   shadow       tiles of a point light, or of a directional one: its rays are parallel
+//!   block        any sixteen rays
+//! ```
+
+mod block;
+mod eye;
+mod hit;
+mod projection;
+mod ray;
+mod shadow;
+mod source;
+mod tile;
+
+pub(crate) use block::RayBlock;
+pub(crate) use eye::EyeTile;
+pub(crate) use hit::{HitBlock, NO_ITEM, PrimitiveId};
+pub(crate) use projection::{Frustum, Projection, ROUNDING};
+pub(crate) use ray::Ray;
+pub use ray::RayCounts;
+pub(crate) use shadow::{ShadowTarget, ShadowTile};
+pub(crate) use source::{LocalRays, RaySource, SurfaceSource};
+pub(crate) use tile::{ALL_BLOCKS, BLOCKS, SIDE, TileColors, TileRays, place};
+pub use tile::{TILE_SIZE, tile_rows};

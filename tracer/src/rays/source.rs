@@ -1,0 +1,61 @@
+//! Traits of ray sources.
+//!
+//! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
+//! nothing for origins that differ.
+
+use super::{PrimitiveId, Ray};
+use crate::frame::{Instance, PreparedFrame};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{Simd, f32x16};
+
+/// Blocks of sixteen rays of one frame.
+pub(crate) trait RaySource {
+    /// The frame that the rays are traced in.
+    fn frame(&self) -> &PreparedFrame;
+
+    /// Bits of the live rays of a block; the others hit nothing.
+    fn live(&self, block: usize) -> u32;
+
+    /// A ray in eye space, exactly.
+    fn ray(&self, block: usize, lane: usize) -> Ray;
+
+    /// The primitive that a ray starts on. The ray does not hit it again, except for the far side of a sphere.
+    fn starts_on(&self, block: usize, lane: usize) -> Option<PrimitiveId>;
+}
+
+/// Rays whose hits become surface points: see `surface`.
+pub(crate) trait SurfaceSource: RaySource + Sized {
+    /// Number of blocks.
+    const BLOCKS: usize;
+
+    /// Whether all rays start at the origin of eye space.
+    const COMMON_ORIGIN: bool;
+
+    /// The rays in the space of a mesh.
+    type Local: LocalRays<Self>;
+
+    /// Directions of the rays of a block in eye space, rounded.
+    fn directions<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
+
+    /// Origins of the rays of a block in eye space, rounded.
+    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
+
+    /// The rays in the space of an instance's mesh, or in eye space.
+    fn local(&self, instance: Option<&Instance>) -> Self::Local;
+
+    /// Points at `t` along the rays of a block. `direction` is that of [`SurfaceSource::directions`].
+    #[inline(always)]
+    fn points<S: Simd>(&self, simd: S, block: usize, direction: Vec3x16<S>, t: f32x16<S>) -> Vec3x16<S> {
+        let along = direction.scale(t);
+        if Self::COMMON_ORIGIN { along } else { self.origins(simd, block).add(along) }
+    }
+}
+
+/// The rays of a source in another space, rounded.
+pub(crate) trait LocalRays<R> {
+    /// Origins of the rays of a block.
+    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
+
+    /// Directions of the rays of a block.
+    fn directions<S: Simd>(&self, simd: S, rays: &R, block: usize) -> Vec3x16<S>;
+}

@@ -1,0 +1,119 @@
+//! The oracle: the shading equations in `f64`, every ray against every primitive, without trees, SIMD or shortcuts.
+//!
+//! Of a frame's quality it applies what is left out (shadows, highlights) and the filter; it is exact where a setting trades
+//! precision for speed. It shares with the fast path only the scene, the cleaned triangles and the sRGB encoding; all else is
+//! computed from the equations of the model of light, to be compared with them.
+//!
+//! ```text
+//!   flatten      the scene as a list of primitives
+//!   shape        primitives, and their intersection
+//!   visibility   closest hits and occlusion
+//!   shading      the shading equation
+//!   texture      texture lookups
+//! ```
+
+mod flatten;
+mod shading;
+mod shape;
+mod texture;
+mod visibility;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::image::RgbImage;
+use crate::intersect::{RayHit, RaySegment};
+use crate::mesh::CompiledMesh;
+use crate::scene::{FrameView, Scene};
+use crate::srgb;
+use crate::texture::Texture;
+use shape::Primitive;
+
+/// Relative error of an `f64` after a handful of operations.
+const F64_ERROR: f64 = 1.0 / (1_u64 << 50) as f64;
+
+/// A scene, flattened to world space relative to the camera.
+pub struct Oracle {
+    scene: Scene,
+    view: FrameView,
+    textures: Vec<Arc<Texture>>,
+    primitives: Vec<Primitive>,
+    size: f64,
+}
+
+impl Oracle {
+    /// Flattens a scene. Meshes and textures that it names must be among the given ones; a model without its mesh is skipped, a
+    /// missing texture is white.
+    pub fn new(
+        scene: &Scene,
+        meshes: &[Arc<CompiledMesh>],
+        textures: &[Arc<Texture>],
+        view: &FrameView,
+    ) -> Self {
+        let primitives = flatten::flatten(scene, meshes, view);
+        let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
+        Self { scene: scene.clone(), view: *view, textures: textures.to_vec(), primitives, size }
+    }
+
+    /// Linear RGB of a pixel: the mean over its samples.
+    pub fn pixel(&self, x: u32, y: u32) -> DVec3 {
+        let n = self.view.samples.isqrt();
+        let mut sum = DVec3::ZERO;
+        for j in 0..n {
+            for i in 0..n {
+                let sx = f64::from(x) + (f64::from(i) + 0.5) / f64::from(n);
+                let sy = f64::from(y) + (f64::from(j) + 0.5) / f64::from(n);
+                sum += self.radiance(self.direction(sx, sy));
+            }
+        }
+        sum / f64::from(n * n)
+    }
+
+    /// A pixel in 8-bit sRGB.
+    pub fn encoded_pixel(&self, x: u32, y: u32) -> [u8; 3] {
+        srgb::encode(self.pixel(x, y).as_vec3())
+    }
+
+    /// Colour of one ray in 8-bit sRGB, through a point of the picture in pixels from its top left corner.
+    pub fn encoded_at(&self, x: f64, y: f64) -> [u8; 3] {
+        srgb::encode(self.radiance(self.direction(x, y)).as_vec3())
+    }
+
+    /// The whole picture. The time is proportional to pixels times primitives.
+    pub fn render(&self) -> RgbImage {
+        let (width, height) = (self.view.width, self.view.height);
+        let pixels =
+            (0..height).flat_map(|y| (0..width).flat_map(move |x| self.encoded_pixel(x, y))).collect();
+        RgbImage { width, height, pixels }
+    }
+
+    /// The hit of a ray from the camera in any direction; the point is camera + t * direction.
+    pub fn closest_hit(&self, direction: DVec3) -> Option<RayHit> {
+        let (index, hit) = self.closest(DVec3::ZERO, direction, f64::INFINITY, None)?;
+        Some(RayHit { t: hit.t, primitive: self.primitives[index].name })
+    }
+
+    /// The hit of any ray of world space.
+    pub fn closest_hit_of(&self, ray: &RaySegment) -> Option<RayHit> {
+        let origin = ray.origin - self.view.camera.position;
+        let starts_on = ray
+            .starts_on
+            .and_then(|name| self.primitives.iter().position(|primitive| primitive.name == name));
+        let (index, hit) = self.closest(origin, ray.direction, ray.t_max, starts_on)?;
+        Some(RayHit { t: hit.t, primitive: self.primitives[index].name })
+    }
+
+    /// Direction through a point of the picture, in pixels from its top left corner.
+    fn direction(&self, sx: f64, sy: f64) -> DVec3 {
+        let camera = &self.view.camera;
+        let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
+        let forward = (camera.look_at - camera.position).normalize();
+        let right = forward.cross(camera.up).normalize();
+        let up = right.cross(forward);
+        let half_height = libm::tan(camera.fov.to_radians() / 2.0) / camera.zoom;
+        let across = (2.0 * sx / width - 1.0) * half_height * width / height;
+        let along = (1.0 - 2.0 * sy / height) * half_height;
+        (forward + right * across + up * along).normalize()
+    }
+}
