@@ -43,6 +43,7 @@
 #[cfg(feature = "transport")]
 pub mod address;
 pub mod codec;
+mod cost;
 pub mod envelope;
 mod error;
 #[cfg(feature = "transport")]
@@ -58,10 +59,11 @@ pub mod session;
 pub mod tcp;
 mod token;
 
+pub use cost::Cost;
 pub use error::{ProtocolError, Role};
 pub use ids::{AssetId, FrameId, Lease};
 pub use message::{FrameAnnounce, Hello, Reconnect, ToMaster, ToWorker, Welcome};
-pub use pixels::{Cost, Encoding, PixelFormat, PixelsHeader};
+pub use pixels::{Encoding, PixelFormat, PixelsHeader};
 
 /// Version of everything after the preamble. It grows with every change that an older peer would misread.
 pub const PROTOCOL_VERSION: u16 = 4;

@@ -9,10 +9,8 @@
 
 use bytes::{Buf, BufMut};
 
-use super::Cost;
-use crate::ProtocolError;
 use crate::envelope::Kind;
-use crate::ids::{FrameId, Lease};
+use crate::{Cost, FrameId, Lease, ProtocolError};
 
 /// Number of bytes of [`PixelsHeader`] on the wire.
 pub(crate) const PIXELS_HEAD_BYTES: usize = 88;
@@ -75,7 +73,7 @@ impl PixelsHeader {
         rest.put_u32_le(lease.row_count);
         rest.put_u32_le(encoding.code());
         rest.put_u32_le(0);
-        cost.put(&mut rest);
+        put_cost(cost, &mut rest);
         bytes
     }
 
@@ -92,6 +90,27 @@ impl PixelsHeader {
         let encoding = Encoding::from_code(code).filter(|_| zero == 0);
         let encoding = encoding
             .ok_or_else(|| ProtocolError::malformed(Kind::Pixels, format!("encoding {code} is not known")))?;
-        Ok(Self { lease, encoding, cost: Cost::get(&mut rest) })
+        Ok(Self { lease, encoding, cost: get_cost(&mut rest) })
+    }
+}
+
+/// Writes the seven numbers of a cost, in the order of the fields.
+fn put_cost(cost: Cost, to: &mut impl BufMut) {
+    let Cost { trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary } = cost;
+    [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary]
+        .into_iter()
+        .for_each(|value| to.put_u64_le(value));
+}
+
+/// Reads what [`put_cost`] has written.
+fn get_cost(from: &mut impl Buf) -> Cost {
+    Cost {
+        trace_ns: from.get_u64_le(),
+        wait_ns: from.get_u64_le(),
+        encode_ns: from.get_u64_le(),
+        span_ns: from.get_u64_le(),
+        primary: from.get_u64_le(),
+        shadow: from.get_u64_le(),
+        secondary: from.get_u64_le(),
     }
 }

@@ -4,13 +4,11 @@
 //! compresses them in blocks ([`Packer`]). [`PixelsHeader`] names the [`Encoding`], so that the master can undo it.
 
 mod blocks;
-mod cost;
 mod format;
 mod header;
 mod rgb565;
 
 pub use blocks::{BlockError, Packer, unpack};
-pub use cost::Cost;
 pub use format::PixelFormat;
 pub use header::{Encoding, PixelsHeader};
 pub use rgb565::{from_rgb565, rgb565_bytes, to_rgb565};

@@ -1,7 +1,5 @@
 //! Time and rays that a segment has taken.
 
-use bytes::{Buf, BufMut};
-
 /// Time and rays that a segment has taken on its worker. Times are intervals of the worker's clock, so no two clocks are
 /// compared.
 ///
@@ -23,29 +21,6 @@ pub struct Cost {
     pub shadow: u64,
     /// Number of reflected and transmitted rays.
     pub secondary: u64,
-}
-
-impl Cost {
-    /// Writes the seven numbers, little endian, in the order of the fields.
-    pub(super) fn put(self, to: &mut impl BufMut) {
-        let Self { trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary } = self;
-        [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary]
-            .into_iter()
-            .for_each(|value| to.put_u64_le(value));
-    }
-
-    /// Reads what [`put`](Self::put) has written.
-    pub(super) fn get(from: &mut impl Buf) -> Self {
-        Self {
-            trace_ns: from.get_u64_le(),
-            wait_ns: from.get_u64_le(),
-            encode_ns: from.get_u64_le(),
-            span_ns: from.get_u64_le(),
-            primary: from.get_u64_le(),
-            shadow: from.get_u64_le(),
-            secondary: from.get_u64_le(),
-        }
-    }
 }
 
 impl std::ops::AddAssign for Cost {
