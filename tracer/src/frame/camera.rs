@@ -52,7 +52,7 @@ impl PinholeRays {
     }
 
     /// Map from eye space to (a, b, g): g is the depth, (a / g, b / g) the place in samples from the top left corner.
-    pub(crate) fn to_picture(&self) -> Affine {
+    pub(crate) fn picture_map(&self) -> Affine {
         let [right, down] = self.steps(self.grid);
         Affine::new(DMat3::from_cols(right, down, self.corner).inverse(), DVec3::ZERO)
     }

@@ -48,7 +48,7 @@ pub struct PreparedFrame {
     /// Eye units per world unit: a power of two.
     pub(crate) per_unit: f64,
     pub(crate) rays: PinholeRays,
-    /// Map from eye space to the camera's picture: see [`PinholeRays::to_picture`].
+    /// Map from eye space to the camera's picture: see [`PinholeRays::picture_map`].
     pub(crate) to_picture: Affine,
     pub(crate) items: Items,
     pub(crate) instances: Vec<Instance>,
@@ -101,7 +101,7 @@ impl PreparedFrame {
         let source = scene.scene();
         let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
         let rays = PinholeRays::new(view);
-        let to_picture = rays.to_picture();
+        let to_picture = rays.picture_map();
         let mut instances: Vec<Instance> = source
             .models
             .iter()

@@ -173,7 +173,7 @@ mod tests {
         let quality = Quality::default();
         let rays =
             PinholeRays::new(&FrameView { camera, width: 64, height: 48, samples: 4, spin: 0.0, quality });
-        let projection = Projection::new(rays.to_picture().centered(40.0, 60.0), 1.0, false);
+        let projection = Projection::new(rays.picture_map().centered(40.0, 60.0), 1.0, false);
         let [a, b, g] = projection.exact(rays.of_sample(43, 57) * 7.0).to_array();
         assert!(
             (g - 7.0).abs() < 1e-9 && (a / g - 3.5).abs() < 1e-9 && (b / g + 2.5).abs() < 1e-9,

@@ -9,7 +9,6 @@ use super::*;
 use crate::compile::CompiledScene;
 use crate::intersect::{Primitive, RaySegment};
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
-use crate::rays::SurfaceSource;
 use crate::reference::Oracle;
 use crate::scene::{
     Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
@@ -135,10 +134,10 @@ fn check_surfaces(frame: &PreparedFrame, block: &RayBlock<'_>, hits: &HitBlock) 
             DVec3::from_array([0, 1, 2].map(|axis| f64::from(lanes[axis].0[lane])))
         };
         let (found, ng) = (vector(&surface.point), vector(&surface.ng));
-        assert!((ng.length() - 1.0).abs() < 1e-5 && ng.dot(ray.direction) <= 0.0, "lane {lane}: {ng}");
+        assert!((ng.length() - 1.0).abs() < 1e-5 && ng.dot(ray.direction) <= 1e-5, "lane {lane}: {ng}");
         // Across the surface: along it, the error grows as the ray grazes it.
         let across = (found - point).dot(ng).abs();
-        assert!(across <= f64::from(surface.bias.0[lane]), "lane {lane}: {found}, not {point}");
+        assert!(across <= 4.0 * f64::from(surface.bias.0[lane]), "lane {lane}: {found}, not {point}");
     }
 }
 
@@ -150,7 +149,6 @@ fn a_block_without_live_rays_hits_nothing() {
     let hits = frame.closest_hits_of(&block);
     assert!((0..LANES).all(|lane| hits.primitive(lane).is_none()));
     assert_eq!(frame.any_hits_of(&block), 0);
-    assert!(!RayBlock::COMMON_ORIGIN);
 }
 
 proptest! {
