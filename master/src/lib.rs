@@ -34,13 +34,14 @@ mod plot;
 mod progress;
 mod report;
 mod roster;
-pub mod scheduler;
 mod seals;
 mod server;
 pub mod simulator;
 mod tradeoff;
 mod transfers;
 mod wanted;
+
+pub use rayfarm_scheduler as scheduler;
 
 #[cfg(test)]
 mod fake_worker;

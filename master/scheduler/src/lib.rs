@@ -42,7 +42,7 @@ pub use action::{Action, Return};
 pub use audits::{Finding, Verdict, Verification};
 pub use event::{Event, HostId, WorkerId};
 pub use policy::SegmentPolicy;
-pub use rayfarm_protocol::{Cost, FrameId, Lease};
+pub use rayfarm_ids::{Cost, FrameId, Lease};
 pub use record::{Progress, WorkerRecord, WorkerState};
 
 use assign::MAX_FRAMES;
@@ -53,7 +53,7 @@ use lapses::FIRST_PATIENCE;
 use worker::{PING_EVERY, Service, Worker};
 
 /// What a band of tiles costs however few of its rows are traced, as a share of the whole: measured, see
-/// [`CostProfile`](crate::simulator::CostProfile).
+/// `CostProfile` of the simulator.
 const TILE_SHARE: f64 = 0.38;
 /// What each finished lease leaves of an earlier surprise...
 const SURPRISE_MEMORY: f64 = 0.98;
