@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::addresses::Reachable;
+use crate::farm::Reachable;
 use crate::farm::FarmStatus;
-use crate::pace::spoken;
+use crate::accounting::spoken;
 
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);

@@ -7,8 +7,7 @@ use accounts::AccountPanel;
 use legend::Entry;
 
 use super::canvas::{Canvas, GLYPH, Rect};
-use crate::addresses::Reachable;
-use crate::farm::KickedWorker;
+use crate::farm::{KickedWorker, Reachable};
 
 pub(super) mod accounts;
 mod kicked;

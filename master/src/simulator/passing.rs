@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SECOND;
 use super::dice::Dice;
 use super::link::{Lane, bytes};
-use crate::chains::{Chains, Source};
+use crate::farm::{Chains, Source};
 use crate::scheduler::WorkerId;
 
 const ASSET: AssetId = AssetId([1; 32]);

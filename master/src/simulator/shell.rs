@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::lies::Lie;
 use super::pictures::Picture;
-use crate::lease_book::{LeaseBook, Standing};
+use crate::farm::{LeaseBook, Standing};
 use crate::scheduler::{Event, Finding, FrameId, Lease, Verdict, WorkerId};
 
 /// What the driver keeps.
