@@ -1,107 +1,107 @@
-//! A farm's other handle: for whoever steers it beside the one who asks for frames.
+//! A second handle to a farm, for commands to its workers.
 
 use std::sync::Arc;
 
+use rayfarm_scheduler::{Event, WorkerId};
 use tokio::runtime::Handle;
 
-use crate::verification::delivered::FrameSet;
 use crate::driver::Driver;
 use crate::error::UnknownWorker;
-use crate::status::FarmStatus;
+use crate::sessions::PastWorker;
 use crate::sessions::identity::Identity;
-use crate::supervisor::Places;
-use crate::sessions::Kicked;
-use rayfarm_scheduler::{Event, WorkerId};
+use crate::status::FarmStatus;
+use crate::supervisor::LocalSlots;
+use crate::verification::delivered::FrameSet;
 
-/// Looks at a farm and commands its workers, from any thread. Once the farm is shut down, no worker is there.
+/// Reads a farm's status and sends commands to its workers, from any thread. After the farm is shut down, there are no
+/// workers.
 #[derive(Clone)]
 pub struct FarmControl {
     driver: Arc<Driver>,
-    places: Arc<Places>,
-    /// Goodbyes are said on the farm's runtime, whatever thread asks for them.
+    slots: Arc<LocalSlots>,
+    /// Goodbyes are sent on the farm's runtime, whatever thread calls.
     runtime: Handle,
 }
 
 impl FarmControl {
-    /// Call it inside the farm's runtime.
-    pub(crate) fn new(driver: Arc<Driver>, places: Arc<Places>) -> Self {
-        Self { driver, places, runtime: Handle::current() }
+    /// A handle. Call it inside the farm's runtime.
+    pub(crate) fn new(driver: Arc<Driver>, slots: Arc<LocalSlots>) -> Self {
+        Self { driver, slots, runtime: Handle::current() }
     }
 
-    /// What is going on right now.
+    /// The current status.
     pub fn status(&self) -> FarmStatus {
-        FarmStatus { local_gone: self.places.gone(), ..self.driver.status() }
+        FarmStatus { local_exited: self.slots.empty(), ..self.driver.status() }
     }
 
-    /// As [`FarmStatus::wrong_frames`], by their numbers.
+    /// Finished frames that may be wrong: the ones that [`FarmStatus::wrong_frames`] counts.
     pub fn wrong_frames(&self) -> FrameSet {
         self.driver.wrong_frames()
     }
 
-    /// Lets a worker finish what it holds and then leave for good; a worker of the same name may come later.
+    /// Drains a worker: it finishes its leases and leaves for good. A worker of the same name may connect later.
     ///
     /// # Errors
-    /// [`UnknownWorker`], as for all commands to a worker.
+    /// [`UnknownWorker`], when no worker of that number is connected.
     pub fn drain(&self, worker: u64) -> Result<(), UnknownWorker> {
         self.command(worker, |worker| Event::DrainRequested { worker })
     }
 
-    /// Gives a worker no more leases until [`FarmControl::resume`]. It stays connected and finishes what it holds. A farm
+    /// Grants a worker no more leases until [`FarmControl::resume`]. It stays connected and finishes its leases. A farm
     /// whose workers are all paused renders nothing.
     ///
     /// # Errors
-    /// [`UnknownWorker`].
+    /// [`UnknownWorker`], when no worker of that number is connected.
     pub fn pause(&self, worker: u64) -> Result<(), UnknownWorker> {
         self.command(worker, |worker| Event::PauseRequested { worker })
     }
 
-    /// Gives a paused worker leases again. One that drains goes on draining.
+    /// Grants a paused worker leases again. A draining worker continues to drain.
     ///
     /// # Errors
-    /// [`UnknownWorker`].
+    /// [`UnknownWorker`], when no worker of that number is connected.
     pub fn resume(&self, worker: u64) -> Result<(), UnknownWorker> {
         self.command(worker, |worker| Event::ResumeRequested { worker })
     }
 
-    /// Sends a worker away at once, with the reason; others render what it held. It is refused when it connects again,
-    /// until [`FarmControl::allow`] or the end of this master. A local worker is known by its process, any other by
-    /// its name and address.
+    /// Disconnects a worker at once, with the reason, and bans it until [`FarmControl::allow`] or the end of this master.
+    /// Other workers render its leases. A local worker is identified by its process, any other by name and address.
     ///
     /// # Errors
-    /// [`UnknownWorker`].
-    pub fn kick(&self, worker: u64, reason: &str) -> Result<(), UnknownWorker> {
+    /// [`UnknownWorker`], when no worker of that number is connected.
+    pub fn ban(&self, worker: u64, reason: &str) -> Result<(), UnknownWorker> {
         let _runtime = self.runtime.enter();
-        found(worker, self.driver.kick(WorkerId(worker), reason))
+        known(worker, self.driver.ban(WorkerId(worker), reason))
     }
 
-    /// Lets all kicked workers of this name connect again; local ones are started. Returns how many were kept out.
+    /// Lifts the bans of all workers of this name; local ones are restarted. Returns how many bans were lifted.
     pub fn allow(&self, name: &str) -> usize {
-        self.let_in(|kicked| kicked.identity.name() == name)
+        self.lift(|banned| banned.identity.name() == name)
     }
 
-    /// Lets the kicked worker that had this number connect again; a local one is started. Whether it was kept out.
+    /// Lifts the ban of the worker that had this number; a local one is restarted. Returns whether it was banned.
     pub fn allow_worker(&self, worker: u64) -> bool {
-        self.let_in(|kicked| kicked.worker == WorkerId(worker)) > 0
+        self.lift(|banned| banned.worker == WorkerId(worker)) > 0
     }
 
-    /// Lets all kicked workers connect again, and starts the local ones that are not running.
-    pub fn bring_back(&self) {
+    /// Lifts all bans and restarts the local workers that are not running.
+    pub fn allow_all(&self) {
         self.driver.allow(|_| true);
-        self.places.start_again(|_| true);
+        self.slots.restart(|_| true);
     }
 
-    fn let_in(&self, which: impl Fn(&Kicked) -> bool) -> usize {
+    fn lift(&self, which: impl Fn(&PastWorker) -> bool) -> usize {
         let allowed = self.driver.allow(which);
-        self.places.start_again(|number| allowed.contains(&Identity::Local(number)));
+        self.slots.restart(|number| allowed.contains(&Identity::Local(number)));
         allowed.len()
     }
 
     fn command(&self, worker: u64, event: impl FnOnce(WorkerId) -> Event) -> Result<(), UnknownWorker> {
         let _runtime = self.runtime.enter();
-        found(worker, self.driver.command(WorkerId(worker), event(WorkerId(worker))))
+        known(worker, self.driver.command(WorkerId(worker), event(WorkerId(worker))))
     }
 }
 
-fn found(worker: u64, found: bool) -> Result<(), UnknownWorker> {
-    if found { Ok(()) } else { Err(UnknownWorker(worker)) }
+fn known(worker: u64, is_known: bool) -> Result<(), UnknownWorker> {
+    if is_known { Ok(()) } else { Err(UnknownWorker(worker)) }
 }

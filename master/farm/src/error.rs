@@ -1,57 +1,57 @@
-//! Why a farm cannot start or go on, and what to do about it.
+//! Errors of a farm, with remedies.
 
 use std::io::ErrorKind;
 use std::net::SocketAddr;
 
+use rayfarm_protocol::FrameId;
 use rayfarm_tracer::scene::ValidateError;
 
 use crate::assets::AssetError;
-use rayfarm_protocol::FrameId;
 
 /// A command names a worker that is not connected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no worker {0} is connected; the status lists those that are")]
+#[error("no worker {0} is connected; the status lists the connected ones")]
 pub struct UnknownWorker(pub u64);
 
-/// Why a farm cannot start or go on.
+/// An error that keeps a farm from starting or from completing a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum FarmError {
-    /// The address cannot be listened on.
+    /// Binding the listening address failed.
     #[error("cannot listen for workers on {address}: {source}; {}", remedy(source, address))]
     Listen {
-        /// What was asked for.
+        /// The requested address.
         address: SocketAddr,
-        /// What the operating system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The scene cannot be sent to workers.
     #[error(transparent)]
     Assets(#[from] AssetError),
-    /// Segments are to be verified, and nothing draws which: workers could foresee them.
-    #[error("cannot draw which segments to verify: {0}; run without --verify")]
+    /// Segments are to be verified, and the system has no random numbers: workers could predict the choice.
+    #[error("cannot draw the segments to verify: {0}; run without --verify")]
     Random(String),
-    /// A frame was requested that cannot be rendered.
+    /// A requested view cannot be rendered.
     #[error("this frame cannot be rendered: {0}")]
     View(#[source] ValidateError),
-    /// Every worker has refused a frame again and again.
+    /// Every worker has refused a frame several times.
     #[error(
-        "no worker can render frame {frame} ({reasons}); look at what the workers say, or change the scene"
+        "no worker can render frame {frame} ({reasons}); check the workers' messages, or change the scene"
     )]
     Refused {
-        /// Which frame.
+        /// The frame.
         frame: FrameId,
-        /// What the workers say.
+        /// The workers' reasons.
         reasons: String,
     },
-    /// Nobody is left to render: the local workers keep dying, and no other is connected.
+    /// All local workers have exited, and no other worker is connected.
     #[error(
-        "no worker is left: {reason}; look at its messages above, or start workers by hand: \
+        "no worker is left: {reason}; check its messages above, or start workers by hand: \
          rayfarm-worker --master {address}"
     )]
     NoWorkers {
-        /// What became of the last local worker.
+        /// How the last local worker ended.
         reason: String,
-        /// Where workers connect.
+        /// The address where workers connect.
         address: SocketAddr,
     },
 }
@@ -65,7 +65,7 @@ fn remedy(error: &std::io::Error, address: &SocketAddr) -> String {
             address.ip()
         ),
         ErrorKind::AddrNotAvailable => format!(
-            "{} is no address of this machine; --listen 0.0.0.0:{port} listens on all it has",
+            "{} is no address of this machine; --listen 0.0.0.0:{port} listens on all its addresses",
             address.ip()
         ),
         ErrorKind::PermissionDenied => "choose a port above 1023 with --listen ADDR:PORT".to_owned(),

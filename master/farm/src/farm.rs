@@ -1,16 +1,9 @@
-//! The farm: ask for frames, get pictures. Everything that happens in between is below this file.
+//! A running farm.
 //!
-//! ```text
-//! let mut farm = Farm::start(options, scene).await?;
-//! farm.request(view);
-//! let frame = farm.finished().await?;
-//! farm.shut_down().await;
-//! ```
-//!
-//! A frame begins when no earlier one stands in its way. Callers that keep at most two requests open (the one being
-//! rendered and the one after it) get every frame they asked for, in order. A third open request replaces the second
-//! unless half of that one is leased already, so a moving camera never queues up, and the oldest frame is always
-//! finished. Frames may differ in size; one of another size than the one before begins when that is complete.
+//! A frame starts when no earlier one blocks it. A caller with at most two open requests (the frame being rendered and
+//! its successor) gets every frame that it requests, in order. A third open request replaces the second unless half of that
+//! one is leased already, so the requests of a moving camera never queue up, and the oldest frame is always finished. Frames
+//! may differ in size; a frame whose size differs from its predecessor's starts when that one is complete.
 
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -23,7 +16,7 @@ use tokio::sync::mpsc;
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tokio_util::task::TaskTracker;
 
-use crate::accounting::TraceSink;
+use crate::accounting::TimelineSink;
 use crate::assets::Assets;
 use crate::control::FarmControl;
 use crate::driver::Driver;
@@ -33,16 +26,15 @@ use crate::options::{DEFAULT_PORT, FarmOptions, FarmScene};
 use crate::server;
 use crate::sessions::addresses::Reachable;
 use crate::status::FarmStatus;
-use crate::supervisor::{LocalWorkers, Places};
-use crate::verification::arbiter::{self, Trace};
+use crate::supervisor::{LocalSlots, LocalWorkers};
+use crate::verification::arbiter::{self, RowRenderer};
 use crate::verification::delivered::FrameSet;
 
-/// A running farm. Dropped without [`Farm::shut_down`], it ends its sessions and its local workers all the same,
-/// only without waiting for them.
+/// A running farm. Dropping it ends its sessions and local workers without waiting for them; [`Farm::shut_down`] waits.
 pub struct Farm {
     address: SocketAddr,
     driver: Arc<Driver>,
-    places: Arc<Places>,
+    slots: Arc<LocalSlots>,
     sessions: TaskTracker,
     processes: TaskTracker,
     stop_processes: CancellationToken,
@@ -50,22 +42,24 @@ pub struct Farm {
 }
 
 impl Farm {
-    /// Binds the listening address, starts the local workers and waits for requests.
+    /// Starts a farm: binds the listening address and starts the local workers.
     ///
     /// # Errors
     /// [`FarmError::Listen`] when the address is taken or does not belong to this machine, [`FarmError::Assets`]
-    /// when the scene cannot be sent, [`FarmError::Random`] when segments are to be verified and cannot be drawn.
+    /// when the scene cannot be sent, [`FarmError::Random`] when segments are to be verified and the system gives no random
+    /// numbers.
     pub async fn start(options: FarmOptions, scene: FarmScene) -> Result<Farm, FarmError> {
         let stop = CancellationToken::new();
-        let trace = (options.verify_percent > 0).then(|| arbiter::tracer(scene.clone(), stop.clone()));
-        Self::start_with(options, scene, trace, stop).await
+        let renderer =
+            (options.verify_percent > 0).then(|| arbiter::row_renderer(scene.clone(), stop.clone()));
+        Self::start_with(options, scene, renderer, stop).await
     }
 
-    /// As [`Farm::start`], with whoever traces rows for the master itself.
+    /// As [`Farm::start`], with a given renderer for the arbiter.
     pub(crate) async fn start_with(
         options: FarmOptions,
         scene: FarmScene,
-        trace: Option<Arc<Trace>>,
+        renderer: Option<Arc<RowRenderer>>,
         stop: CancellationToken,
     ) -> Result<Farm, FarmError> {
         let assets = Assets::new(&scene.scene, scene.meshes, scene.textures)?;
@@ -73,17 +67,17 @@ impl Farm {
         if let Some(line) = Reachable::of(address).announcement() {
             tracing::info!("{line}");
         }
-        let (court, cases) = mpsc::unbounded_channel();
-        let driver = Arc::new(Driver::new(&options, assets, court)?);
+        let (arbiter_queue, disputes) = mpsc::unbounded_channel();
+        let driver = Arc::new(Driver::new(&options, assets, arbiter_queue)?);
         let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());
 
         let clock = driver.clone();
         let stopped = stop.clone();
         tokio::spawn(async move { clock.keep_time(stopped).await });
-        if let Some(trace) = trace {
-            let referee = driver.clone();
-            let settle = move |event| referee.handle(event);
-            tokio::spawn(arbiter::hold_court(cases, trace, settle, stop.clone()));
+        if let Some(renderer) = renderer {
+            let settled = driver.clone();
+            let report = move |event| settled.handle(event);
+            tokio::spawn(arbiter::run(disputes, renderer, report, stop.clone()));
         }
         tokio::spawn(server::accept(listener, driver.clone(), sessions.clone(), stop.clone()));
         let local = LocalWorkers {
@@ -92,78 +86,76 @@ impl Farm {
             threads: options.threads,
             listening: address,
         };
-        let bereaved = driver.clone();
+        let reporter = driver.clone();
         let stop_processes = stop.child_token();
-        let places = local.start(&driver.tickets, &processes, &stop_processes, move |reason| {
-            if bereaved.worker_count() == 0 {
-                bereaved.report(FarmError::NoWorkers { reason, address });
+        let slots = local.start(&driver.tickets, &processes, &stop_processes, move |reason| {
+            if reporter.worker_count() == 0 {
+                reporter.report(FarmError::NoWorkers { reason, address });
             }
         });
-        Ok(Farm { address, driver, places, sessions, processes, stop_processes, stop: stop.drop_guard() })
+        Ok(Farm { address, driver, slots, sessions, processes, stop_processes, stop: stop.drop_guard() })
     }
 
-    /// Where workers connect.
+    /// The address where workers connect.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The frame to render next; see the top of this file for what becomes of earlier requests. A frame that cannot
-    /// be rendered at all (no pixels, a camera that sees nothing) is an error of [`Farm::finished`].
+    /// Requests a frame. It may replace an earlier request: at most two are open, and the oldest frame is always finished.
+    /// A view that cannot be rendered (no pixels, an invalid camera) is an error of [`Farm::finished`].
     pub fn request(&self, view: FrameView) -> FrameId {
         self.driver.request(view)
     }
 
-    /// How many frames the run has: [`FarmStatus::totals`] tells how long they take.
+    /// Sets the number of frames of the run, from which [`FarmStatus::totals`] predicts its duration.
     pub fn expect_frames(&self, frames: u64) {
         self.driver.expect_frames(frames);
     }
 
-    /// Gives up all frames that were requested so far, begun or not: they will not be finished.
-    pub fn give_up(&self) {
-        self.driver.give_up();
+    /// Drops all frames that were requested so far, started or not: they are not finished.
+    pub fn drop_requests(&self) {
+        self.driver.drop_requests();
     }
 
-    /// The next completed frame, in the order of requests. Waits for as long as it takes. Safe to drop half-way, as
-    /// `select!` does.
+    /// Waits for the next completed frame, in the order of requests. Cancel safe.
     ///
     /// # Errors
-    /// [`FarmError::View`] for a request that cannot be rendered, [`FarmError::Refused`] for one that all workers say
-    /// they cannot; [`FarmError::NoWorkers`], once, when nobody is
-    /// left to render: a worker that connects later goes on with the frame.
+    /// [`FarmError::View`] for a view that cannot be rendered, [`FarmError::Refused`] for a frame that all workers refuse;
+    /// [`FarmError::NoWorkers`], once, when the last worker has left: a worker that connects later continues the frame.
     pub async fn finished(&mut self) -> Result<FinishedFrame, FarmError> {
         self.driver.next_finished().await
     }
 
-    /// Waits until nothing is left to verify of the frames that are complete. Safe to drop half-way.
+    /// Waits until no segment of the completed frames is left to verify. Cancel safe.
     pub async fn verified(&self) {
         self.driver.all_verified().await;
     }
 
-    /// Finished frames that have rows of workers which were found to send wrong pixels: they may be wrong.
+    /// Finished frames that have rows of workers which sent wrong pixels: they may be wrong.
     pub fn wrong_frames(&self) -> FrameSet {
         self.driver.wrong_frames()
     }
 
-    /// What is going on right now.
+    /// The current status.
     pub fn status(&self) -> FarmStatus {
-        FarmStatus { local_gone: self.places.gone(), ..self.driver.status() }
+        FarmStatus { local_exited: self.slots.empty(), ..self.driver.status() }
     }
 
-    /// Another handle, for whoever steers the farm beside the one who asks for frames. Call it inside the runtime.
+    /// A second handle, for commands to workers. Call it inside the runtime.
     pub fn control(&self) -> FarmControl {
-        FarmControl::new(self.driver.clone(), self.places.clone())
+        FarmControl::new(self.driver.clone(), self.slots.clone())
     }
 
-    /// Tells a timeline of everything from now on.
-    pub fn trace_into(&self, sink: TraceSink) {
-        self.driver.trace_into(sink);
+    /// Records a timeline of everything from now on.
+    pub fn record_timeline(&self, sink: TimelineSink) {
+        self.driver.record_timeline(sink);
     }
 
-    /// Says goodbye to all workers and waits, not for long, until the local ones have ended; kills what has not.
+    /// Disconnects all workers and waits until the local ones have exited; those that do not within three seconds are killed.
     pub async fn shut_down(self) {
-        // First of all, so that nobody starts a worker again that ends because it was told goodbye.
+        // First of all, so that no supervisor restarts a worker that exits because of its goodbye.
         self.stop_processes.cancel();
-        self.driver.part("the master ends").await;
+        self.driver.disconnect_all("the master ends").await;
         let stop = self.stop.disarm();
         stop.cancel();
         for tasks in [self.processes, self.sessions] {
@@ -173,12 +165,12 @@ impl Farm {
     }
 }
 
-/// Binds the address asked for, or else the usual one, or else whatever is free.
-async fn listen(asked: Option<SocketAddr>) -> Result<(TcpListener, SocketAddr), FarmError> {
-    let usual = SocketAddr::from((Ipv4Addr::LOCALHOST, DEFAULT_PORT));
-    let address = asked.unwrap_or(usual);
+/// Binds the requested address, or else the default one, or else a free port.
+async fn listen(requested: Option<SocketAddr>) -> Result<(TcpListener, SocketAddr), FarmError> {
+    let default = SocketAddr::from((Ipv4Addr::LOCALHOST, DEFAULT_PORT));
+    let address = requested.unwrap_or(default);
     let bound = match TcpListener::bind(address).await {
-        Err(error) if asked.is_none() && error.kind() == ErrorKind::AddrInUse => {
+        Err(error) if requested.is_none() && error.kind() == ErrorKind::AddrInUse => {
             let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await;
             if let Some(port) = free.as_ref().ok().and_then(|listener| listener.local_addr().ok()) {
                 tracing::info!("port {DEFAULT_PORT} is taken; workers connect to {port} instead");

@@ -10,32 +10,32 @@ use crate::framebuffer::FramePixels;
 
 pub use rayfarm_protocol::Cost as FrameCounts;
 
-/// A completed picture and what it took.
+/// A completed picture with its costs.
 #[derive(Debug)]
 pub struct FinishedFrame {
-    /// Which request this is.
+    /// The request that it answers.
     pub frame: FrameId,
-    /// What was asked for.
+    /// The requested view.
     pub view: FrameView,
     /// RGB8 sRGB rows, top to bottom: `view.width * view.height * 3` bytes.
     pub pixels: FramePixels,
-    /// What the segments of the picture took, summed: nanoseconds of tracing over all threads, and rays by kind.
-    /// Each row counts once, however many workers rendered it.
+    /// The costs of the picture's segments, summed: nanoseconds over all threads, and rays by kind. Each row counts once,
+    /// even if several workers rendered it.
     pub counts: FrameCounts,
-    /// From the moment the frame began to its last row.
+    /// Time from the start of the frame to its last row.
     pub elapsed: Duration,
-    /// From the request to the last row: how old the camera is that the picture shows.
+    /// Time from the request to the last row: the age of the camera in the picture.
     pub latency: Duration,
-    /// Workers connected when it completed.
+    /// Workers that were connected when the frame completed.
     pub workers: u32,
     /// Render threads of these workers together.
     pub threads: u32,
-    /// Bytes sent to all workers since the frame before.
+    /// Bytes sent to all workers since the previous frame completed.
     pub sent_bytes: u64,
-    /// Bytes received from all workers since the frame before.
+    /// Bytes received from all workers since the previous frame completed.
     pub received_bytes: u64,
     /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
     pub scene_bytes: u64,
-    /// What the workers did with their time since the frame before, and who rendered what.
+    /// How the workers' thread time was spent since the previous frame, and which worker rendered which rows.
     pub account: FrameAccount,
 }

@@ -32,7 +32,7 @@ mod verification;
 mod tests;
 
 pub use accounting::{FrameAccount, Parts, SegmentNote, WorkerAccount};
-pub use assets::routing::{Chains, Source};
+pub use assets::routing::{AssetRouting, AssetSource};
 pub use assets::{AssetError, Assets, TransferStatus};
 pub use control::FarmControl;
 pub use error::{FarmError, UnknownWorker};
@@ -43,7 +43,7 @@ pub use options::{DEFAULT_PORT, FarmOptions, FarmScene};
 pub use rayfarm_protocol::FrameId;
 pub use rayfarm_scheduler::{SegmentPolicy, Verification, WorkerState};
 pub use sessions::addresses::Reachable;
-pub use sessions::lease_book::{LeaseBook, Standing};
-pub use status::{FarmStatus, KickedWorker, RunTotals, WorkerStatus};
+pub use sessions::lease_book::{LeaseBook, LeaseStatus};
+pub use status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
 pub use supervisor::LocalWorkerCommand;
 pub use verification::delivered::{FrameSet, as_text};

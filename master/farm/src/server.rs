@@ -1,4 +1,5 @@
-//! Lets workers in and listens to each of them: one task a session. Whatever one peer does ends its own session only.
+//! The listener: accepts connections, shakes hands, and runs one task per session. An error of a peer ends its own session
+//! only.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -8,24 +9,24 @@ use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
 use rayfarm_protocol::{AssetId, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
+use rayfarm_scheduler::{Event, WorkerId};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, mpsc};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 use crate::driver::{AnswerError, Driver};
-use crate::sessions::identity::Identity;
 use crate::sessions::Session;
-use rayfarm_scheduler::{Event, WorkerId};
+use crate::sessions::identity::Identity;
 
-/// Connections that have not shaken hands yet; more wait in the operating system's queue.
+/// Connections in their handshake; more wait in the operating system's queue.
 const MAX_HANDSHAKES: usize = 64;
-/// Assets that a worker has asked for and not been sent yet.
-const MAX_WANTED_ASSETS: usize = 4096;
-/// After a failed accept (out of file descriptors, usually), so that it does not fail as fast as it can.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+/// Asset requests of a worker that wait to be served.
+const MAX_ASSET_REQUESTS: usize = 4096;
+/// Delay after a failed accept, which usually means that file descriptors have run out.
+const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(100);
 
-/// Why a session ended before its time.
+/// An error that ends a session.
 #[derive(Debug, thiserror::Error)]
 enum SessionError {
     #[error(transparent)]
@@ -34,11 +35,11 @@ enum SessionError {
     Answer(#[from] AnswerError),
     #[error("it closed the connection without a goodbye")]
     Closed,
-    #[error("it asks for more than {MAX_WANTED_ASSETS} assets at once")]
-    Greedy,
+    #[error("it requests more than {MAX_ASSET_REQUESTS} assets at once")]
+    TooManyRequests,
 }
 
-/// Accepts workers until `stop`.
+/// Accepts connections until `stop`, and runs their sessions.
 pub(crate) async fn accept(
     listener: TcpListener,
     driver: Arc<Driver>,
@@ -50,18 +51,18 @@ pub(crate) async fn accept(
         let accepted = tokio::select! {
             () = stop.cancelled() => return,
             accepted = async {
-                let place = handshakes.clone().acquire_owned().await;
-                (listener.accept().await, place)
+                let permit = handshakes.clone().acquire_owned().await;
+                (listener.accept().await, permit)
             } => accepted,
         };
         match accepted {
-            (Ok((stream, address)), place) => {
+            (Ok((stream, address)), permit) => {
                 let (driver, stop) = (driver.clone(), stop.clone());
                 sessions.spawn(async move {
                     let session = async {
-                        if let Some(newcomer) = greet(&driver, stream, address).await {
-                            drop(place);
-                            serve(&driver, newcomer, address).await;
+                        if let Some(admitted) = shake_hands(&driver, stream, address).await {
+                            drop(permit);
+                            run_session(&driver, admitted, address).await;
                         }
                     };
                     tokio::select! {
@@ -71,23 +72,23 @@ pub(crate) async fn accept(
                 });
             }
             (Err(error), _) => {
-                tracing::warn!("cannot accept a connection: {error}; trying again");
-                tokio::time::sleep(ACCEPT_PAUSE).await;
+                tracing::warn!("cannot accept a connection: {error}; retrying");
+                tokio::time::sleep(ACCEPT_RETRY_DELAY).await;
             }
         }
     }
 }
 
-/// A worker that has been let in.
-struct Newcomer {
+/// A worker that has been admitted.
+struct Admitted {
     worker: WorkerId,
     hello: Hello,
     identity: Identity,
     stream: TcpStream,
 }
 
-/// The handshake. Whoever fails it is logged, and has disturbed nobody.
-async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> Option<Newcomer> {
+/// Shakes hands with a peer. Failures are logged.
+async fn shake_hands(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> Option<Admitted> {
     if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
@@ -101,33 +102,33 @@ async fn greet(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> O
     };
     match handshake::as_master(&mut stream, decide).await {
         Ok(hello) => admitted.map(|(worker, identity)| {
-            // A ticket is never shown.
+            // A ticket is never displayed.
             let hello = Hello { name: identity.name(), ..hello };
-            Newcomer { worker, hello, identity, stream }
+            Admitted { worker, hello, identity, stream }
         }),
-        // It comes back every few seconds.
+        // The worker retries every few seconds.
         Err(error @ ProtocolError::NotNow { .. }) => {
-            tracing::debug!("{address} was not let in: {error}");
+            tracing::debug!("{address} is refused: {error}");
             None
         }
         Err(error) => {
-            tracing::warn!("{address} was not let in: {error}");
+            tracing::warn!("{address} is refused: {error}");
             None
         }
     }
 }
 
-/// A session from its beginning to its end.
-async fn serve(driver: &Driver, newcomer: Newcomer, address: SocketAddr) {
-    let Newcomer { worker, hello, identity, stream } = newcomer;
+/// Runs a session to its end.
+async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
+    let Admitted { worker, hello, identity, stream } = admitted;
     let Hello { name, threads, simd, software } = hello.clone();
     tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
     let (sender, receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
-    let (want, wanted) = mpsc::channel(MAX_WANTED_ASSETS);
+    let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
     driver.join(worker, Session::new(hello, identity, address, sender.clone(), traffic));
     let ended = tokio::select! {
-        ended = listen(driver, worker, receiver, want) => ended,
-        () = send_assets(driver, worker, &sender, wanted) => Err(SessionError::Closed),
+        ended = receive(driver, worker, receiver, request) => ended,
+        () = send_assets(driver, worker, &sender, requests) => Err(SessionError::Closed),
     };
     match ended {
         Ok(reason) => {
@@ -135,8 +136,8 @@ async fn serve(driver: &Driver, newcomer: Newcomer, address: SocketAddr) {
             driver.leave(worker, "goodbye");
         }
         Err(error) => {
-            // Logged by the driver where it was the driver who dismissed it.
-            if driver.knows(worker) {
+            // A session that the driver has ended is logged already.
+            if driver.is_connected(worker) {
                 tracing::warn!("{worker} ({name}, {address}) is lost: {error}");
             }
             driver.leave(worker, &error.to_string());
@@ -144,23 +145,26 @@ async fn serve(driver: &Driver, newcomer: Newcomer, address: SocketAddr) {
     }
 }
 
-/// Takes what a worker says for as long as it makes sense. Returns the reason of its goodbye.
-async fn listen(
+/// Handles a worker's messages. Returns the reason in its goodbye.
+///
+/// # Errors
+/// The connection fails, or a message breaks a rule.
+async fn receive(
     driver: &Driver,
     worker: WorkerId,
     mut receiver: Receiver<ToMaster>,
-    want: mpsc::Sender<(AssetId, u64)>,
+    request: mpsc::Sender<(AssetId, u64)>,
 ) -> Result<String, SessionError> {
     while let Some(message) = receiver.recv().await {
         match message? {
             ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
             ToMaster::NeedAsset { id, offset, again } => {
-                if !driver.asset_wanted(worker, id, offset, again) {
-                    want.try_send((id, offset)).map_err(|_| SessionError::Greedy)?;
+                if !driver.asset_requested(worker, id, offset, again) {
+                    request.try_send((id, offset)).map_err(|_| SessionError::TooManyRequests)?;
                 }
             }
-            ToMaster::Sharing { port } => driver.shares(worker, port),
-            ToMaster::HaveAsset { id } => driver.asset_taken(worker, id),
+            ToMaster::Sharing { port } => driver.add_peer_server(worker, port),
+            ToMaster::HaveAsset { id } => driver.asset_received(worker, id),
             ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
             ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
@@ -170,28 +174,28 @@ async fn listen(
     Err(SessionError::Closed)
 }
 
-/// Sends the assets that a worker asks for, one after the other, as fast as it takes them. Ends with the session.
+/// Sends the assets that a worker requests, one after the other, as fast as it reads them. Ends with the session.
 async fn send_assets(
     driver: &Driver,
     worker: WorkerId,
     sender: &Sender<ToWorker>,
-    mut wanted: mpsc::Receiver<(AssetId, u64)>,
+    mut requests: mpsc::Receiver<(AssetId, u64)>,
 ) {
-    while let Some((id, offset)) = wanted.recv().await {
+    while let Some((id, offset)) = requests.recv().await {
         let sent = match driver.assets.get(id) {
             Some(bytes) => send_asset(driver, worker, sender, id, bytes, offset).await,
             None => sender.send(ToWorker::AssetUnknown { id }).await,
         };
         match sent {
             Ok(()) => {}
-            // What ended the session is the listener's to say.
+            // The receiving half of the session reports why it has ended.
             Err(SendError::Closed) => return std::future::pending().await,
             Err(SendError::Invalid(error)) => tracing::error!("asset {id} cannot be sent: {error}"),
         }
     }
 }
 
-/// An asset from some byte on.
+/// Sends an asset from byte `offset` on.
 async fn send_asset(
     driver: &Driver,
     worker: WorkerId,
@@ -201,14 +205,14 @@ async fn send_asset(
     mut offset: u64,
 ) -> Result<(), SendError> {
     sender.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await?;
-    // From beyond its end there is nothing to send.
+    // An offset beyond the end leaves nothing to send.
     let _ = bytes.split_to(usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len()));
     while !bytes.is_empty() {
         let chunk = bytes.split_to(bytes.len().min(MAX_CHUNK_BYTES));
         let next = offset + chunk.len() as u64;
         sender.send(ToWorker::AssetChunk { id, offset, bytes: chunk }).await?;
         offset = next;
-        // On a slow link its answers to pings wait behind megabytes in the operating system's buffers.
+        // On a slow link, pings wait behind megabytes in the operating system's buffers: this report counts as a sign of life.
         driver.asset_sent(worker, id, offset);
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! A look at a running farm.
+//! The status of a running farm.
 
 use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
@@ -8,82 +8,82 @@ use rayfarm_scheduler::{Verification, WorkerState};
 
 use crate::assets::TransferStatus;
 
-/// A look at the farm, for overlays and progress bars.
+/// A snapshot of the farm, for overlays and progress bars.
 #[derive(Clone, Debug, Default)]
 pub struct FarmStatus {
-    /// The workers connected now, in the order in which they came.
+    /// The connected workers, in the order in which they connected.
     pub workers: Vec<WorkerStatus>,
-    /// Workers that were kicked and are kept out, in the order in which they were kicked.
-    pub kicked: Vec<KickedWorker>,
-    /// Local workers that have left, or cannot be kept running: [`FarmControl::bring_back`] starts them again.
-    pub local_gone: u32,
-    /// The oldest frame being rendered.
+    /// Banned workers, oldest ban first.
+    pub banned: Vec<BannedWorker>,
+    /// Local workers that have exited and are not restarted until [`FarmControl::allow_all`](crate::FarmControl::allow_all).
+    pub local_exited: u32,
+    /// The oldest frame that is being rendered.
     pub frame: Option<FrameId>,
-    /// Its finished rows.
+    /// Finished rows of that frame.
     pub rows_done: u32,
-    /// Its rows.
+    /// Rows of that frame.
     pub rows: u32,
-    /// Finished frames that have rows of workers which were found to send wrong pixels: they may be wrong.
+    /// Finished frames that have rows of workers which sent wrong pixels: they may be wrong.
     pub wrong_frames: u64,
-    /// How much was verified since the farm began, where it verifies at all.
+    /// Counts of verified segments since the farm started; `None` where nothing is verified.
     pub verification: Option<Verification>,
-    /// How much of the scene is at the workers that still wait for it.
+    /// Progress of the scene's transfer to the workers that wait for it.
     pub transfers: TransferStatus,
     /// Sums over the run.
     pub totals: RunTotals,
 }
 
-/// A run up to now.
+/// Sums over a run, up to now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RunTotals {
-    /// Frames completed.
+    /// Completed frames.
     pub frames_done: u64,
-    /// Frames of the whole run, where that is known.
+    /// Frames of the whole run, where known.
     pub frames: Option<u64>,
-    /// Since the first request.
+    /// Time since the first request.
     pub elapsed: Duration,
-    /// Frames a second over the last 20 seconds or so.
+    /// Frames per second, averaged over about 20 seconds.
     pub fps: f64,
-    /// How long the rest takes at that pace, if that is known.
+    /// Predicted time for the remaining frames at that rate, where known.
     pub left: Option<Duration>,
     /// Bytes sent to all workers.
     pub sent_bytes: u64,
     /// Bytes received from all workers.
     pub received_bytes: u64,
-    /// The part of `sent_bytes` that describes what to draw.
+    /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
     pub scene_bytes: u64,
 }
 
-/// A worker that is kept out.
+/// A banned worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct KickedWorker {
-    /// The number that it had when it was kicked.
+pub struct BannedWorker {
+    /// Its number in its last session.
     pub id: u64,
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
-    /// Where it connected from; `None` for a local worker.
+    /// The address from which it connected; `None` for a local worker.
     pub address: Option<IpAddr>,
 }
 
 /// A connected worker.
 #[derive(Clone, Debug)]
 pub struct WorkerStatus {
-    /// Number given by this master; never reused.
+    /// Number assigned by this master; never reused.
     pub id: u64,
-    /// What it calls itself. Not unique: any worker may choose any name.
+    /// Its name. Not unique: any worker may choose any name.
     pub name: String,
     /// Whether this master has started it.
     pub local: bool,
-    /// Where it connects from.
+    /// The address from which it connects.
     pub address: SocketAddr,
     /// Its render threads.
     pub threads: u32,
-    /// Segments it has finished since it connected.
+    /// Segments that it has finished since it connected.
     pub segments_done: u64,
-    /// Rows of average cost per second, smoothed; 0 before that is known.
+    /// Rows of average cost per second, smoothed; 0 until it is measured.
     pub speed: f64,
-    /// Whether it is given work, and why not.
+    /// Whether it is granted leases, and if not, why.
     pub state: WorkerState,
-    /// Why it could not render a frame, the last time it could not.
-    pub trouble: Option<String>,
+    /// Why it last failed to render a frame.
+    pub last_failure: Option<String>,
 }

@@ -1,30 +1,31 @@
-//! The accounts of all workers, fed with what happens to the scheduler and what it decides.
+//! The accounts of all workers, kept from the scheduler's events and actions.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::ops::Range;
 use std::time::Duration;
 
 use rayfarm_protocol::{FrameId, Lease};
+use rayfarm_scheduler::{Action, Cost, Event, WorkerId};
 
 use super::ledger::{Answer, Ledger, Stretch};
 use super::parts::Parts;
 use super::span::{Mark, Span, What, laid_out};
-use rayfarm_scheduler::{Action, Cost, Event, WorkerId};
 
-/// Workers that may leave during one frame with an account of their own; beyond that, they share one.
-const MAX_GONE: usize = 1024;
+/// Workers that disconnect during one frame and keep an account of their own; beyond that, they share one.
+const MAX_DISCONNECTED: usize = 1024;
 
-/// What the workers did with their time while a frame was made: see [`crate::accounting`].
+/// How the workers' thread time was spent while a frame was made; see [`crate::accounting`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameAccount {
-    /// Each worker that was there, in the order in which they came.
+    /// Each worker that was connected, in the order in which they connected.
     pub workers: Vec<WorkerAccount>,
-    /// Who rendered what, in the order of arrival. Where rows were rendered twice, the first ones are in the picture.
+    /// The worker of each run of rows, in the order of arrival. Of rows that were rendered twice, the first are in the
+    /// picture.
     pub segments: Vec<SegmentNote>,
 }
 
 impl FrameAccount {
-    /// The account without the time before the frame in which nothing was requested: that time is no loss.
+    /// The account without the time, `rest`, in which no frame was requested: that time is no loss.
     pub fn without_rest(&self, rest: Duration) -> Self {
         let mut account = self.clone();
         for worker in &mut account.workers {
@@ -36,40 +37,40 @@ impl FrameAccount {
     }
 }
 
-/// What one worker did.
+/// The account of one worker.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WorkerAccount {
-    /// Number given by the master; never reused.
+    /// Number assigned by the master; never reused.
     pub id: u64,
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
     /// Its render threads.
     pub threads: u32,
-    /// Its time.
+    /// Its thread time, in parts.
     pub parts: Parts,
-    /// Segments that it answered.
+    /// Segments that it delivered.
     pub segments: u32,
-    /// Their rows.
+    /// Rows of these segments.
     pub rows: u64,
-    /// Bytes of pixels, as they came over the wire.
+    /// Bytes of pixels on the wire.
     pub bytes: u64,
 }
 
-/// Rows that one worker rendered.
+/// A run of rows that one worker rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SegmentNote {
-    /// From the top.
+    /// The first row, counted from the top.
     pub first_row: u32,
-    /// How many.
+    /// Number of rows.
     pub row_count: u32,
-    /// The worker's number.
+    /// Number of the worker.
     pub worker: u64,
     /// Nanoseconds of tracing, summed over its threads.
     pub trace_ns: u64,
 }
 
 impl FrameAccount {
-    /// All workers together.
+    /// The sum over all workers.
     pub fn sum(&self) -> Parts {
         let mut sum = Parts::default();
         self.workers.iter().for_each(|worker| sum.add(&worker.parts));
@@ -77,91 +78,92 @@ impl FrameAccount {
     }
 }
 
-/// Keeps the accounts. Times are since any fixed moment and never go backwards.
+/// The accounts of all workers. Times are durations since a fixed moment and never decrease.
 #[derive(Debug, Default)]
 pub(crate) struct Accounts {
-    workers: BTreeMap<WorkerId, Member>,
-    /// Those who left since the last frame.
-    gone: Vec<WorkerAccount>,
-    /// Frames in flight, with what is known of them.
-    frames: BTreeMap<FrameId, Sketch>,
-    /// Whether a frame has ever begun: nothing is lost before that.
+    workers: BTreeMap<WorkerId, WorkerBooks>,
+    /// Accounts of workers that have disconnected since the last frame.
+    disconnected: Vec<WorkerAccount>,
+    /// Frames in flight.
+    frames: BTreeMap<FrameId, FrameBooks>,
+    /// Whether any frame has started: time before that is not accounted.
     begun: bool,
     last_done: Duration,
     done: Option<FrameAccount>,
-    /// What a timeline wants to know, where there is one.
+    /// Marks for the timeline, if one is recorded.
     marks: Option<VecDeque<Mark>>,
 }
 
 #[derive(Debug)]
-struct Member {
+struct WorkerBooks {
     ledger: Ledger,
     account: WorkerAccount,
-    /// Size of the pixels that are about to be reported as done, and what it took to take them in.
-    taken_in: (u64, Duration),
+    /// Bytes of the pixels whose [`Event::SegmentDone`] is next, and the time to decode them.
+    received: (u64, Duration),
 }
 
 #[derive(Debug, Default)]
-struct Sketch {
+struct FrameBooks {
     begun_at: Duration,
     segments: Vec<SegmentNote>,
-    /// Rows of leases in the picture; no row is noted twice.
+    /// First row and row count of each noted lease, so that none is noted twice.
     noted: BTreeSet<(u32, u32)>,
 }
 
 impl Accounts {
-    /// From now on, [`Self::poll_mark`] tells of every stretch of time.
+    /// Starts to keep marks for [`Self::poll_mark`].
     pub(crate) fn keep_marks(&mut self) {
-        let named = |(&worker, member): (&WorkerId, &Member)| {
-            let WorkerAccount { name, threads, .. } = &member.account;
+        let named = |(&worker, books): (&WorkerId, &WorkerBooks)| {
+            let WorkerAccount { name, threads, .. } = &books.account;
             Mark::Named { worker, name: name.clone(), threads: *threads }
         };
         self.marks = Some(self.workers.iter().map(named).collect());
     }
 
-    /// The next thing that a timeline shows.
+    /// The next mark for the timeline.
     pub(crate) fn poll_mark(&mut self) -> Option<Mark> {
         self.marks.as_mut()?.pop_front()
     }
 
-    /// The account of the frame that was done last, once.
+    /// Takes the account of the frame that was finished last.
     pub(crate) fn take_done(&mut self) -> FrameAccount {
         self.done.take().unwrap_or_default()
     }
 
-    /// What a worker calls itself.
+    /// Sets the name of a worker.
     pub(crate) fn name(&mut self, worker: WorkerId, name: &str) {
-        let Some(member) = self.workers.get_mut(&worker) else { return };
-        name.clone_into(&mut member.account.name);
+        let Some(books) = self.workers.get_mut(&worker) else { return };
+        name.clone_into(&mut books.account.name);
         if let Some(marks) = &mut self.marks {
-            let threads = member.account.threads;
+            let threads = books.account.threads;
             marks.push_back(Mark::Named { worker, name: name.to_owned(), threads });
         }
     }
 
-    /// A worker asks for an asset.
-    pub(crate) fn asset_wanted(&mut self, now: Duration, worker: WorkerId) {
+    /// Notes that a worker requests an asset.
+    pub(crate) fn asset_requested(&mut self, now: Duration, worker: WorkerId) {
         self.advance(now, worker);
-        if let Some(member) = self.workers.get_mut(&worker) {
-            member.ledger.fetch();
+        if let Some(books) = self.workers.get_mut(&worker) {
+            books.ledger.fetch();
         }
     }
 
-    /// Pixels of a worker, `bytes` long on the wire, took the master `decode`; [`Event::SegmentDone`] follows.
-    pub(crate) fn taken_in(&mut self, worker: WorkerId, bytes: usize, decode: Duration) {
-        if let Some(member) = self.workers.get_mut(&worker) {
-            member.taken_in = (bytes as u64, decode);
+    /// Notes that pixels of a worker, `bytes` long on the wire, took the master `decode` to decode and copy. Their
+    /// [`Event::SegmentDone`] must follow.
+    pub(crate) fn received(&mut self, worker: WorkerId, bytes: usize, decode: Duration) {
+        if let Some(books) = self.workers.get_mut(&worker) {
+            books.received = (bytes as u64, decode);
         }
     }
 
-    /// Something happens to the scheduler.
+    /// Notes an event that the scheduler handles.
     pub(crate) fn event(&mut self, now: Duration, event: &Event) {
         match *event {
             Event::WorkerJoined { worker, threads, .. } => {
                 self.leave(now, worker);
                 let account = WorkerAccount { id: worker.0, threads, ..WorkerAccount::default() };
                 let ledger = Ledger::new(now, threads);
-                self.workers.insert(worker, Member { ledger, account, taken_in: Default::default() });
+                self.workers.insert(worker, WorkerBooks { ledger, account, received: Default::default() });
             }
             Event::WorkerLeft { worker } => self.leave(now, worker),
             Event::SegmentDone { worker, lease, cost } => self.answer(now, worker, lease, cost, true),
@@ -173,7 +175,7 @@ impl Accounts {
             }
             Event::WorkerFailed { worker, .. } => {
                 self.advance(now, worker);
-                let stretch = self.workers.get_mut(&worker).and_then(|member| member.ledger.fail());
+                let stretch = self.workers.get_mut(&worker).and_then(|books| books.ledger.fail());
                 self.mark_parts(now, worker, stretch);
             }
             Event::PauseRequested { worker } => self.pause(now, worker, true),
@@ -189,7 +191,7 @@ impl Accounts {
         }
     }
 
-    /// The scheduler decides something.
+    /// Notes an action that the scheduler decides on.
     pub(crate) fn action(&mut self, now: Duration, action: &Action) {
         match *action {
             Action::BeginFrame { frame } => self.begin(now, frame),
@@ -200,8 +202,8 @@ impl Accounts {
             }
             Action::Grant { worker, lease } | Action::Verify { worker, lease } => {
                 self.advance(now, worker);
-                if let Some(member) = self.workers.get_mut(&worker) {
-                    member.ledger.grant(lease);
+                if let Some(books) = self.workers.get_mut(&worker) {
+                    books.ledger.grant(lease);
                 }
             }
             Action::Cancel { worker, before } => self.cancel(now, worker, before),
@@ -215,38 +217,37 @@ impl Accounts {
         if std::mem::replace(&mut self.begun, true) {
             self.advance_all(now);
         } else {
-            self.workers.values_mut().for_each(|member| member.ledger.begin(now));
+            self.workers.values_mut().for_each(|books| books.ledger.begin(now));
         }
-        self.frames.insert(frame, Sketch { begun_at: now, ..Sketch::default() });
+        self.frames.insert(frame, FrameBooks { begun_at: now, ..FrameBooks::default() });
     }
 
     fn finish(&mut self, now: Duration, frame: FrameId, elapsed: Duration) {
         self.advance_all(now);
-        let sketch = self.frames.remove(&frame).unwrap_or_default();
+        let books = self.frames.remove(&frame).unwrap_or_default();
         if let Some(marks) = &mut self.marks {
-            let from = sketch.begun_at.max(self.last_done);
+            let from = books.begun_at.max(self.last_done);
             let what = What::Frame { frame, elapsed };
             marks.push_back(Mark::Span(Span { worker: None, from, to: now, what }));
         }
         self.last_done = now;
-        let mut workers: Vec<WorkerAccount> =
-            self.workers.values_mut().map(|member| member.closed()).collect();
-        workers.append(&mut self.gone);
+        let mut workers: Vec<WorkerAccount> = self.workers.values_mut().map(|books| books.closed()).collect();
+        workers.append(&mut self.disconnected);
         workers.sort_by_key(|worker| worker.id);
-        self.done = Some(FrameAccount { workers, segments: sketch.segments });
+        self.done = Some(FrameAccount { workers, segments: books.segments });
     }
 
-    /// A lease is answered; `shown`: with rows for a picture.
+    /// Notes the reply to a lease; `shown`: its rows go into a picture.
     fn answer(&mut self, now: Duration, worker: WorkerId, lease: Lease, cost: Cost, shown: bool) {
         self.advance(now, worker);
-        let Some(member) = self.workers.get_mut(&worker) else { return };
-        let (bytes, decode) = std::mem::take(&mut member.taken_in);
+        let Some(books) = self.workers.get_mut(&worker) else { return };
+        let (bytes, decode) = std::mem::take(&mut books.received);
         let Cost { trace_ns, wait_ns, encode_ns, span_ns, .. } = cost;
         let answer = Answer { trace_ns, wait_ns, encode_ns, span_ns, decode };
-        let Some(stretch) = member.ledger.answer(&lease, answer) else { return };
-        member.account.segments = member.account.segments.saturating_add(1);
-        member.account.rows = member.account.rows.saturating_add(lease.row_count.into());
-        member.account.bytes = member.account.bytes.saturating_add(bytes);
+        let Some(stretch) = books.ledger.answer(&lease, answer) else { return };
+        books.account.segments = books.account.segments.saturating_add(1);
+        books.account.rows = books.account.rows.saturating_add(lease.row_count.into());
+        books.account.bytes = books.account.bytes.saturating_add(bytes);
         if shown {
             self.note(worker, lease, trace_ns);
         }
@@ -257,59 +258,59 @@ impl Accounts {
         self.mark_parts(now, worker, Some(stretch));
     }
 
-    /// Remembers who rendered which rows of a frame in flight.
+    /// Notes which worker rendered the rows of a lease of a frame in flight.
     fn note(&mut self, worker: WorkerId, lease: Lease, trace_ns: u64) {
         let Lease { frame, first_row, row_count, .. } = lease;
-        let Some(sketch) = self.frames.get_mut(&frame) else { return };
-        if sketch.noted.insert((first_row, row_count)) {
-            sketch.segments.push(SegmentNote { first_row, row_count, worker: worker.0, trace_ns });
+        let Some(books) = self.frames.get_mut(&frame) else { return };
+        if books.noted.insert((first_row, row_count)) {
+            books.segments.push(SegmentNote { first_row, row_count, worker: worker.0, trace_ns });
         }
     }
 
-    /// Rows have left a picture: others will be noted in their place.
+    /// Drops the notes of rows that are removed from a picture and will be rendered again.
     fn forget_notes(&mut self, frame: FrameId, rows: Range<u32>) {
-        let Some(sketch) = self.frames.get_mut(&frame) else { return };
+        let Some(books) = self.frames.get_mut(&frame) else { return };
         let stays = |first: u32, count: u32| first >= rows.end || first.saturating_add(count) <= rows.start;
-        sketch.segments.retain(|note| stays(note.first_row, note.row_count));
-        sketch.noted.retain(|&(first, count)| stays(first, count));
+        books.segments.retain(|note| stays(note.first_row, note.row_count));
+        books.noted.retain(|&(first, count)| stays(first, count));
     }
 
     fn cancel(&mut self, now: Duration, worker: WorkerId, before: FrameId) {
         self.advance(now, worker);
-        let Some(member) = self.workers.get_mut(&worker) else { return };
-        if member.ledger.holds_before(before) {
-            let stretch = member.ledger.revoke(|lease| lease.frame < before);
+        let Some(books) = self.workers.get_mut(&worker) else { return };
+        if books.ledger.holds_before(before) {
+            let stretch = books.ledger.revoke(|lease| lease.frame < before);
             self.mark_parts(now, worker, stretch);
         }
     }
 
     fn pause(&mut self, now: Duration, worker: WorkerId, paused: bool) {
         self.advance(now, worker);
-        if let Some(member) = self.workers.get_mut(&worker) {
-            member.ledger.pause(paused);
+        if let Some(books) = self.workers.get_mut(&worker) {
+            books.ledger.pause(paused);
         }
     }
 
     fn leave(&mut self, now: Duration, worker: WorkerId) {
         self.advance(now, worker);
-        let Some(mut member) = self.workers.remove(&worker) else { return };
-        let stretch = member.ledger.fail();
-        self.mark_parts_of(now, worker, member.ledger.threads, stretch);
-        let account = member.closed();
-        let full = self.gone.len() >= MAX_GONE;
-        match self.gone.last_mut().filter(|_| full) {
-            None => self.gone.push(account),
+        let Some(mut books) = self.workers.remove(&worker) else { return };
+        let stretch = books.ledger.fail();
+        self.mark_parts_of(now, worker, books.ledger.threads, stretch);
+        let account = books.closed();
+        let full = self.disconnected.len() >= MAX_DISCONNECTED;
+        match self.disconnected.last_mut().filter(|_| full) {
+            None => self.disconnected.push(account),
             Some(others) => others.add(&account),
         }
     }
 
     fn advance(&mut self, now: Duration, worker: WorkerId) {
         let in_flight = !self.frames.is_empty();
-        let Some(member) = self.workers.get_mut(&worker) else { return };
+        let Some(books) = self.workers.get_mut(&worker) else { return };
         if !self.begun {
-            return member.ledger.begin(now);
+            return books.ledger.begin(now);
         }
-        let stretch = member.ledger.advance(now, in_flight);
+        let stretch = books.ledger.advance(now, in_flight);
         self.mark_parts(now, worker, stretch);
     }
 
@@ -320,7 +321,7 @@ impl Accounts {
     }
 
     fn mark_parts(&mut self, now: Duration, worker: WorkerId, stretch: Option<Stretch>) {
-        if let Some(threads) = self.workers.get(&worker).map(|member| member.ledger.threads) {
+        if let Some(threads) = self.workers.get(&worker).map(|books| books.ledger.threads) {
             self.mark_parts_of(now, worker, threads, stretch);
         }
     }
@@ -332,12 +333,12 @@ impl Accounts {
 
     #[cfg(test)]
     pub(super) fn unsettled(&self, worker: WorkerId) -> u64 {
-        self.workers.get(&worker).map_or(0, |member| member.ledger.unsettled())
+        self.workers.get(&worker).map_or(0, |books| books.ledger.unsettled())
     }
 }
 
-impl Member {
-    /// The account up to now; the next one begins.
+impl WorkerBooks {
+    /// Closes the account and opens the next one.
     fn closed(&mut self) -> WorkerAccount {
         self.account.parts = self.ledger.close();
         let WorkerAccount { id, threads, .. } = self.account;
@@ -347,7 +348,7 @@ impl Member {
 }
 
 impl WorkerAccount {
-    /// Adds what a worker did at another time.
+    /// Adds another account of the same worker.
     pub(crate) fn add(&mut self, other: &Self) {
         self.parts.add(&other.parts);
         self.segments = self.segments.saturating_add(other.segments);

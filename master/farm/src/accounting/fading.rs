@@ -1,4 +1,4 @@
-//! Accounts as people want to read them: smoothed over about a second.
+//! Accounts smoothed over about one second, for overlays.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -6,17 +6,17 @@ use std::time::Duration;
 use super::accounts::{FrameAccount, WorkerAccount};
 use super::parts::{PART_COUNT, Parts};
 
-/// After this long, a frame counts for a third of what it did.
+/// Time constant of the exponential decay: after this time, a frame's weight is 1/e.
 const MEMORY: Duration = Duration::from_secs(1);
 
-/// Fading sums over the workers that are there.
+/// Exponentially decaying sums over the connected workers.
 #[derive(Clone, Debug, Default)]
 pub struct Fading {
     workers: BTreeMap<u64, Faded>,
     at: Duration,
 }
 
-/// One worker's fading sums.
+/// The decaying sums of one worker.
 #[derive(Clone, Debug, Default)]
 struct Faded {
     parts: [f64; PART_COUNT],
@@ -24,34 +24,34 @@ struct Faded {
     bytes: f64,
 }
 
-/// A worker's account, smoothed.
+/// The smoothed account of one worker, or of all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Smoothed {
-    /// Per cent of its time, in the order of [`super::PART_NAMES`].
+    /// Percent of thread time, in the order of [`super::PART_NAMES`].
     pub percent: [f64; PART_COUNT],
     /// Bytes of pixels per frame.
     pub bytes: f64,
 }
 
 impl Fading {
-    /// A frame was completed `at`.
+    /// Adds the account of a frame that was completed at `at`.
     pub fn add(&mut self, at: Duration, account: &FrameAccount) {
         let keep = (-at.saturating_sub(self.at).div_duration_f64(MEMORY)).exp();
         self.at = at;
-        let here = |id: &u64| account.workers.iter().any(|worker| worker.id == *id);
-        self.workers.retain(|id, _| here(id));
+        let connected = |id: &u64| account.workers.iter().any(|worker| worker.id == *id);
+        self.workers.retain(|id, _| connected(id));
         for WorkerAccount { id, parts, bytes, .. } in &account.workers {
             let faded = self.workers.entry(*id).or_default();
             faded.add(keep, parts, *bytes);
         }
     }
 
-    /// A worker's account; `None` before its first frame.
+    /// The account of a worker; `None` before its first frame.
     pub fn of(&self, id: u64) -> Option<Smoothed> {
         self.workers.get(&id).map(Faded::smoothed)
     }
 
-    /// The account of all together; `None` before the first frame.
+    /// The account of all workers together; `None` before the first frame.
     pub fn sum(&self) -> Option<Smoothed> {
         let mut sum = Faded::default();
         for worker in self.workers.values() {
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn old_frames_fade_and_shares_sum_to_a_hundred() {
+    fn old_frames_decay_and_percentages_sum_to_100() {
         let mut fading = Fading::default();
         let step = Duration::from_millis(100);
         for index in 0..10 {
@@ -106,18 +106,18 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_is_no_wait() {
+    fn time_without_requests_is_not_waiting() {
         let account = |threads| {
             let mut account = frame(1, 1000, 60_500);
             account.workers[0].threads = threads;
             account.without_rest(Duration::from_nanos(30_000)).workers[0].parts
         };
         assert_eq!(account(2), Parts { trace: 1000, wait: 500, ..Parts::default() });
-        assert_eq!(account(3), Parts { trace: 1000, ..Parts::default() }, "never less than nothing");
+        assert_eq!(account(3), Parts { trace: 1000, ..Parts::default() }, "the subtraction saturates");
     }
 
     #[test]
-    fn who_has_left_is_forgotten() {
+    fn disconnected_workers_are_removed() {
         let mut fading = Fading::default();
         fading.add(Duration::ZERO, &frame(1, 1, 1));
         fading.add(MEMORY, &frame(2, 1, 1));

@@ -7,43 +7,43 @@ use rayfarm_protocol::{FrameId, Lease};
 
 use super::parts::{Claim, Parts};
 
-/// What a worker has done with its time since the last frame.
+/// The account of one worker since the last frame.
 #[derive(Debug)]
 pub(super) struct Ledger {
     pub(super) threads: u64,
-    /// Up to here, time is put down.
+    /// Time up to here is attributed.
     mark: Duration,
-    /// The leases that it holds, and since when.
+    /// The leases that it holds, with the times of their grants.
     held: BTreeMap<Lease, Duration>,
-    /// Time under leases since the last answer.
+    /// Time under leases since the last reply.
     open: Duration,
-    /// It has asked for an asset and answered no lease since.
+    /// Whether it has requested an asset and replied to no lease since.
     fetching: bool,
-    /// It gets no leases because the master's user says so: such time is nobody's loss.
+    /// Whether it is paused by a user: such time is not accounted.
     paused: bool,
-    /// Thread time under leases that have been answered, and what the answers say about it.
+    /// Thread time under leases that are answered, and the claims of these replies.
     answered: u64,
     claim: Claim,
-    /// Everything else.
+    /// All other time, by part.
     settled: Parts,
 }
 
-/// What an answer says.
+/// Times of one reply.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answer {
     /// Nanoseconds, summed over threads.
     pub(super) trace_ns: u64,
     /// Nanoseconds, summed over threads.
     pub(super) encode_ns: u64,
-    /// Nanoseconds between the arrival of the lease and the beginning of its first row.
+    /// Nanoseconds from the arrival of the lease to the start of its first row.
     pub(super) wait_ns: u64,
-    /// Nanoseconds from there to the moment the pixels were ready to be sent.
+    /// Nanoseconds from there until the pixels were ready to send.
     pub(super) span_ns: u64,
-    /// What the master needed to take the pixels in.
+    /// Time in which the master decoded the pixels.
     pub(super) decode: Duration,
 }
 
-/// A stretch of time whose account is known.
+/// A stretch of time with its parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stretch {
     pub(super) from: Duration,
@@ -65,7 +65,7 @@ impl Ledger {
         }
     }
 
-    /// Time up to now is put down to what the worker has been doing; what that was, if it held no leases.
+    /// Attributes the time up to now. Returns the stretch, if the worker held no leases in it.
     pub(super) fn advance(&mut self, now: Duration, frames_in_flight: bool) -> Option<Stretch> {
         let from = self.mark;
         let passed = now.saturating_sub(from);
@@ -90,27 +90,27 @@ impl Ledger {
         Some(Stretch { from, parts })
     }
 
-    /// Nothing before now counts: nobody has asked for anything yet.
+    /// Drops the time before now: no frame was requested in it.
     pub(super) fn begin(&mut self, now: Duration) {
         self.mark = now;
     }
 
-    /// It gets a lease. Time is up to date.
+    /// Adds a lease. Time must be attributed up to now.
     pub(super) fn grant(&mut self, lease: Lease) {
         self.held.insert(lease, self.mark);
     }
 
-    /// It asks for an asset. Time is up to date.
+    /// Notes a request for an asset. Time must be attributed up to now.
     pub(super) fn fetch(&mut self) {
         self.fetching = true;
     }
 
-    /// It gets no more leases, or does again. Time is up to date.
+    /// Pauses or resumes the worker. Time must be attributed up to now.
     pub(super) fn pause(&mut self, paused: bool) {
         self.paused = paused;
     }
 
-    /// It answers a lease that it holds; what came of the time since the answer before. Time is up to date.
+    /// Notes a reply to a lease. Returns the stretch since the previous reply. Time must be attributed up to now.
     pub(super) fn answer(&mut self, lease: &Lease, answer: Answer) -> Option<Stretch> {
         let granted = self.held.remove(lease)?;
         let open = std::mem::take(&mut self.open);
@@ -129,7 +129,7 @@ impl Ledger {
         Some(Stretch { from, parts: claim.split(budget) })
     }
 
-    /// Leases are taken back: the time that went into them has been spent in vain. Time is up to date.
+    /// Revokes leases: the time spent on them was in vain. Time must be attributed up to now.
     pub(super) fn revoke(&mut self, which: impl Fn(&Lease) -> bool) -> Option<Stretch> {
         self.held.retain(|lease, _| !which(lease));
         if self.open.is_zero() || !self.held.is_empty() {
@@ -141,7 +141,7 @@ impl Ledger {
         Some(Stretch { from: self.mark.saturating_sub(open), parts })
     }
 
-    /// The worker has failed to render a frame, and is asked for nothing for a while.
+    /// Revokes all leases of a worker that failed to render a frame or has disconnected.
     pub(super) fn fail(&mut self) -> Option<Stretch> {
         self.fetching = false;
         self.revoke(|_| true)
@@ -152,14 +152,14 @@ impl Ledger {
         self.held.keys().any(|lease| lease.frame < before)
     }
 
-    /// Closes the account of a frame. Time is up to date.
+    /// Closes the account of a frame. Time must be attributed up to now.
     pub(super) fn close(&mut self) -> Parts {
         let mut parts = std::mem::take(&mut self.settled);
         let (answered, claim) = (std::mem::take(&mut self.answered), std::mem::take(&mut self.claim));
         let given = claim.split(answered);
         parts.add(&given);
-        // Threads work ahead of the answers: an answer may tell of work done in the time of the frame before. Such a
-        // surplus waits for the time of the next frame, but no more of it than one frame can have.
+        // A reply may report work that was done in the time of the previous frame. Such a surplus is attributed to the time of
+        // the next frame, up to one frame's time.
         self.claim.trace = (claim.trace - given.trace).min(answered);
         self.claim.encode = (claim.encode - given.encode).min(answered);
         if self.fetching {
@@ -169,14 +169,14 @@ impl Ledger {
         parts
     }
 
-    /// Thread time under leases that nobody has answered yet.
+    /// Thread time under leases that are not answered yet.
     #[cfg(test)]
     pub(super) fn unsettled(&self) -> u64 {
         self.thread_time(self.open)
     }
 
-    /// What an answer claims of the time that its lease was held. The worker says how long the lease lay with it and how
-    /// long it was at it, the master knows how long it took the pixels in; the rest of the time, something was on the wire.
+    /// The claim of a reply on the time for which its lease was held. The worker reports its waiting and rendering, the
+    /// master measures the decoding; in the rest of the time, leases or pixels were on the wire.
     fn claim(&self, answer: Answer, held: Duration) -> Claim {
         let Answer { trace_ns, encode_ns, wait_ns, span_ns, decode } = answer;
         let known = Duration::from_nanos(wait_ns.saturating_add(span_ns)).saturating_add(decode);

@@ -1,25 +1,25 @@
-//! Where did my frames per second go? What every render thread of every worker did with its time.
+//! Accounting: how each render thread of each worker spends its time.
 //!
-//! Pure: what happened comes in with its time, accounts come out. No clock, no socket.
+//! Pure: events come in with their time, accounts come out. No clock, no socket.
 //!
-//! The whole is *thread time*: a worker with four render threads that is connected for a second has four seconds to
-//! spend. Each nanosecond of it is put down to one part, so the parts of a worker sum to 100 % by construction:
+//! The whole is *thread time*: a worker with four render threads that is connected for one second has four seconds of it.
+//! Each nanosecond is attributed to one part, so the parts of a worker sum to 100 % by construction:
 //!
 //! | part | the worker's threads ... |
 //! | --- | --- |
-//! | trace | rendered rows that came into a picture, or that verified others, as the worker measures it |
-//! | encode | made these rows small for the wire, as the worker measures it |
-//! | decode | had nothing to do while the master took their pixels in |
-//! | send | had nothing to do while leases or pixels were on the wire |
-//! | wait | had nothing to do though the worker held leases (they waited for the frame to be prepared, or threads ran out of rows before others did), or because no frame was asked for |
-//! | idle tail | had no rows while a frame was finished by others, or rendered rows in vain: others were faster, or nobody wanted them any more |
-//! | scene | waited for the scene: from the worker's request for an asset until it answers a lease, less what it traced |
+//! | trace | rendered rows for a picture or for a verification, as measured by the worker |
+//! | encode | encoded these rows, as measured by the worker |
+//! | decode | were idle while the master decoded their pixels |
+//! | send | were idle while leases or pixels were on the wire |
+//! | wait | were idle although the worker held leases (its frame was being prepared, or some threads ran out of rows earlier than others), or because no frame was requested |
+//! | idle tail | had no rows while other workers finished a frame, or rendered rows in vain: another worker was faster, or the frame was dropped |
+//! | scene | waited for the scene: from the worker's request for an asset until it replies to a lease, minus what it traced |
 //!
-//! What is hidden costs nothing: a thread that traces while pixels of its worker are on the wire traces. So `send`
-//! and `decode` are what a better link and a faster master could win at most.
+//! Overlapped time costs nothing: a thread that traces while pixels of its worker are on the wire counts as tracing. So
+//! `send` and `decode` are upper bounds of what a faster link and a faster master can gain.
 //!
-//! A frame's account covers the time from the frame before it to the moment it is done. Time under a lease is put
-//! down when the lease is answered, for only then it is known what became of it: it counts for the frame that is done next.
+//! The account of a frame covers the time from the end of the previous frame to its own. Time under a lease is attributed
+//! when the lease is answered, because its use is unknown before: it counts for the frame that is finished next.
 
 mod accounts;
 mod fading;
@@ -36,7 +36,7 @@ mod tests;
 pub(crate) use accounts::Accounts;
 pub use accounts::{FrameAccount, SegmentNote, WorkerAccount};
 pub use fading::{Fading, Smoothed};
-pub use pace::spoken;
+pub use pace::duration_text;
 pub use parts::{PART_COUNT, PART_NAMES, Parts};
 pub use run::{AccountReport, Percent, RunAccount, WorkerReport};
-pub use timeline_file::{TimelineError, TraceFile, TraceSink};
+pub use timeline_file::{TimelineError, TimelineFile, TimelineSink};

@@ -1,24 +1,24 @@
-//! How fast a run has been lately, and how long the rest of it takes at that pace.
+//! The recent frame rate of a run, and the predicted time of the rest.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How far the estimate looks back.
+/// Time over which the rate is averaged.
 const WINDOW: Duration = Duration::from_secs(20);
-/// Samples that are closer together count as one.
+/// Samples that are closer together are merged.
 const STEP: Duration = Duration::from_millis(100);
-/// What is not known after so short a time.
-const LEAST: Duration = Duration::from_millis(500);
+/// Shortest time after which a rate is known.
+const MIN_TIME: Duration = Duration::from_millis(500);
 
-/// Frames done over time. Times are since any fixed moment, and grow; frames may be fractions.
+/// Finished frames over time. Times are durations since a fixed moment and never decrease; frames may be fractions.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pace {
-    /// When, and how many were done then; the first is the newest from before the window.
+    /// Times with the frames finished by then. The first is the newest sample from before the window.
     samples: VecDeque<(Duration, f64)>,
 }
 
 impl Pace {
-    /// That number of frames is done at that moment; the first call marks the beginning.
+    /// Notes that `done` frames are finished at `at`. The first call marks the start.
     pub(crate) fn note(&mut self, at: Duration, done: f64) {
         let recent = self.samples.len() > 1
             && self.samples.back().is_some_and(|(then, _)| at.saturating_sub(*then) < STEP);
@@ -31,22 +31,22 @@ impl Pace {
         }
     }
 
-    /// Frames a second up to now, with `done` frames; 0 while that is not known.
+    /// Frames per second up to now, with `done` frames finished; 0 while unknown.
     pub(crate) fn per_second(&self, now: Duration, done: f64) -> f64 {
         let Some((then, done_then)) = self.samples.front() else { return 0.0 };
         let passed = now.saturating_sub(*then);
-        if passed < LEAST { 0.0 } else { ((done - done_then) / passed.as_secs_f64()).max(0.0) }
+        if passed < MIN_TIME { 0.0 } else { ((done - done_then) / passed.as_secs_f64()).max(0.0) }
     }
 
-    /// How long the rest of `total` frames takes, if that is known.
+    /// Predicted time for the rest of `total` frames; `None` while unknown.
     pub(crate) fn left(&self, now: Duration, done: f64, total: f64) -> Option<Duration> {
         let seconds = (total - done).max(0.0) / self.per_second(now, done);
         Duration::try_from_secs_f64(seconds).ok()
     }
 }
 
-/// A duration as people say it: `45 s`, `12 min 30 s`, `3 h 5 min`, `2 d 4 h`.
-pub fn spoken(time: Duration) -> String {
+/// A duration as text: `45 s`, `12 min 30 s`, `3 h 5 min`, `2 d 4 h`.
+pub fn duration_text(time: Duration) -> String {
     let seconds = time.as_secs_f64().round() as u64;
     let (minutes, hours) = (seconds / 60, seconds / 3600);
     match () {
@@ -64,7 +64,7 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     #[test]
-    fn a_steady_run_tells_its_end() {
+    fn the_end_of_a_steady_run_is_predicted() {
         let mut pace = Pace::default();
         for second in 0..=30u32 {
             pace.note(SECOND * second, f64::from(second) * 2.0);
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_the_only_frame_is_enough() {
+    fn a_part_of_a_frame_is_enough_for_a_prediction() {
         let mut pace = Pace::default();
         pace.note(SECOND * 5, 0.0);
         assert_eq!(pace.left(SECOND * 15, 0.25, 1.0), Some(SECOND * 30));
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn it_follows_a_change_and_a_standstill() {
+    fn the_rate_follows_changes_and_drops_when_the_run_stops() {
         let mut pace = Pace::default();
         for tenth in 0..1000u32 {
             pace.note(SECOND * tenth / 10, f64::from(tenth));
@@ -106,8 +106,9 @@ mod tests {
     }
 
     #[test]
-    fn durations_are_spoken() {
-        let words = [0, 45, 60, 750, 11_100, 187_200].map(|seconds| spoken(Duration::from_secs(seconds)));
-        assert_eq!(words, ["0 s", "45 s", "1 min 0 s", "12 min 30 s", "3 h 5 min", "2 d 4 h"]);
+    fn durations_have_two_units_at_most() {
+        let texts =
+            [0, 45, 60, 750, 11_100, 187_200].map(|seconds| duration_text(Duration::from_secs(seconds)));
+        assert_eq!(texts, ["0 s", "45 s", "1 min 0 s", "12 min 30 s", "3 h 5 min", "2 d 4 h"]);
     }
 }

@@ -1,33 +1,32 @@
-//! A sum of time, split into the parts of the account.
+//! Thread time, split into the parts of an account.
 
-/// How many parts there are.
+/// Number of parts.
 pub const PART_COUNT: usize = 7;
 
-/// The parts' names, in the order of [`Parts::values`].
+/// The names of the parts, in the order of [`Parts::percent`].
 pub const PART_NAMES: [&str; PART_COUNT] =
     ["trace", "wait", "encode", "send", "decode", "idle_tail", "scene"];
 
-/// What threads did, in nanoseconds of thread time. See [`crate::accounting`] for what each part is.
+/// Thread time in nanoseconds, by part. [`crate::accounting`] defines the parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Parts {
     /// Rendering.
     pub trace: u64,
-    /// Nothing, with leases at hand or without a frame to render.
+    /// Idle, with leases or without a requested frame.
     pub wait: u64,
-    /// Making pixels small.
+    /// Encoding pixels.
     pub encode: u64,
-    /// Nothing, while something was on the wire.
+    /// Idle, while leases or pixels were on the wire.
     pub send: u64,
-    /// Nothing, while the master took pixels in.
+    /// Idle, while the master decoded pixels.
     pub decode: u64,
-    /// Nothing, or nothing useful, while others finished the frame.
+    /// Idle or rendering in vain, while other workers finished the frame.
     pub idle_tail: u64,
-    /// Nothing, for want of the scene.
+    /// Idle, while the scene was in transfer.
     pub scene: u64,
 }
 
-/// What a worker's answers say about the time since they were asked for, in nanoseconds of thread time. Whatever it
-/// says, no more is put down than has passed.
+/// Claims of a worker's replies about its thread time, in nanoseconds. No more is accepted than has passed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Claim {
     pub(super) trace: u64,
@@ -44,8 +43,7 @@ impl Claim {
         self.send = self.send.saturating_add(other.send);
     }
 
-    /// Splits `budget` nanoseconds: first what the threads did, then what kept them from doing more, then the rest,
-    /// for which nobody has a better name than waiting.
+    /// Splits `budget` nanoseconds: first the work of the threads, then decoding and sending; the rest is waiting.
     pub(super) fn split(self, budget: u64) -> Parts {
         let mut left = budget;
         let mut take = |claimed: u64| {
@@ -60,18 +58,18 @@ impl Claim {
 }
 
 impl Parts {
-    /// In the order of [`PART_NAMES`].
+    /// The parts in the order of [`PART_NAMES`].
     pub(crate) fn values(&self) -> [u64; PART_COUNT] {
         let Self { trace, wait, encode, send, decode, idle_tail, scene } = *self;
         [trace, wait, encode, send, decode, idle_tail, scene]
     }
 
-    /// All thread time, in nanoseconds.
+    /// The total thread time, in nanoseconds.
     pub fn total(&self) -> u64 {
         self.values().into_iter().fold(0, u64::saturating_add)
     }
 
-    /// Adds another account.
+    /// Adds the parts of another account.
     pub(crate) fn add(&mut self, other: &Self) {
         let Self { trace, wait, encode, send, decode, idle_tail, scene } = self;
         let sums = [trace, wait, encode, send, decode, idle_tail, scene];
@@ -80,8 +78,8 @@ impl Parts {
         }
     }
 
-    /// Per cent of the total, in the order of [`PART_NAMES`], rounded to three digits in such a way that they sum to
-    /// 100; all zero where no time has passed.
+    /// Percentages of the total, in the order of [`PART_NAMES`], rounded to three decimals so that they sum to 100; all zero
+    /// where no time has passed.
     pub fn percent(&self) -> [f64; PART_COUNT] {
         const WHOLE: u128 = 100_000;
         let values = self.values().map(u128::from);
@@ -90,7 +88,7 @@ impl Parts {
             return [0.0; PART_COUNT];
         }
         let mut thousandths = values.map(|value| value * WHOLE / total);
-        // The method of largest remainders: what rounding down has left goes to those that lost most.
+        // The largest remainder method: the units lost by rounding down go to the parts with the largest remainders.
         let mut by_remainder: [usize; PART_COUNT] = std::array::from_fn(|part| part);
         by_remainder.sort_by_key(|&part| std::cmp::Reverse(values[part] * WHOLE % total));
         let missing = WHOLE.saturating_sub(thousandths.iter().sum());

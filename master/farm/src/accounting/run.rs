@@ -1,4 +1,4 @@
-//! The account of a whole run: `--json` tells of it.
+//! The account of a whole run, as reported by `--json`.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::accounts::{FrameAccount, WorkerAccount};
 use super::parts::Parts;
 
-/// Workers with an account of their own; beyond that, newcomers share the last one.
+/// Workers with an account of their own; beyond that, new workers share the last one.
 const MAX_WORKERS: usize = 1024;
 
 /// Sums over the frames of a run.
@@ -16,35 +16,35 @@ pub struct RunAccount {
     workers: BTreeMap<u64, WorkerAccount>,
 }
 
-/// What became of the thread time of a run.
+/// How the thread time of a run was spent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AccountReport {
-    /// Of all workers together.
+    /// All workers together.
     pub percent: Percent,
-    /// Of each, in the order in which they came.
+    /// Each worker, in the order in which they connected.
     pub workers: Vec<WorkerReport>,
 }
 
-/// What one worker did.
+/// How the thread time of one worker was spent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorkerReport {
-    /// Number given by the master.
+    /// Number assigned by the master.
     pub id: u64,
-    /// What it calls itself.
+    /// Its name.
     pub name: String,
     /// Its render threads.
     pub threads: u32,
-    /// Its time.
+    /// Its thread time, in parts.
     pub percent: Percent,
-    /// Segments that it answered.
+    /// Segments that it delivered.
     pub segments: u32,
-    /// Their rows.
+    /// Rows of these segments.
     pub rows: u64,
-    /// Bytes of pixels, as they came over the wire.
+    /// Bytes of pixels on the wire.
     pub pixel_bytes: u64,
 }
 
-/// Per cent of thread time; they sum to 100, or are all zero where no time has passed.
+/// Percentages of thread time. They sum to 100, or are all zero where no time has passed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Percent {
     trace: f64,
@@ -79,7 +79,7 @@ impl RunAccount {
         }
     }
 
-    /// As `--json` tells it.
+    /// The report for `--json`.
     pub fn report(&self) -> AccountReport {
         let mut sum = Parts::default();
         self.workers.values().for_each(|worker| sum.add(&worker.parts));
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn any_number_of_workers_takes_bounded_room_and_loses_no_time() {
+    fn memory_is_bounded_and_no_time_is_lost() {
         let mut run = RunAccount::default();
         for id in 0..3 * MAX_WORKERS as u64 {
             run.add(&frame([(id, 1, 0)]));

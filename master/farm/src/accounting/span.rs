@@ -1,23 +1,22 @@
-//! Stretches of time as a timeline shows them.
+//! Marks and spans of a timeline.
 
 use std::time::Duration;
 
 use rayfarm_protocol::{FrameId, Lease};
-
-use super::parts::Parts;
 use rayfarm_scheduler::WorkerId;
 
-/// What a timeline shows, in the order in which it is known. Spans of one track follow each other or lie inside
-/// each other; an outer one comes before those inside.
+use super::parts::Parts;
+
+/// An entry of a timeline. Spans of one track are disjoint or nested; an outer span comes before its inner ones.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Mark {
-    /// A worker has come: its track gets a name.
+    /// The name of a worker's track.
     Named { worker: WorkerId, name: String, threads: u32 },
-    /// Something lasted.
+    /// A span of time.
     Span(Span),
 }
 
-/// A stretch of time on one track.
+/// A span of time on one track.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Span {
     /// The worker whose track it is on; `None` for the master's.
@@ -27,19 +26,19 @@ pub(crate) struct Span {
     pub(crate) what: What,
 }
 
-/// What lasted.
+/// What a span shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum What {
-    /// A frame, from the end of the one before or its own beginning, whichever is later.
+    /// A frame: from the end of the previous frame or its own start, whichever is later, to its end.
     Frame { frame: FrameId, elapsed: Duration },
-    /// A lease, from its grant or the answer before, whichever is later, to its answer.
+    /// A lease: from its grant or the previous reply, whichever is later, to its reply.
     Segment { lease: Lease, bytes: u64 },
     /// A part of the account.
     Part(&'static str),
 }
 
-/// The parts of one stretch of `threads` threads, laid out one after the other: a picture of how long each was, not
-/// of when it happened. They end at `to`; what is missing is at the beginning.
+/// Spans for the parts of one stretch of `threads` threads, one after the other and ending at `to`. They show how long each
+/// part took, not when it happened.
 pub(super) fn laid_out(worker: WorkerId, to: Duration, threads: u64, parts: &Parts) -> Vec<Span> {
     let Parts { trace, wait, encode, send, decode, idle_tail, scene } = *parts;
     let in_order = [

@@ -1,11 +1,11 @@
-//! `--trace FILE`: the timeline of a run as trace events, for Perfetto or chrome://tracing.
+//! A file with the timeline of a run, as trace events for Perfetto or chrome://tracing.
 //!
 //! The format is the JSON array of Chrome's trace event format: one track for the master's frames and one for each
 //! worker, complete events (`"ph":"X"`), times in microseconds since the farm was started.
 //!
-//! Whoever has something to tell never waits for the disk: marks go through a bounded queue to a thread that writes,
-//! and what the queue has no room for is left out, and counted. After each piece the array is closed, and the next
-//! piece overwrites the closing: between two writes the file is valid JSON, whatever ends the process there.
+//! Recording never waits for the disk: marks go through a bounded queue to a writing thread, and marks that find the queue
+//! full are dropped and counted. Each write ends with the closing bracket of the array, which the next write overwrites:
+//! the file is valid JSON between two writes, even if the process is killed.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -21,12 +21,12 @@ use serde_json::{Value, json};
 
 use super::span::{Mark, Span, What};
 
-/// Marks between those who tell and the thread that writes.
+/// Capacity of the queue to the writing thread, in marks.
 const QUEUE: usize = 1 << 16;
-/// Marks are written together that come within this time.
+/// Marks that arrive within this time are written together.
 const GATHER: Duration = Duration::from_millis(50);
-/// Bytes that are written at once.
-const PIECE_BYTES: usize = 1 << 18;
+/// Size from which a chunk is written at once.
+const CHUNK_BYTES: usize = 1 << 18;
 const OPENING: &[u8] = b"[\n";
 const CLOSING: &[u8] = b"\n]\n";
 const PROCESS: u32 = 1;
@@ -62,16 +62,16 @@ pub enum TimelineError {
     },
 }
 
-/// A trace that is being written.
-pub struct TraceFile {
-    sink: TraceSink,
+/// A timeline that is being written.
+pub struct TimelineFile {
+    sink: TimelineSink,
     writer: JoinHandle<io::Result<()>>,
     name: String,
 }
 
-/// Where marks go.
+/// The writing thread's queue.
 #[derive(Clone, Debug)]
-pub struct TraceSink {
+pub struct TimelineSink {
     queue: SyncSender<Message>,
     lost: Arc<AtomicU64>,
 }
@@ -82,40 +82,40 @@ enum Message {
     End,
 }
 
-impl TraceFile {
-    /// Creates the file: an empty trace, which is valid already.
+impl TimelineFile {
+    /// Creates a file with an empty timeline, and starts its writing thread.
     ///
     /// # Errors
-    /// A place that cannot be written, or is no file on a disk.
+    /// The file cannot be written, or is not a regular file.
     pub fn create(path: &Path) -> Result<Self, TimelineError> {
         let name = path.display().to_string();
-        let place = |source| TimelineError::Create { name: name.clone(), source };
-        let file = File::create(path).map_err(place)?;
+        let failed = |source| TimelineError::Create { name: name.clone(), source };
+        let file = File::create(path).map_err(failed)?;
         if !file.metadata().is_ok_and(|metadata| metadata.is_file()) {
             return Err(TimelineError::NotSeekable { name });
         }
-        let mut events = Events::begin(file).map_err(place)?;
+        let mut events = Events::begin(file).map_err(failed)?;
         let (queue, marks) = sync_channel(QUEUE);
-        let sink = TraceSink { queue, lost: Arc::default() };
+        let sink = TimelineSink { queue, lost: Arc::default() };
         let lost = Arc::clone(&sink.lost);
         let writer = std::thread::Builder::new()
-            .name("trace".to_owned())
+            .name("timeline".to_owned())
             .spawn(move || events.write_all(&marks, &lost))
             .map_err(TimelineError::Thread)?;
         Ok(Self { sink, writer, name })
     }
 
-    /// Where marks go.
-    pub fn sink(&self) -> TraceSink {
+    /// A handle to record marks with.
+    pub fn sink(&self) -> TimelineSink {
         self.sink.clone()
     }
 
-    /// Waits until everything told so far is on the disk.
+    /// Writes all recorded marks and closes the file.
     ///
     /// # Errors
-    /// A full disk, for one; what was written before is a valid trace.
+    /// Writing fails, for example because the disk is full. The file then has a valid timeline of earlier events.
     pub fn finish(self) -> Result<(), TimelineError> {
-        // It fails where the thread has ended with an error, which comes next.
+        // Sending fails if the thread has ended with an error, which `join` returns.
         let _ = self.sink.queue.send(Message::End);
         let written = self.writer.join().unwrap_or_else(|_| Err(io::Error::other("the writer failed")));
         let lost = self.sink.lost.load(Relaxed);
@@ -126,34 +126,34 @@ impl TraceFile {
     }
 }
 
-impl TraceSink {
-    /// Takes a mark, or counts it where there is no room.
-    pub(crate) fn tell(&self, mark: Mark) {
+impl TimelineSink {
+    /// Records a mark, or counts it as dropped if the queue is full.
+    pub(crate) fn record(&self, mark: Mark) {
         if self.queue.try_send(Message::Mark(mark)).is_err() {
             self.lost.fetch_add(1, Relaxed);
         }
     }
 }
 
-/// The array of events on its way to the disk.
+/// The JSON array of events.
 struct Events<W> {
     out: W,
-    /// Where the closing stands.
+    /// Offset of the closing bracket in the file.
     end: u64,
-    piece: Vec<u8>,
+    chunk: Vec<u8>,
     empty: bool,
 }
 
 impl<W: Write + Seek> Events<W> {
     fn begin(out: W) -> io::Result<Self> {
-        let mut events = Self { out, end: 0, piece: OPENING.to_vec(), empty: true };
+        let mut events = Self { out, end: 0, chunk: OPENING.to_vec(), empty: true };
         events.add(&metadata("process_name", MASTER_TRACK, json!({ "name": "rayfarm" })));
         events.add(&metadata("thread_name", MASTER_TRACK, json!({ "name": "master: frames" })));
         events.put()?;
         Ok(events)
     }
 
-    /// Writes what comes until the end is told, or nobody is left to tell it.
+    /// Writes marks until [`Message::End`], or until all senders are dropped.
     fn write_all(&mut self, marks: &Receiver<Message>, lost: &AtomicU64) -> io::Result<()> {
         while let Ok(first) = marks.recv() {
             let mut next = Some(first);
@@ -165,7 +165,7 @@ impl<W: Write + Seek> Events<W> {
                         return self.put();
                     }
                 }
-                if self.piece.len() >= PIECE_BYTES {
+                if self.chunk.len() >= CHUNK_BYTES {
                     self.put()?;
                 }
                 next = marks.try_recv().ok();
@@ -195,20 +195,20 @@ impl<W: Write + Seek> Events<W> {
 
     fn add(&mut self, event: &Value) {
         if !std::mem::replace(&mut self.empty, false) {
-            self.piece.extend_from_slice(b",\n");
+            self.chunk.extend_from_slice(b",\n");
         }
-        self.piece.extend_from_slice(event.to_string().as_bytes());
+        self.chunk.extend_from_slice(event.to_string().as_bytes());
     }
 
-    /// Writes the piece and the closing over the closing before.
+    /// Writes the chunk and a closing bracket, over the previous closing bracket.
     fn put(&mut self) -> io::Result<()> {
-        let next_end = self.end + self.piece.len() as u64;
-        self.piece.extend_from_slice(CLOSING);
+        let next_end = self.end + self.chunk.len() as u64;
+        self.chunk.extend_from_slice(CLOSING);
         self.out.seek(SeekFrom::Start(self.end))?;
-        self.out.write_all(&self.piece)?;
+        self.out.write_all(&self.chunk)?;
         self.out.flush()?;
         self.end = next_end;
-        self.piece.clear();
+        self.chunk.clear();
         Ok(())
     }
 }
@@ -269,25 +269,25 @@ mod tests {
     }
 
     #[test]
-    fn a_trace_is_valid_from_its_first_byte_to_its_last() {
+    fn a_timeline_is_always_valid() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("trace.json");
-        let trace = TraceFile::create(&path).unwrap();
+        let path = folder.path().join("timeline.json");
+        let timeline = TimelineFile::create(&path).unwrap();
         assert_eq!(parsed(&path).len(), 2);
-        let sink = trace.sink();
+        let sink = timeline.sink();
         let name = "a \"quoted\"\nname".to_owned();
-        sink.tell(Mark::Named { worker: WorkerId(7), name, threads: 2 });
-        (0..100).for_each(|number| sink.tell(frame(number)));
-        trace.finish().unwrap();
+        sink.record(Mark::Named { worker: WorkerId(7), name, threads: 2 });
+        (0..100).for_each(|number| sink.record(frame(number)));
+        timeline.finish().unwrap();
         let events = parsed(&path);
         assert_eq!(events.len(), 2 + 2 + 100);
         assert_eq!(events[2]["args"]["name"], "worker 7: a \"quoted\"\nname, 2 threads");
         assert_eq!((&events[5]["ts"], &events[5]["dur"]), (&json!(1000.0), &json!(1000.5)));
-        sink.tell(frame(1));
+        sink.record(frame(1));
     }
 
     #[test]
-    fn every_piece_leaves_a_whole_array() {
+    fn each_write_leaves_a_valid_array() {
         let mut events = Events::begin(io::Cursor::new(Vec::new())).unwrap();
         for number in 0..20 {
             (0..number % 4).for_each(|_| events.add_mark(&frame(number)));
@@ -298,11 +298,11 @@ mod tests {
     }
 
     #[test]
-    fn places_without_an_end_are_refused() {
+    fn only_regular_files_are_accepted() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(TraceFile::create(folder.path()).is_err());
+        assert!(TimelineFile::create(folder.path()).is_err());
         if cfg!(unix) {
-            let error = TraceFile::create(Path::new("/dev/null")).err().unwrap().to_string();
+            let error = TimelineFile::create(Path::new("/dev/null")).err().unwrap().to_string();
             assert!(error.contains("/dev/null") && error.contains("regular file"), "{error}");
         }
     }

@@ -1,4 +1,5 @@
-//! What workers fetch once and keep: the scene body, the meshes and the textures it names, each under the hash of its bytes.
+//! The assets of a scene, which workers fetch once and keep: the scene body, its meshes and its textures, each under the
+//! hash of its bytes. And their routing and transfers.
 
 pub(crate) mod routing;
 pub(crate) mod transfers;
@@ -16,22 +17,22 @@ use rayfarm_tracer::texture::{Texture, TextureId};
 
 pub use transfers::TransferStatus;
 
-/// Why a scene cannot be sent.
+/// An error that keeps a scene from being sent.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
-    /// The scene has no encoding.
+    /// Encoding the scene failed.
     #[error("cannot encode the scene for the workers: {0}")]
     Encode(#[from] CodecError),
 
-    /// The scene body is longer than a worker reads.
+    /// The scene body is longer than workers accept.
     #[error(
-        "the scene without its meshes takes {bytes} bytes, workers take at most {limit}; \
+        "the scene without its meshes takes {bytes} bytes, workers accept at most {limit}; \
          move single [[triangle]]s into an OBJ file"
     )]
     SceneTooLong {
-        /// Its length.
+        /// Its length in bytes.
         bytes: usize,
-        /// The bound.
+        /// The bound in bytes.
         limit: usize,
     },
 
@@ -40,29 +41,29 @@ pub enum AssetError {
         "a compiled mesh takes {bytes} bytes, an asset at most {limit}; split the model into several files"
     )]
     MeshTooLong {
-        /// Its length.
+        /// Its length in bytes.
         bytes: usize,
-        /// The bound.
+        /// The bound in bytes.
         limit: u64,
     },
 
-    /// The scene names a mesh that was not given.
-    #[error("the scene names the mesh {0}, which was not loaded with it")]
+    /// The scene refers to a mesh that is not among the given ones.
+    #[error("the scene refers to the mesh {0}, which is not loaded")]
     MissingMesh(AssetId),
 
-    /// The scene names a texture that was not given.
-    #[error("the scene names the texture {0}, which was not loaded with it")]
+    /// The scene refers to a texture that is not among the given ones.
+    #[error("the scene refers to the texture {0}, which is not loaded")]
     MissingTexture(AssetId),
 }
 
-/// The assets of one scene. Bytes are shared with whoever sends them, never copied.
+/// The assets of one scene. Their bytes are shared with the senders, never copied.
 #[derive(Debug)]
 pub struct Assets {
     scene: AssetId,
     blobs: BTreeMap<AssetId, Bytes>,
 }
 
-/// A compiled mesh as the owner of its bytes: 100 MB lie in memory once, however many workers fetch them.
+/// A compiled mesh as the owner of its bytes: all transfers share one copy in memory.
 struct MeshBytes(Arc<CompiledMesh>);
 
 impl AsRef<[u8]> for MeshBytes {
@@ -71,7 +72,7 @@ impl AsRef<[u8]> for MeshBytes {
     }
 }
 
-/// A texture, likewise.
+/// A texture as the owner of its bytes.
 struct TextureBytes(Arc<Texture>);
 
 impl AsRef<[u8]> for TextureBytes {
@@ -81,7 +82,10 @@ impl AsRef<[u8]> for TextureBytes {
 }
 
 impl Assets {
-    /// The scene's body, and those of `meshes` and `textures` that it names.
+    /// The scene's body, and those of `meshes` and `textures` that it refers to.
+    ///
+    /// # Errors
+    /// The scene or a mesh is too long, or one that it refers to is missing.
     pub fn new(
         scene: &Scene,
         meshes: Vec<Arc<CompiledMesh>>,
@@ -115,17 +119,17 @@ impl Assets {
         }
     }
 
-    /// The name of the scene body.
+    /// The hash of the scene body.
     pub fn scene(&self) -> AssetId {
         self.scene
     }
 
-    /// Bytes of all of them together.
+    /// The size of all assets together, in bytes.
     pub fn total_bytes(&self) -> usize {
         self.blobs.values().map(Bytes::len).sum()
     }
 
-    /// An asset's bytes.
+    /// The bytes of an asset; `None` if it is no asset of this scene.
     pub fn get(&self, id: AssetId) -> Option<Bytes> {
         self.blobs.get(&id).cloned()
     }
@@ -165,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn assets_bear_the_hash_of_their_bytes_and_share_the_mesh() {
+    fn assets_are_named_by_their_hash_and_share_the_mesh() {
         let mesh = triangle();
         let scene = scene_with(mesh.id());
         let assets = Assets::new(&scene, vec![mesh.clone(), mesh.clone()], Vec::new()).unwrap();
@@ -177,14 +181,14 @@ mod tests {
     }
 
     #[test]
-    fn meshes_that_nobody_names_are_left_out() {
+    fn unused_meshes_are_left_out() {
         let mesh = triangle();
         let assets = Assets::new(&test_scene::scene(), vec![mesh.clone()], Vec::new()).unwrap();
         assert_eq!(assets.get(AssetId(mesh.id().0)), None);
     }
 
     #[test]
-    fn textures_that_the_scene_names_are_shared_and_missing_ones_named() {
+    fn textures_are_shared_and_missing_ones_reported() {
         let texture = |red| {
             let picture = RgbImage { width: 1, height: 1, pixels: vec![red, 0, 0] };
             Arc::new(Texture::new(&picture).unwrap())
@@ -202,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_mesh_is_named() {
+    fn a_missing_mesh_is_reported() {
         let error = Assets::new(&scene_with(MeshId([0xab; 32])), Vec::new(), Vec::new()).unwrap_err();
         assert!(error.to_string().contains("abababab"), "{error}");
     }

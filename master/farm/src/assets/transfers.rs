@@ -1,36 +1,36 @@
-//! How much of the scene is at a worker: assets that it has requested, and the bytes of them that are on their way.
+//! Progress of asset transfers: what each worker has requested, and the bytes of it that were sent.
 
 use std::collections::BTreeMap;
 
 use rayfarm_protocol::AssetId;
 
-/// The assets of one session.
+/// The transfers of one session.
 #[derive(Debug, Default)]
 pub(crate) struct Transfers {
-    /// Bytes of each asset, and those that were sent.
+    /// For each asset in transfer its size and the bytes sent, in bytes.
     pending: BTreeMap<AssetId, (u64, u64)>,
-    /// Bytes of those that are complete.
+    /// Size of the completed assets, in bytes.
     complete: u64,
 }
 
-/// How far transfers are.
+/// Progress of the transfers to all workers that wait for a part of the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TransferStatus {
-    /// Workers that wait for a part of the scene.
+    /// Number of these workers.
     pub workers: u32,
-    /// Bytes that they have.
+    /// Bytes that they have received.
     pub done: u64,
     /// Bytes that they have requested.
     pub total: u64,
 }
 
 impl Transfers {
-    /// The worker requests the rest of an asset of `size` bytes.
+    /// Adds a request for an asset of `size` bytes from `offset` on.
     pub(crate) fn requested(&mut self, id: AssetId, size: u64, offset: u64) {
         self.pending.insert(id, (size, offset.min(size)));
     }
 
-    /// All bytes up to `end` are sent.
+    /// Notes that all bytes of an asset up to `end` are sent.
     pub(crate) fn sent(&mut self, id: AssetId, end: u64) {
         let Some((size, done)) = self.pending.get_mut(&id) else { return };
         *done = end.min(*size);
@@ -39,14 +39,14 @@ impl Transfers {
         }
     }
 
-    /// The worker has the asset, from wherever.
+    /// Notes that the worker has an asset, from any source.
     pub(crate) fn complete(&mut self, id: AssetId) {
         if let Some((size, _)) = self.pending.remove(&id) {
             self.complete += size;
         }
     }
 
-    /// Adds what this worker waits for, if it does.
+    /// Adds this session to `status`, if it waits for anything.
     pub(crate) fn add_to(&self, status: &mut TransferStatus) {
         if self.pending.is_empty() {
             return;
@@ -60,8 +60,8 @@ impl Transfers {
 }
 
 impl TransferStatus {
-    /// In words, if there is anything to wait for.
-    pub fn words(&self) -> Option<String> {
+    /// A text for progress lines; `None` if no worker waits.
+    pub fn to_text(&self) -> Option<String> {
         if self.workers == 0 || self.total == 0 {
             return None;
         }
@@ -87,19 +87,19 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_counted_until_all_are_there() {
+    fn bytes_are_counted_until_the_transfer_is_complete() {
         let (mut one, mut other) = (Transfers::default(), Transfers::default());
-        assert_eq!(status(&[&one, &other]).words(), None);
+        assert_eq!(status(&[&one, &other]).to_text(), None);
         one.requested(A, 1_000_000, 0);
         one.requested(B, 3_000_000, 500_000);
         one.sent(A, 500_000);
         let half = TransferStatus { workers: 1, done: 1_000_000, total: 4_000_000 };
         assert_eq!(status(&[&one, &other]), half);
-        assert_eq!(half.words().unwrap(), "scene to 1 worker: 25 % of 4.0 MB");
+        assert_eq!(half.to_text().unwrap(), "scene to 1 worker: 25 % of 4.0 MB");
         one.sent(A, 1_000_000);
         assert_eq!(status(&[&one]), TransferStatus { done: 1_500_000, ..half });
         other.requested(A, 1_000_000, 0);
-        assert_eq!(status(&[&one, &other]).words().unwrap(), "scene to 2 workers: 30 % of 5.0 MB");
+        assert_eq!(status(&[&one, &other]).to_text().unwrap(), "scene to 2 workers: 30 % of 5.0 MB");
         one.sent(B, u64::MAX);
         other.complete(A);
         assert_eq!(status(&[&one, &other]), TransferStatus::default());

@@ -1,32 +1,32 @@
-//! What workers answer: pixels into their place, or beside what is there; failures.
+//! Replies of workers: pixels for the picture, pixels to verify, failures.
 
 use rayfarm_protocol::{Cost, FrameId, Lease, PixelsHeader};
+use rayfarm_scheduler::{Event, WorkerId};
 use rayfarm_tracer::scene::FrameView;
 
 use super::Driver;
 use crate::framebuffer::{Misfit, Written};
-use crate::sessions::lease_book::Standing;
-use rayfarm_scheduler::{Event, WorkerId};
+use crate::sessions::lease_book::LeaseStatus;
 
-/// Why an answer ends its session.
+/// An error in a reply, which ends its session.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum AnswerError {
-    /// The worker answers what it was not asked.
+    /// The worker does not hold the lease.
     #[error("it sent pixels of {0}, which it does not hold")]
     NotHeld(Lease),
-    /// The pixels do not fit.
+    /// The pixels do not fit the lease.
     #[error("its pixels do not fit: {0}")]
     Misfit(#[from] Misfit),
 }
 
-/// Rows whose rays may be counted with a lease although they are not in it: those of a band of tiles at either end.
+/// Rows beyond those of a lease whose rays a worker may count with it: one band of tiles at either end.
 const MORE_ROWS: u64 = 32;
-/// Rays for a pixel beyond its samples: at its corners and through its centre.
+/// Primary rays of a pixel beyond its samples: at its corners and through its centre.
 const MORE_RAYS: u64 = 4;
-/// Rays that one ray may lead to: more lights or bounces no picture waits for.
+/// Upper bound of the rays that follow from one primary ray, by lights and bounces.
 const RAYS_FROM_ONE: u64 = 1 << 16;
 
-/// A cost with no more rays than rows of a view can take: a worker may claim any number.
+/// Limits the ray counts of a reply, which a worker may set to any number, to what rows of a view can take.
 fn plausible(cost: Cost, view: &FrameView, rows: u32) -> Cost {
     let pixels = u64::from(view.width).saturating_mul(u64::from(rows) + MORE_ROWS);
     let primary = pixels.saturating_mul(u64::from(view.samples) + MORE_RAYS);
@@ -40,8 +40,10 @@ fn plausible(cost: Cost, view: &FrameView, rows: u32) -> Cost {
 }
 
 impl Driver {
-    /// Pixels have arrived: checks them against what this very worker holds, and puts them into the picture. They
-    /// are there before the scheduler hears of them.
+    /// Handles pixels: checks their lease, writes them into the picture, and then reports them to the scheduler.
+    ///
+    /// # Errors
+    /// The worker does not hold the lease, or the pixels do not fit it.
     pub(crate) fn pixels(
         &self,
         worker: WorkerId,
@@ -49,35 +51,35 @@ impl Driver {
         bytes: &[u8],
     ) -> Result<(), AnswerError> {
         let PixelsHeader { lease, encoding, cost } = header;
-        let standing = match self.lock().roster.get_mut(worker) {
-            Some(session) => session.leases.answer(&lease),
-            None => Standing::Revoked,
+        let status = match self.lock().sessions.get_mut(worker) {
+            Some(session) => session.leases.check_reply(&lease),
+            None => LeaseStatus::Revoked,
         };
-        match standing {
-            Standing::Granted => match self.framebuffers.write(worker, lease, encoding, bytes)? {
+        match status {
+            LeaseStatus::Granted => match self.framebuffers.write(worker, lease, encoding, bytes)? {
                 Written::Kept { decode } => {
                     let mut inner = self.lock();
-                    inner.accounts.taken_in(worker, bytes.len(), decode);
-                    let view = inner.views.get(&lease.frame).map(|requested| requested.view);
+                    inner.accounts.received(worker, bytes.len(), decode);
+                    let view = inner.requests.get(&lease.frame).map(|request| request.view);
                     let cost = view.map_or(cost, |view| plausible(cost, &view, lease.row_count));
                     self.drive(&mut inner, Event::SegmentDone { worker, lease, cost });
                 }
                 Written::Superseded => {}
             },
-            Standing::Verifying => self.verify(worker, header, bytes)?,
-            Standing::Revoked => {}
-            Standing::Unknown => return Err(AnswerError::NotHeld(lease)),
+            LeaseStatus::Verifying => self.verify(worker, header, bytes)?,
+            LeaseStatus::Revoked => {}
+            LeaseStatus::Unknown => return Err(AnswerError::NotHeld(lease)),
         }
         Ok(())
     }
 
-    /// A worker cannot render a frame.
+    /// Handles a worker's report that it cannot render a frame.
     pub(crate) fn failed(&self, worker: WorkerId, frame: FrameId, reason: String) {
         let mut inner = self.lock();
-        if let Some(session) = inner.roster.get_mut(worker) {
+        if let Some(session) = inner.sessions.get_mut(worker) {
             session.leases.fail(frame);
             tracing::warn!("{worker} ({}) cannot render frame {frame}: {reason}", session.hello.name);
-            session.trouble = Some(reason);
+            session.last_failure = Some(reason);
         }
         self.drive(&mut inner, Event::WorkerFailed { worker, frame });
     }
@@ -89,7 +91,7 @@ mod tests {
     use crate::testing::test_scene::view;
 
     #[test]
-    fn a_claim_of_more_rays_than_rows_can_take_is_cut() {
+    fn ray_counts_are_limited_to_what_the_rows_can_take() {
         let honest = Cost { trace_ns: 9, primary: 100, shadow: 300, secondary: 50, ..Cost::default() };
         assert_eq!(plausible(honest, &view(), 1), honest);
         let absurd = Cost { primary: u64::MAX, shadow: u64::MAX, secondary: u64::MAX, ..honest };

@@ -1,7 +1,7 @@
-//! Drives the scheduler: the one reader of the clock. Events go in, actions come out and are performed at once.
+//! The driver: passes events to the scheduler and performs its actions. Only the driver reads the clock.
 //!
-//! Whoever has an event (a session, the timer, a request) brings it itself, under one lock and without waiting for
-//! anything: messages to workers go into bounded queues, and a worker whose queue is full is let go.
+//! Sessions, the timer and requests call the driver on their own threads. It handles each event under one lock and never
+//! waits there: messages to workers go into bounded queues, and a worker whose queue is full is disconnected.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,34 +10,34 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
 use rayfarm_protocol::{FrameAnnounce, FrameId, codec};
+use rayfarm_scheduler::{Event, Scheduler};
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::tile_rows;
 use tokio::sync::{Notify, mpsc};
 use tokio_util::sync::CancellationToken;
 
-use crate::accounting::{Accounts, TraceSink};
-use crate::assets::Assets;
-use crate::verification::delivered::{Delivered, FrameSet};
-use crate::error::FarmError;
-use crate::finished::FinishedFrame;
-use crate::options::FarmOptions;
-use crate::framebuffer::Framebuffers;
-use crate::sessions::identity::Tickets;
-use crate::verification::arbiter::Case;
-use crate::accounting::pace::Pace;
-use crate::sessions::{ByteCount, Roster};
-use rayfarm_scheduler::{Event, Scheduler};
-use crate::verification::open_segments::Seals;
-
 mod answers;
 mod perform;
 mod routing;
-mod verify;
+mod verification;
 mod workers;
+
+use crate::accounting::pace::Pace;
+use crate::accounting::{Accounts, TimelineSink};
+use crate::assets::Assets;
+use crate::error::FarmError;
+use crate::finished::FinishedFrame;
+use crate::framebuffer::Framebuffers;
+use crate::options::FarmOptions;
+use crate::sessions::identity::Tickets;
+use crate::sessions::{ByteCount, Sessions};
+use crate::verification::OpenSegments;
+use crate::verification::arbiter::Dispute;
+use crate::verification::delivered::{Delivered, FrameSet};
 
 pub(crate) use answers::AnswerError;
 
-/// Finished frames that wait to be fetched. Beyond that, the oldest is thrown away.
+/// Finished frames that wait to be fetched. Beyond that, the oldest is dropped.
 const MAX_UNFETCHED: usize = 8;
 
 /// The farm's state and its clock.
@@ -46,44 +46,44 @@ pub(crate) struct Driver {
     pub(crate) assets: Assets,
     framebuffers: Arc<Framebuffers>,
     inner: Mutex<Inner>,
-    /// The scheduler wants to be woken earlier than before.
+    /// Notified when the scheduler's next timeout is earlier than the armed one.
     rearm: Notify,
-    /// There is a finished frame, or a reason why there will be none.
+    /// Notified when there is a result to fetch.
     finished: Notify,
-    /// There is nothing more to verify.
+    /// Notified when no segment is left to verify.
     verified: Notify,
-    /// Rows that the master is to trace itself; no more than there are open audits.
-    court: mpsc::UnboundedSender<Case>,
-    /// What the workers' keys are made of; without it, nothing is passed on.
+    /// Disputes for the arbiter; no more than there are open segments.
+    arbiter_queue: mpsc::UnboundedSender<Dispute>,
+    /// The key from which the workers' own keys are derived; without it, no assets are passed from worker to worker.
     secret: Option<[u8; 32]>,
-    /// What local workers introduce themselves with.
+    /// The secret names of local workers.
     pub(crate) tickets: Tickets,
 }
 
 struct Inner {
     scheduler: Scheduler,
     accounts: Accounts,
-    trace: Option<TraceSink>,
-    roster: Roster,
-    seals: Seals,
+    timeline: Option<TimelineSink>,
+    sessions: Sessions,
+    open_segments: OpenSegments,
     delivered: Delivered,
-    /// What the frames that wait or are in flight show.
-    views: BTreeMap<FrameId, Requested>,
+    /// The requested frames that wait or are in flight.
+    requests: BTreeMap<FrameId, Request>,
     unfetched: VecDeque<Result<FinishedFrame, FarmError>>,
     last_frame: u64,
     last_worker: u64,
     run: Run,
-    /// All traffic up to the frame before.
+    /// All traffic up to the last finished frame.
     counted: ByteCount,
     armed_for: Option<Duration>,
-    /// Whether goodbye has been said to everybody.
+    /// Whether the farm is shutting down: no worker is admitted any more.
     is_ending: bool,
 }
 
 /// Sums over the run.
 #[derive(Debug, Default)]
 struct Run {
-    /// Frames of all of it, where that is known.
+    /// Frames of the whole run, where known.
     frames: Option<u64>,
     done: u64,
     /// When the first frame was requested.
@@ -91,39 +91,39 @@ struct Run {
     pace: Pace,
 }
 
-/// A frame that was asked for.
-struct Requested {
+/// A requested frame.
+struct Request {
     view: FrameView,
     announce: FrameAnnounce,
-    /// On the driver's clock.
+    /// Time of the request, on the driver's clock.
     at: Duration,
 }
 
 impl Driver {
-    /// `court`: whoever traces rows for the master itself.
+    /// A driver without sessions and frames. Disputes about pixels go to `arbiter_queue`.
     ///
     /// # Errors
-    /// Segments are to be verified, and the system gives no random numbers to draw them with.
+    /// [`FarmError::Random`], when segments are to be verified and the system gives no random numbers.
     pub(crate) fn new(
         options: &FarmOptions,
         assets: Assets,
-        court: mpsc::UnboundedSender<Case>,
+        arbiter_queue: mpsc::UnboundedSender<Dispute>,
     ) -> Result<Self, FarmError> {
-        let lots = match options.verify_percent {
+        let key = match options.verify_percent {
             0 => [0; 32],
             _ => random().map_err(FarmError::Random)?,
         };
         let scheduler = Scheduler::new(options.policy, MAX_PIXELS_BYTES as u64)
             .with_pipeline(!options.sequential)
-            .with_verification(options.verify_percent, lots);
+            .with_verification(options.verify_percent, key);
         let inner = Inner {
             scheduler,
             accounts: Accounts::default(),
-            trace: None,
-            roster: Roster::default(),
-            seals: Seals::default(),
+            timeline: None,
+            sessions: Sessions::default(),
+            open_segments: OpenSegments::default(),
             delivered: Delivered::default(),
-            views: BTreeMap::new(),
+            requests: BTreeMap::new(),
             unfetched: VecDeque::new(),
             last_frame: 0,
             last_worker: 0,
@@ -141,13 +141,13 @@ impl Driver {
             rearm: Notify::new(),
             finished: Notify::new(),
             verified: Notify::new(),
-            court,
+            arbiter_queue,
             tickets: Tickets::new(secret.as_ref(), options.local_workers),
             secret,
         })
     }
 
-    /// Wakes the scheduler when it wants to be woken, until `stop`.
+    /// Reports the scheduler's timeouts to it, until `stop`.
     pub(crate) async fn keep_time(&self, stop: CancellationToken) {
         loop {
             let wait =
@@ -166,7 +166,7 @@ impl Driver {
         }
     }
 
-    /// Tells the scheduler the time, if it is the time it wanted.
+    /// Reports the timeout to the scheduler, if it is due.
     fn wake(&self) {
         let mut inner = self.lock();
         inner.armed_for = None;
@@ -175,12 +175,12 @@ impl Driver {
         }
     }
 
-    /// Brings an event.
+    /// Handles an event.
     pub(crate) fn handle(&self, event: Event) {
         self.drive(&mut self.lock(), event);
     }
 
-    /// Asks for a frame. One that cannot be asked for is reported by [`Self::next_finished`].
+    /// Requests a frame. A view that cannot be rendered is reported by [`Self::next_finished`].
     pub(crate) fn request(&self, view: FrameView) -> FrameId {
         let mut inner = self.lock();
         inner.last_frame += 1;
@@ -193,22 +193,22 @@ impl Driver {
         match self.announcement(frame, &view) {
             Ok(announce) => {
                 let (FrameView { width, height, .. }, tile_rows) = (view, tile_rows(&view));
-                inner.views.insert(frame, Requested { view, announce, at: self.started.elapsed() });
+                inner.requests.insert(frame, Request { view, announce, at: self.started.elapsed() });
                 self.drive(&mut inner, Event::FrameRequested { frame, width, height, tile_rows });
             }
-            Err(error) => self.hand_out(&mut inner, Err(error)),
+            Err(error) => self.deliver(&mut inner, Err(error)),
         }
         frame
     }
 
-    /// Nobody wants the frames that were asked for so far.
-    pub(crate) fn give_up(&self) {
+    /// Drops all frames that were requested so far.
+    pub(crate) fn drop_requests(&self) {
         let mut inner = self.lock();
         let next = FrameId(inner.last_frame + 1);
         self.drive(&mut inner, Event::RequestsGivenUp { next });
     }
 
-    /// A frame as the workers are told of it: serialised once, the same bytes for all.
+    /// The announcement of a frame: serialised once, the same bytes for all workers.
     fn announcement(&self, frame: FrameId, view: &FrameView) -> Result<FrameAnnounce, FarmError> {
         view.validate().map_err(FarmError::View)?;
         let bytes = codec::encode(view).map_err(|error| FarmError::Assets(error.into()))?;
@@ -216,41 +216,41 @@ impl Driver {
         Ok(FrameAnnounce { frame, scene: self.assets.scene(), width, height, view: Bytes::from(bytes) })
     }
 
-    /// Waits for the next finished frame, or the reason why there is none.
+    /// Waits for the next finished frame or error.
     pub(crate) async fn next_finished(&self) -> Result<FinishedFrame, FarmError> {
         loop {
-            if let Some(frame) = self.lock().unfetched.pop_front() {
-                return frame;
+            if let Some(result) = self.lock().unfetched.pop_front() {
+                return result;
             }
             self.finished.notified().await;
         }
     }
 
-    /// Waits until nothing is left to verify.
+    /// Waits until no segment is left to verify.
     pub(crate) async fn all_verified(&self) {
         while self.lock().scheduler.verification().open > 0 {
             self.verified.notified().await;
         }
     }
 
-    /// Finished frames with rows of workers that were found to send wrong pixels.
+    /// Finished frames with rows of workers that have sent wrong pixels.
     pub(crate) fn wrong_frames(&self) -> FrameSet {
         self.lock().delivered.wrong().clone()
     }
 
-    /// Reports something that callers must hear of.
+    /// Delivers an error to the caller of [`Self::next_finished`].
     pub(crate) fn report(&self, error: FarmError) {
-        self.hand_out(&mut self.lock(), Err(error));
+        self.deliver(&mut self.lock(), Err(error));
     }
 
-    /// Tells a timeline of everything from now on.
-    pub(crate) fn trace_into(&self, sink: TraceSink) {
+    /// Records a timeline of everything from now on.
+    pub(crate) fn record_timeline(&self, sink: TimelineSink) {
         let mut inner = self.lock();
         inner.accounts.keep_marks();
-        inner.trace = Some(sink);
+        inner.timeline = Some(sink);
     }
 
-    /// One event, and all that follows from it.
+    /// Handles an event and all events that follow from it.
     fn drive(&self, inner: &mut Inner, event: Event) {
         let mut events = VecDeque::from([event]);
         while let Some(event) = events.pop_front() {
@@ -265,40 +265,40 @@ impl Driver {
         if inner.scheduler.verification().open == 0 {
             self.verified.notify_one();
         }
-        if let Some(trace) = &inner.trace {
-            std::iter::from_fn(|| inner.accounts.poll_mark()).for_each(|mark| trace.tell(mark));
+        if let Some(timeline) = &inner.timeline {
+            std::iter::from_fn(|| inner.accounts.poll_mark()).for_each(|mark| timeline.record(mark));
         }
-        let wanted = inner.scheduler.poll_timeout();
-        if wanted.is_some_and(|wanted| inner.armed_for.is_none_or(|armed| wanted < armed)) {
-            inner.armed_for = wanted;
+        let timeout = inner.scheduler.poll_timeout();
+        if timeout.is_some_and(|at| inner.armed_for.is_none_or(|armed| at < armed)) {
+            inner.armed_for = timeout;
             self.rearm.notify_one();
         }
     }
 
-    fn hand_out(&self, inner: &mut Inner, result: Result<FinishedFrame, FarmError>) {
+    fn deliver(&self, inner: &mut Inner, result: Result<FinishedFrame, FarmError>) {
         inner.unfetched.push_back(result);
         if inner.unfetched.len() > MAX_UNFETCHED {
             inner.unfetched.pop_front();
-            tracing::warn!("nobody fetches finished frames; the oldest of {MAX_UNFETCHED} is thrown away");
+            tracing::warn!("{MAX_UNFETCHED} finished frames wait to be fetched; the oldest is dropped");
         }
         self.finished.notify_one();
     }
 
-    /// No panic leaves the state half changed in a way that later events could not live with.
+    /// Locks the state. A poisoned lock is used as it is: a panic leaves a state that later events can be handled in.
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Numbers that nobody can guess.
+/// A random key from which keys for workers are derived.
 fn secret() -> Option<[u8; 32]> {
-    let told = |error: &String| tracing::warn!("workers pass no assets on: {error}");
-    random().inspect_err(told).ok()
+    let warn = |error: &String| tracing::warn!("workers pass no assets on: {error}");
+    random().inspect_err(warn).ok()
 }
 
-/// Numbers that only this process knows.
+/// Random bytes from the operating system.
 fn random() -> Result<[u8; 32], String> {
-    let mut numbers = [0; 32];
-    let filled = getrandom::fill(&mut numbers);
-    filled.map(|()| numbers).map_err(|error| format!("the system gives no random numbers: {error}"))
+    let mut bytes = [0; 32];
+    let filled = getrandom::fill(&mut bytes);
+    filled.map(|()| bytes).map_err(|error| format!("the system gives no random numbers: {error}"))
 }

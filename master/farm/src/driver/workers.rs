@@ -1,105 +1,105 @@
-//! Who comes, who goes, and what users want of them.
+//! Workers that join and leave, commands to them, and the farm's status.
 
 use std::time::Duration;
 
 use rayfarm_protocol::Hello;
 use rayfarm_protocol::handshake::Refusal;
+use rayfarm_scheduler::{Event, Return, WorkerId};
 
 use super::{Driver, Inner, Run};
 use crate::assets::TransferStatus;
-use crate::status::{FarmStatus, KickedWorker, RunTotals, WorkerStatus};
 use crate::sessions::identity::{Identity, host};
-use crate::sessions::{Kicked, Session};
-use rayfarm_scheduler::{Event, Return, WorkerId};
+use crate::sessions::{PastWorker, Session};
+use crate::status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
 
-/// Workers that are let in.
+/// Workers that are admitted.
 const MAX_WORKERS: usize = 1024;
 
 impl Driver {
-    /// How many workers are connected.
+    /// Number of connected workers.
     pub(crate) fn worker_count(&self) -> usize {
-        self.lock().roster.len()
+        self.lock().sessions.len()
     }
 
-    /// Whether a session is still wanted.
-    pub(crate) fn knows(&self, worker: WorkerId) -> bool {
-        self.lock().roster.get(worker).is_some()
+    /// Whether a worker's session is current. The master may have ended it before its connection closes.
+    pub(crate) fn is_connected(&self, worker: WorkerId) -> bool {
+        self.lock().sessions.get(worker).is_some()
     }
 
-    /// A number for a new worker.
+    /// The number of the next worker.
     pub(crate) fn next_worker(&self) -> WorkerId {
         let mut inner = self.lock();
         inner.last_worker += 1;
         WorkerId(inner.last_worker)
     }
 
-    /// A session has begun.
+    /// Adds a session after its handshake.
     pub(crate) fn join(&self, worker: WorkerId, session: Session) {
         let Hello { name, threads, .. } = session.hello.clone();
         let host = host(session.address.ip());
         let mut inner = self.lock();
-        inner.roster.add(worker, session);
+        inner.sessions.insert(worker, session);
         self.drive(&mut inner, Event::WorkerJoined { worker, threads, host });
         inner.accounts.name(worker, &name);
     }
 
-    /// Brings what a user wants of a connected worker; `false` if it is not connected.
+    /// Handles a user's command to a worker. Returns whether the worker is connected.
     pub(crate) fn command(&self, worker: WorkerId, event: Event) -> bool {
         let mut inner = self.lock();
-        let known = inner.roster.get(worker).is_some();
+        let known = inner.sessions.get(worker).is_some();
         if known {
             self.drive(&mut inner, event);
         }
         known
     }
 
-    /// Sends a worker away at once and keeps it out; `false` if it is not connected.
-    pub(crate) fn kick(&self, worker: WorkerId, reason: &str) -> bool {
+    /// Disconnects and bans a worker. Returns whether it was connected.
+    pub(crate) fn ban(&self, worker: WorkerId, reason: &str) -> bool {
         let mut inner = self.lock();
-        let known = inner.roster.get(worker).is_some();
+        let known = inner.sessions.get(worker).is_some();
         if known {
-            inner.roster.log_dismissal(worker, reason);
-            inner.roster.bar(worker);
-            inner.roster.end(worker, reason, Return::Unwanted);
+            inner.sessions.log_disconnect(worker, reason);
+            inner.sessions.ban(worker);
+            inner.sessions.disconnect(worker, reason, Return::Unwanted);
             self.drive(&mut inner, Event::WorkerLeft { worker });
         }
         known
     }
 
-    /// Lets kicked workers in again. Returns which.
-    pub(crate) fn allow(&self, which: impl Fn(&Kicked) -> bool) -> Vec<Identity> {
-        self.lock().roster.allow(which)
+    /// Lifts the bans that `which` selects. Returns the identities.
+    pub(crate) fn allow(&self, which: impl Fn(&PastWorker) -> bool) -> Vec<Identity> {
+        self.lock().sessions.allow(which)
     }
 
-    /// Why a worker that shakes hands is not let in, if it is not.
+    /// The reason to refuse a worker in its handshake; `None`: it is admitted.
     pub(crate) fn refusal(&self, identity: &Identity) -> Option<Refusal> {
         let inner = self.lock();
         if inner.is_ending {
             return Some(Refusal::NotNow("the master ends".to_owned()));
         }
-        let count = inner.roster.len();
-        if inner.roster.is_barred(identity) {
+        let count = inner.sessions.len();
+        if inner.sessions.is_banned(identity) {
             return Some(Refusal::Final(format!(
-                "a worker called {} was kicked from this master; it is kept out until the master allows it or ends",
+                "worker {} is banned from this master; the ban ends when the master allows the worker or exits",
                 identity.name()
             )));
         }
-        let full = || Refusal::NotNow(format!("it has {count} workers already, the most it takes"));
+        let full = || Refusal::NotNow(format!("it has {count} workers, its limit"));
         (count >= MAX_WORKERS).then(full)
     }
 
-    /// A session has ended; its worker is told why, where it still listens.
+    /// Removes a session that has ended. The reason is sent to the worker if its connection still works.
     pub(crate) fn leave(&self, worker: WorkerId, reason: &str) {
         let mut inner = self.lock();
-        inner.roster.end(worker, reason, Return::Welcome);
+        inner.sessions.disconnect(worker, reason, Return::Welcome);
         self.drive(&mut inner, Event::WorkerLeft { worker });
     }
 
-    /// A look at everything, for overlays.
+    /// The current status, except for local workers that have exited.
     pub(crate) fn status(&self) -> FarmStatus {
         let inner = self.lock();
         let workers = inner.scheduler.workers().filter_map(|record| {
-            let session = inner.roster.get(record.worker)?;
+            let session = inner.sessions.get(record.worker)?;
             Some(WorkerStatus {
                 id: record.worker.0,
                 name: session.hello.name.clone(),
@@ -109,10 +109,10 @@ impl Driver {
                 segments_done: record.segments_done,
                 speed: record.speed,
                 state: record.state,
-                trouble: session.trouble.clone(),
+                last_failure: session.last_failure.clone(),
             })
         });
-        let kicked = inner.roster.barred().map(|Kicked { worker, identity }| KickedWorker {
+        let banned = inner.sessions.banned().map(|PastWorker { worker, identity }| BannedWorker {
             id: worker.0,
             name: identity.name(),
             address: match identity {
@@ -127,8 +127,8 @@ impl Driver {
             transfers: transfers(&inner),
             totals: self.totals(&inner, part),
             workers: workers.collect(),
-            kicked: kicked.collect(),
-            local_gone: 0,
+            banned: banned.collect(),
+            local_exited: 0,
             frame: progress.map(|progress| progress.frame),
             rows_done: progress.map_or(0, |progress| progress.rows_done),
             rows: progress.map_or(0, |progress| progress.rows),
@@ -138,15 +138,15 @@ impl Driver {
         }
     }
 
-    /// How many frames the run has.
+    /// Sets the number of frames of the run.
     pub(crate) fn expect_frames(&self, frames: u64) {
         self.lock().run.frames = Some(frames);
     }
 
-    /// Sums over the run; `part` of a frame is done beside the complete ones.
+    /// Sums over the run; `part` is the finished share of the frame in flight, 0 to 1.
     fn totals(&self, inner: &Inner, part: f64) -> RunTotals {
         let Run { frames, done, begun, pace } = &inner.run;
-        let (now, bytes) = (self.started.elapsed(), inner.roster.byte_count());
+        let (now, bytes) = (self.started.elapsed(), inner.sessions.byte_count());
         let so_far = *done as f64 + part;
         RunTotals {
             frames_done: *done,
@@ -160,30 +160,30 @@ impl Driver {
         }
     }
 
-    /// Says goodbye to everybody and waits, not for long, until they have heard it. Nobody is let in any more.
-    pub(crate) async fn part(&self, reason: &str) {
-        let farewells: Vec<_> = {
+    /// Disconnects all workers and admits no more. Returns when each goodbye is sent or has timed out.
+    pub(crate) async fn disconnect_all(&self, reason: &str) {
+        let goodbyes: Vec<_> = {
             let mut inner = self.lock();
             inner.is_ending = true;
-            let farewells = inner.roster.ids().into_iter().map(|worker| {
-                let farewell = inner.roster.end(worker, reason, Return::NextMaster);
+            let goodbyes = inner.sessions.ids().into_iter().map(|worker| {
+                let goodbye = inner.sessions.disconnect(worker, reason, Return::NextMaster);
                 self.drive(&mut inner, Event::WorkerLeft { worker });
-                farewell
+                goodbye
             });
-            farewells.flatten().collect()
+            goodbyes.flatten().collect()
         };
-        for farewell in farewells {
-            // It bounds itself, and cannot fail.
-            let _ = farewell.await;
+        for goodbye in goodbyes {
+            // The task has a time limit and does not panic.
+            let _ = goodbye.await;
         }
     }
 }
 
-/// What workers wait for that have rendered nothing yet: one that renders has the scene.
+/// Progress of the scene's transfer to the workers that have finished no segment yet: one that has, has the scene.
 fn transfers(inner: &Inner) -> TransferStatus {
     let mut status = TransferStatus::default();
     for record in inner.scheduler.workers().filter(|record| record.segments_done == 0) {
-        if let Some(session) = inner.roster.get(record.worker) {
+        if let Some(session) = inner.sessions.get(record.worker) {
             session.transfers.add_to(&mut status);
         }
     }

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 use rayfarm_protocol::{Encoding, FrameId, Lease};
 
 use rayfarm_scheduler::WorkerId;
+
+use crate::verification::SegmentDigest;
 use decode::Decoder;
 
 pub(crate) use decode::Misfit;
@@ -90,13 +92,13 @@ impl Framebuffers {
     }
 
     /// A hash of the pixels of a lease, if all of them are here and this worker's.
-    pub(crate) fn digest(&self, of: WorkerId, lease: Lease) -> Option<blake3::Hash> {
+    pub(crate) fn digest(&self, of: WorkerId, lease: Lease) -> Option<SegmentDigest> {
         let inner = self.lock();
         let canvas = inner.open.get(&lease.frame)?;
         let (first, end) = (lease.first_row as usize, lease.first_row as usize + lease.row_count as usize);
         let is_all_its = canvas.filled.get(first..end)?.iter().all(|filled| *filled == Some(of));
         let pixels = canvas.pixels.get(first * canvas.row_bytes..end * canvas.row_bytes)?;
-        is_all_its.then(|| blake3::hash(pixels))
+        is_all_its.then(|| SegmentDigest::of(pixels))
     }
 
     /// Takes a worker's rows out of all pictures, and takes none of it any more. Returns which rows are missing now.
@@ -207,10 +209,10 @@ pub(crate) fn digest(
     row_bytes: usize,
     encoding: Encoding,
     bytes: &[u8],
-) -> Result<blake3::Hash, Misfit> {
+) -> Result<SegmentDigest, Misfit> {
     let mut pixels = vec![0; row_bytes * lease.row_count as usize];
     Decoder::default().decode(lease, encoding, bytes, &mut pixels)?;
-    Ok(blake3::hash(&pixels))
+    Ok(SegmentDigest::of(&pixels))
 }
 
 /// The pixels of a finished frame; read them as `&[u8]`. Dropped, their memory serves a later frame.

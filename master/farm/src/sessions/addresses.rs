@@ -1,25 +1,26 @@
-//! Where workers reach this master: what the window and the log name.
+//! The addresses under which workers reach this master, for the window and the log.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV6, UdpSocket};
 
 use rayfarm_protocol::address::{self, Interface};
 
-/// Addresses that the window names.
+/// Addresses that the window shows.
 const SHOWN: usize = 2;
 
 /// The addresses under which workers may connect, best first.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reachable {
-    /// As a worker's `--master` takes them; never empty.
+    /// Values for a worker's `--master`; never empty.
     pub addresses: Vec<String>,
     /// Whether other machines can use them.
     pub from_outside: bool,
-    /// Whether other machines were meant to.
+    /// Whether the listening address is meant for other machines.
     pub meant_for_outside: bool,
 }
 
 impl Reachable {
-    /// Those of a master that listens there. Asks the system for the addresses of this machine where they count.
+    /// The addresses of a master that listens at `listening`. An unspecified address stands for all addresses of this
+    /// machine, which are read from the operating system.
     pub fn of(listening: SocketAddr) -> Self {
         let interfaces = address::interfaces().unwrap_or_else(|error| {
             tracing::debug!("cannot list this machine's addresses: {error}");
@@ -28,7 +29,7 @@ impl Reachable {
         Self::among(listening, &interfaces, default_route(listening.is_ipv6()))
     }
 
-    /// `routed`: the address that leads out of this machine, if there is a default route.
+    /// As [`Self::of`], with given interfaces; `routed`: the local address of the default route, if there is one.
     fn among(listening: SocketAddr, interfaces: &[Interface], routed: Option<IpAddr>) -> Self {
         let ip = listening.ip();
         if !ip.is_unspecified() {
@@ -38,7 +39,7 @@ impl Reachable {
         }
         let fits = |interface: &&Interface| {
             let is_here_only = interface.ip.is_loopback() || interface.ip.is_unspecified();
-            // A socket for any IPv6 address takes IPv4 connections too, where the system lets it.
+            // A socket for any IPv6 address accepts IPv4 connections as well on most systems.
             interface.is_up && !is_here_only && (interface.ip.is_ipv4() || listening.is_ipv6())
         };
         let mut found: Vec<&Interface> = interfaces.iter().filter(fits).collect();
@@ -61,7 +62,7 @@ impl Reachable {
         command(self.addresses.first().map_or("", String::as_str))
     }
 
-    /// How to start a worker, in lines for the window: one address or two.
+    /// Lines for the window that say how to start a worker, with at most two addresses.
     pub fn for_window(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if self.meant_for_outside && !self.from_outside {
@@ -72,7 +73,7 @@ impl Reachable {
         lines
     }
 
-    /// How to start a worker, in one line for the log: all addresses.
+    /// One line for the log that says how to start a worker, with all addresses.
     pub fn for_log(&self) -> String {
         let others = match self.addresses.get(1..) {
             None | Some([]) => String::new(),
@@ -81,7 +82,7 @@ impl Reachable {
         format!("to start one {}: {}{others}{}", self.place(), self.command(), self.warning())
     }
 
-    /// Where workers connect, for the log, if other machines were meant to.
+    /// One line for the log that says where workers connect, if the address is meant for other machines.
     pub fn announcement(&self) -> Option<String> {
         let list = || format!("workers connect to {}{}", self.addresses.join(", "), self.warning());
         self.meant_for_outside.then(list)
@@ -103,7 +104,7 @@ fn command(address: &str) -> String {
     format!("rayfarm-worker --master {address}")
 }
 
-/// A link-local address has no meaning without its interface.
+/// Adds the interface to a link-local address, which is ambiguous without it.
 fn at(interface: &Interface, port: u16) -> SocketAddr {
     match interface.ip {
         IpAddr::V6(ip) if ip.is_unicast_link_local() => {
@@ -113,7 +114,7 @@ fn at(interface: &Interface, port: u16) -> SocketAddr {
     }
 }
 
-/// How likely other machines of the room are to reach an address: less is better.
+/// A rank of addresses by how likely other machines of the room can reach them: lower is better.
 fn rank(interface: &Interface, routed: Option<IpAddr>) -> u8 {
     let kind = match interface.ip {
         IpAddr::V4(ip) if ip.is_private() => 1,
@@ -130,20 +131,20 @@ fn rank(interface: &Interface, routed: Option<IpAddr>) -> u8 {
     }
 }
 
-/// Whether an interface of that name leads to containers and virtual machines of this machine alone.
+/// Whether an interface of that name connects only containers and virtual machines of this machine.
 fn is_inside_a_machine(name: &str) -> bool {
     const PREFIXES: [&str; 9] =
         ["docker", "br-", "veth", "virbr", "vmnet", "vboxnet", "lxc", "cni", "podman"];
     PREFIXES.iter().any(|prefix| name.starts_with(prefix))
 }
 
-/// Whether a socket for any IPv6 address also takes IPv4 connections on this system.
+/// Whether a socket for any IPv6 address also accepts IPv4 connections on this system.
 fn is_dual_stack() -> bool {
     rayfarm_protocol::tcp::is_dual_stack()
 }
 
-/// The address of the interface that leads out of this machine. Connecting a datagram socket only asks the routing
-/// table; nothing is sent.
+/// The local address of the default route. Connecting a datagram socket only consults the routing table; nothing is
+/// sent.
 fn default_route(ipv6: bool) -> Option<IpAddr> {
     // Addresses reserved for documentation: RFC 5737 and RFC 3849.
     let ask = |any: IpAddr, outside: IpAddr| {
@@ -186,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn private_addresses_come_first_and_no_loopback_is_named() {
+    fn private_addresses_come_first_and_loopback_is_left_out() {
         let reachable = found("0.0.0.0:7117", &machine(), None);
         let expected =
             ["192.168.1.10:7117", "10.0.0.3:7117", "203.0.113.5:7117", "169.254.1.1:7117", "172.17.0.1:7117"];
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn ipv6_addresses_are_named_and_link_local_ones_with_their_scope() {
+    fn ipv6_addresses_are_listed_and_link_local_ones_have_a_scope() {
         let reachable = found("[::]:7117", &machine(), None);
         let v6: Vec<_> = reachable.addresses.iter().filter(|address| address.starts_with('[')).collect();
         assert_eq!(v6, ["[fd00::2]:7117", "[2001:db8::2]:7117", "[fe80::2%eth0]:7117"]);
@@ -224,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_without_a_network_says_so() {
+    fn a_machine_without_a_network_gets_a_warning() {
         for (listening, loopback) in [("0.0.0.0:7117", "127.0.0.1:7117"), ("[::]:7117", "[::1]:7117")] {
             let reachable = found(listening, &machine()[..2], None);
             assert_eq!(reachable.addresses, [loopback]);
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_was_asked_for_is_named_as_it_is() {
+    fn an_explicit_address_is_listed_unchanged() {
         for (listening, place) in [
             ("127.0.0.1:7117", "on this machine"),
             ("192.168.1.10:7117", "on any machine"),
@@ -251,9 +252,8 @@ mod tests {
         assert_eq!(found("[fe80::2%2]:7117", &machine(), None).addresses, ["[fe80::2%eth0]:7117"]);
     }
 
-    /// Whatever the machine of this test has.
     #[test]
-    fn no_loopback_is_offered_to_other_machines() {
+    fn loopback_is_not_offered_to_other_machines() {
         for listening in ["0.0.0.0:7117", "[::]:7117"] {
             let reachable = Reachable::of(listening.parse().unwrap());
             let loopback = |address: &String| address.starts_with("127.") || address.starts_with("[::1]");

@@ -1,11 +1,11 @@
-//! What one session was granted: the measure of what its worker may answer.
+//! The leases of one session, against which the replies of its worker are checked.
 
 use std::collections::BTreeSet;
 
 use rayfarm_protocol::{FrameId, Lease};
 
-/// Leases taken back that a late answer may still come to; beyond that, the oldest are forgotten. A worker that stands
-/// still for some seconds is granted, and loses, eight a frame until it is noticed, and must be forgiven when it wakes.
+/// Revoked leases for which a late reply is still accepted in silence. A worker that is suspended for some seconds is
+/// granted, and loses, up to eight leases a frame until it is disconnected, and its late replies must not end its session.
 const MAX_REVOKED: usize = 4096;
 
 /// The leases of one session.
@@ -16,50 +16,50 @@ pub struct LeaseBook {
     revoked: BTreeSet<Lease>,
 }
 
-/// What an answer is worth.
+/// Outcome of checking a reply against the leases of its session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
-    /// The lease was granted to this session and not answered yet.
+pub enum LeaseStatus {
+    /// The session holds the lease.
     Granted,
-    /// The same, of rows that are to be compared with those in the picture.
+    /// The session holds the lease, and the rows are a second rendering, to be compared with the first.
     Verifying,
-    /// It was taken back: the answer was on its way, and is thrown away.
+    /// The lease was revoked while the reply was on the wire: the reply is dropped.
     Revoked,
-    /// This session never got such a lease, or has answered it.
+    /// The session never held the lease, or has replied to it before.
     Unknown,
 }
 
 impl LeaseBook {
-    /// The session gets a lease.
+    /// Adds a lease of rows for the picture.
     pub fn grant(&mut self, lease: Lease) {
         self.granted.insert(lease);
     }
 
-    /// The session gets a lease of rows that are verified.
+    /// Adds a lease of rows to verify.
     pub fn verify(&mut self, lease: Lease) {
         self.verifying.insert(lease);
     }
 
-    /// Leases of frames before `before` are taken back.
+    /// Revokes the leases of all frames before `before`.
     pub fn cancel(&mut self, before: FrameId) {
         self.revoke(|lease| lease.frame < before);
     }
 
-    /// The worker says that it cannot render a frame.
+    /// Revokes the leases of a frame that the worker cannot render.
     pub fn fail(&mut self, frame: FrameId) {
         self.revoke(|lease| lease.frame == frame);
     }
 
-    /// An answer arrives. Each lease is answered once.
-    pub fn answer(&mut self, lease: &Lease) -> Standing {
+    /// Checks a reply and removes its lease, so that each lease accepts one reply.
+    pub fn check_reply(&mut self, lease: &Lease) -> LeaseStatus {
         if self.granted.remove(lease) {
-            Standing::Granted
+            LeaseStatus::Granted
         } else if self.verifying.remove(lease) {
-            Standing::Verifying
+            LeaseStatus::Verifying
         } else if self.revoked.remove(lease) {
-            Standing::Revoked
+            LeaseStatus::Revoked
         } else {
-            Standing::Unknown
+            LeaseStatus::Unknown
         }
     }
 
@@ -81,19 +81,19 @@ mod tests {
     }
 
     #[test]
-    fn a_lease_is_answered_once_and_only_as_granted() {
+    fn each_lease_accepts_one_reply() {
         let mut book = LeaseBook::default();
         book.grant(lease(1, 0));
-        assert_eq!(book.answer(&Lease { attempt: 1, ..lease(1, 0) }), Standing::Unknown);
+        assert_eq!(book.check_reply(&Lease { attempt: 1, ..lease(1, 0) }), LeaseStatus::Unknown);
         book.verify(lease(1, 1));
-        assert_eq!(book.answer(&lease(1, 0)), Standing::Granted);
-        assert_eq!(book.answer(&lease(1, 0)), Standing::Unknown);
-        assert_eq!(book.answer(&lease(1, 1)), Standing::Verifying);
-        assert_eq!(book.answer(&lease(1, 1)), Standing::Unknown);
+        assert_eq!(book.check_reply(&lease(1, 0)), LeaseStatus::Granted);
+        assert_eq!(book.check_reply(&lease(1, 0)), LeaseStatus::Unknown);
+        assert_eq!(book.check_reply(&lease(1, 1)), LeaseStatus::Verifying);
+        assert_eq!(book.check_reply(&lease(1, 1)), LeaseStatus::Unknown);
     }
 
     #[test]
-    fn an_answer_that_was_on_its_way_is_no_offence() {
+    fn a_reply_to_a_revoked_lease_is_not_an_error() {
         let mut book = LeaseBook::default();
         for (frame, segment) in [(1, 0), (2, 0), (3, 0)] {
             book.grant(lease(frame, segment));
@@ -101,15 +101,15 @@ mod tests {
         book.verify(lease(1, 1));
         book.cancel(FrameId(2));
         book.fail(FrameId(3));
-        assert_eq!(book.answer(&lease(1, 1)), Standing::Revoked);
-        assert_eq!(book.answer(&lease(1, 0)), Standing::Revoked);
-        assert_eq!(book.answer(&lease(1, 0)), Standing::Unknown);
-        assert_eq!(book.answer(&lease(2, 0)), Standing::Granted);
-        assert_eq!(book.answer(&lease(3, 0)), Standing::Revoked);
+        assert_eq!(book.check_reply(&lease(1, 1)), LeaseStatus::Revoked);
+        assert_eq!(book.check_reply(&lease(1, 0)), LeaseStatus::Revoked);
+        assert_eq!(book.check_reply(&lease(1, 0)), LeaseStatus::Unknown);
+        assert_eq!(book.check_reply(&lease(2, 0)), LeaseStatus::Granted);
+        assert_eq!(book.check_reply(&lease(3, 0)), LeaseStatus::Revoked);
     }
 
     #[test]
-    fn what_was_taken_back_is_forgotten_in_the_end() {
+    fn the_number_of_revoked_leases_is_bounded() {
         let mut book = LeaseBook::default();
         for segment in 0..2 * MAX_REVOKED as u32 {
             book.grant(lease(1, segment));

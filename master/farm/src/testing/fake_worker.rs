@@ -1,4 +1,4 @@
-//! A worker that does as its script says, with pixels from a simple function, over a real connection.
+//! A scripted worker over a real connection, with pixels from a simple function.
 
 use std::net::SocketAddr;
 use std::ops::Range;
@@ -16,55 +16,56 @@ use tokio::task::JoinHandle;
 
 use crate::framebuffer::FramePixels;
 
-/// What one that is busy takes for a pixel.
+/// Render time of [`Script::Busy`] for one pixel.
 const PIXEL_TIME: Duration = Duration::from_nanos(2_440);
 
-/// What a worker does besides rendering what it is asked to.
+/// The behaviour of a fake worker, besides rendering its leases correctly.
 pub enum Script {
-    /// Nothing.
-    Honest,
-    /// Is gone at its n-th lease (from 0), without a word.
+    /// Renders every lease correctly.
+    Correct,
+    /// Closes the connection without a goodbye at its n-th lease, from 0.
     VanishAt(usize),
-    /// Answers its first lease only when it is told to.
+    /// Delays the reply to its first lease until the channel fires.
     Late(oneshot::Receiver<()>),
-    /// Takes five milliseconds a frame of 32 x 64 pixels, and as much as that for each pixel of others.
+    /// Takes 2.44 microseconds a pixel: five milliseconds for a frame of 32 x 64 pixels.
     Busy,
-    /// Answers no lease of a frame that is as wide as that, or wider.
+    /// Replies to no lease of a frame of at least this width, in pixels.
     OnlyNarrowerThan(u32),
-    /// Sends a byte too few.
+    /// Sends one byte too few for its first lease.
     Short,
-    /// Answers every lease twice.
+    /// Replies twice to its first lease.
     Twice,
     /// Flips a bit of the last pixel of every lease.
-    Lie,
-    /// Cannot render its first lease.
+    WrongPixels,
+    /// Reports that it cannot render its first lease.
     FailOnce,
-    /// Sends bytes that are no envelope in answer to its first lease.
+    /// Sends bytes that are no envelope after its handshake.
     Babble,
 }
 
-/// What became of a worker.
+/// The end of a fake worker's session.
 #[derive(Debug, PartialEq)]
 pub struct Outcome {
-    /// The master's last word, if it said one.
+    /// The reason in the master's goodbye, if there was one.
     pub goodbye: Option<String>,
-    /// Leases granted.
+    /// Number of leases granted.
     pub leases: usize,
-    /// Whether it was told that no more would come.
+    /// Whether the master drained it.
     pub drained: bool,
 }
 
-/// The pixels of rows: a function of the view, x and y, like any picture.
+/// RGB8 pixels of rows: a function of the view, x and y, as in any picture.
 pub fn pixels(view: &FrameView, rows: Range<u32>) -> Vec<u8> {
     let pixel = |x: u32, y: u32| [x as u8, y as u8, (view.spin as u32 + x * y) as u8];
     rows.flat_map(|y| (0..view.width).flat_map(move |x| pixel(x, y))).collect()
 }
 
-/// Whether this is the whole picture of a view.
+/// Whether `picture` is the complete picture of [`pixels`].
 pub fn is_picture(view: &FrameView, picture: &FramePixels) -> bool {
     **picture == *pixels(view, 0..view.height)
 }
 
+/// Connects and shakes hands as a worker named "fake".
 pub async fn connect(address: SocketAddr, threads: u32) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let hello = Hello { name: "fake".into(), threads, simd: "none".into(), software: "test".into() };
@@ -72,21 +73,21 @@ pub async fn connect(address: SocketAddr, threads: u32) -> TcpStream {
     stream
 }
 
-/// A worker of that name; it is connected when this returns.
+/// Starts a worker with this name and one thread. It is connected when this returns.
 pub async fn start_named(address: SocketAddr, name: &str, script: Script) -> JoinHandle<Outcome> {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let hello = Hello { name: name.into(), threads: 1, simd: "none".into(), software: "test".into() };
     handshake::as_worker(&mut stream, &hello).await.unwrap();
-    tokio::spawn(live(stream, script))
+    tokio::spawn(run(stream, script))
 }
 
 /// Starts a worker with one thread. It is connected when this returns.
 pub async fn start(address: SocketAddr, script: Script) -> JoinHandle<Outcome> {
     let stream = connect(address, 1).await;
-    tokio::spawn(live(stream, script))
+    tokio::spawn(run(stream, script))
 }
 
-async fn live(stream: TcpStream, mut script: Script) -> Outcome {
+async fn run(stream: TcpStream, mut script: Script) -> Outcome {
     if matches!(script, Script::Babble) {
         return babble(stream).await;
     }
@@ -125,21 +126,21 @@ async fn live(stream: TcpStream, mut script: Script) -> Outcome {
 
 async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, view: &FrameView) {
     let mut bytes = pixels(view, lease.first_row..lease.first_row + lease.row_count);
-    // Every other misdeed is done once.
-    let misdeed = match script {
-        Script::VanishAt(_) => Script::Honest,
+    // Every other deviation happens once.
+    let deviation = match script {
+        Script::VanishAt(_) => Script::Correct,
         Script::Busy => Script::Busy,
-        Script::Lie => Script::Lie,
+        Script::WrongPixels => Script::WrongPixels,
         Script::OnlyNarrowerThan(width) if view.width >= *width => return,
-        Script::OnlyNarrowerThan(_) => Script::Honest,
-        _ => std::mem::replace(script, Script::Honest),
+        Script::OnlyNarrowerThan(_) => Script::Correct,
+        _ => std::mem::replace(script, Script::Correct),
     };
-    let answers = match misdeed {
+    let answers = match deviation {
         Script::Busy => {
             tokio::time::sleep(PIXEL_TIME * (bytes.len() / 3) as u32).await;
             1
         }
-        Script::Honest | Script::VanishAt(_) | Script::OnlyNarrowerThan(_) | Script::Babble => 1,
+        Script::Correct | Script::VanishAt(_) | Script::OnlyNarrowerThan(_) | Script::Babble => 1,
         Script::Late(go) => {
             let sender = sender.clone();
             tokio::spawn(async move {
@@ -153,12 +154,12 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
             1
         }
         Script::Twice => 2,
-        Script::Lie => {
+        Script::WrongPixels => {
             bytes.last_mut().into_iter().for_each(|byte| *byte ^= 1);
             1
         }
         Script::FailOnce => {
-            let failed = ToMaster::Failed { frame: lease.frame, reason: "out of paint".into() };
+            let failed = ToMaster::Failed { frame: lease.frame, reason: "out of memory".into() };
             return sender.send(failed).await.unwrap();
         }
     };
@@ -170,17 +171,17 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
 async fn send_pixels(sender: &Sender<ToMaster>, lease: Lease, bytes: Vec<u8>) {
     let cost = Cost { trace_ns: 1000, primary: u64::from(lease.row_count), ..Cost::default() };
     let header = PixelsHeader { lease, encoding: Encoding::Raw, cost };
-    // The master may have ended the session meanwhile: some scripts are written for that.
+    // Sending fails where the master has ended the session because of the script.
     let _ = sender.send(ToMaster::Pixels { header, bytes: Bytes::from(bytes) }).await;
 }
 
-/// Shakes hands like a worker and then speaks gibberish until it is thrown out.
+/// Sends bytes that are no envelope, until the master closes the connection.
 async fn babble(stream: TcpStream) -> Outcome {
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
     let (mut read, mut write) = stream.into_split();
     write.write_all(&[0xff; 64]).await.unwrap();
     let mut heard = Vec::new();
-    // Whether the end comes as EOF or as a reset is the operating system's business.
+    // The connection ends with EOF or a reset, depending on the operating system.
     let _ = read.read_to_end(&mut heard).await;
     Outcome { goodbye: None, leases: 0, drained: false }
 }

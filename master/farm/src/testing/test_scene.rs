@@ -1,8 +1,9 @@
-//! The smallest scene there is, for tests that are not about pictures.
+//! A minimal scene, for tests that are not about pictures.
 
 use glam::{DVec3, Vec3};
 use rayfarm_tracer::scene::{Background, Camera, FrameView, Material, RenderSettings, Scene};
 
+/// A scene without objects, of 32 x 64 pixels.
 pub fn scene() -> Scene {
     Scene {
         ambient: Vec3::ZERO,
@@ -19,6 +20,7 @@ pub fn scene() -> Scene {
     }
 }
 
+/// The view of [`scene`].
 pub fn view() -> FrameView {
     FrameView::of(&scene())
 }

@@ -1,4 +1,4 @@
-//! Real workers in this process, over 127.0.0.1, that pass a large asset on.
+//! Real workers in this process, over 127.0.0.1, that pass a large asset on to each other.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -9,16 +9,16 @@ use rayfarm_tracer::scene::{Filter, Scene, TextureMap};
 use rayfarm_tracer::texture::Texture;
 use rayfarm_worker::{Ending, Share, WorkerOptions};
 
-use rayfarm_scheduler::SegmentPolicy;
 use crate::farm::Farm;
 use crate::options::{FarmOptions, FarmScene};
 use crate::testing::test_scene::{scene, view};
+use rayfarm_scheduler::SegmentPolicy;
 
-/// Far beyond what any of these tests takes.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// Time limit of the test.
+const TIMEOUT: Duration = Duration::from_secs(120);
 const WORKERS: usize = 4;
 
-/// A texture of several chunks that nothing makes smaller.
+/// A texture of several chunks that does not compress.
 fn texture() -> Arc<Texture> {
     let (width, height) = (1400, 1000);
     let noise = (0..width * height * 3).map(|n: u32| (n.wrapping_mul(2_654_435_761) >> 13) as u8);
@@ -39,7 +39,7 @@ fn options(master: SocketAddr, share: Share) -> WorkerOptions {
     }
 }
 
-/// Bytes of scene that the master has sent until every one of the workers has rendered something.
+/// Bytes of scene that the master sends until each worker has rendered a segment.
 async fn sent_until_all_render(share: Share) -> u64 {
     let texture = texture();
     let maps = vec![TextureMap::new(texture.id(), Filter::Nearest)];
@@ -73,8 +73,8 @@ async fn the_master_sends_a_large_asset_about_once() {
     let size = texture().bytes().len() as u64;
     assert!(size > 4_000_000);
     let place = Share::At(SocketAddr::from(([127, 0, 0, 1], 0)));
-    let passed_on = tokio::time::timeout(PATIENCE, sent_until_all_render(place)).await.unwrap();
+    let passed_on = tokio::time::timeout(TIMEOUT, sent_until_all_render(place)).await.unwrap();
     assert!((size..2 * size).contains(&passed_on), "{passed_on} bytes of {size}");
-    let alone = tokio::time::timeout(PATIENCE, sent_until_all_render(Share::Off)).await.unwrap();
+    let alone = tokio::time::timeout(TIMEOUT, sent_until_all_render(Share::Off)).await.unwrap();
     assert!(alone >= WORKERS as u64 * size, "{alone} bytes of {size}");
 }

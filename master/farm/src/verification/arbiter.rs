@@ -1,66 +1,67 @@
-//! The last word on pixels: the master traces rows itself, as any worker would, and sees who has sent others.
+//! The arbiter: settles mismatches by rendering the rows on the master.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use blake3::Hash;
 use rayfarm_protocol::FrameId;
+use rayfarm_scheduler::{Event, Verdict};
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
+use super::SegmentDigest;
 use crate::options::FarmScene;
-use rayfarm_scheduler::{Event, Verdict};
 
-/// RGB8 sRGB rows of a frame, or why there are none.
-pub(crate) type Trace = dyn Fn(&FrameView, Range<u32>) -> Result<Vec<u8>, String> + Send + Sync;
+/// Renders rows of a view: RGB8 sRGB without gaps, or the reason why it cannot.
+pub(crate) type RowRenderer = dyn Fn(&FrameView, Range<u32>) -> Result<Vec<u8>, String> + Send + Sync;
 
-/// Rows to be traced here.
+/// A segment for the arbiter to render: two renderings differ, or no second worker can render it.
 #[derive(Clone, Debug)]
-pub(crate) struct Case {
+pub(crate) struct Dispute {
     pub(crate) frame: FrameId,
-    /// The number of the audit.
+    /// The number of the segment within the frame.
     pub(crate) segment: u32,
     pub(crate) view: FrameView,
     pub(crate) rows: Range<u32>,
-    /// What is in the picture.
-    pub(crate) painter: Hash,
-    /// What was sent to verify it, if it was something else.
-    pub(crate) checker: Option<Hash>,
+    /// The digest of the rows in the picture.
+    pub(crate) first: SegmentDigest,
+    /// The digest of a second rendering that differs.
+    pub(crate) second: Option<SegmentDigest>,
 }
 
-/// Traces one case after the other, each on a blocking thread, until `stop`.
-pub(crate) async fn hold_court(
-    mut cases: mpsc::UnboundedReceiver<Case>,
-    trace: Arc<Trace>,
-    settle: impl Fn(Event) + Send,
+/// Settles one dispute after the other until `stop`. Each is rendered on a blocking thread; `report` receives the result
+/// as an event for the scheduler.
+pub(crate) async fn run(
+    mut disputes: mpsc::UnboundedReceiver<Dispute>,
+    renderer: Arc<RowRenderer>,
+    report: impl Fn(Event) + Send,
     stop: CancellationToken,
 ) {
-    while let Some(Some(case)) = stop.run_until_cancelled(cases.recv()).await {
-        let Case { frame, segment, view, rows, painter, checker } = case;
-        let trace = trace.clone();
-        let traced = tokio::task::spawn_blocking(move || trace(&view, rows)).await;
-        let verdict = match traced.map_err(|error| error.to_string()).flatten() {
-            Ok(bytes) => {
-                let own = blake3::hash(&bytes);
-                Verdict {
-                    traced: true,
-                    painter: painter != own,
-                    checker: checker.is_some_and(|hash| hash != own),
-                }
-            }
+    while let Some(Some(dispute)) = stop.run_until_cancelled(disputes.recv()).await {
+        let Dispute { frame, segment, .. } = dispute;
+        let renderer = renderer.clone();
+        let settled = tokio::task::spawn_blocking(move || settle(dispute, &*renderer)).await;
+        let verdict = match settled.map_err(|error| error.to_string()).flatten() {
+            Ok(verdict) => verdict,
             Err(error) => {
                 tracing::error!("the master cannot verify rows of frame {frame} itself: {error}");
                 Verdict::default()
             }
         };
-        settle(Event::SegmentJudged { frame, segment, verdict });
+        report(Event::SegmentJudged { frame, segment, verdict });
     }
 }
 
-/// The scene as the master traces it; it is compiled when it is asked for first. Gives up when `stop` says so.
-pub(crate) fn tracer(scene: FarmScene, stop: CancellationToken) -> Arc<Trace> {
+fn settle(dispute: Dispute, renderer: &RowRenderer) -> Result<Verdict, String> {
+    let Dispute { view, rows, first, second, .. } = dispute;
+    let own = SegmentDigest::of(&renderer(&view, rows)?);
+    Ok(Verdict { traced: true, painter: first != own, checker: second.is_some_and(|second| second != own) })
+}
+
+/// A renderer of a scene on this machine, with the code that workers use. The scene is compiled at the first call; `stop`
+/// cancels a call.
+pub(crate) fn row_renderer(scene: FarmScene, stop: CancellationToken) -> Arc<RowRenderer> {
     let compiled: OnceLock<Result<Arc<CompiledScene>, String>> = OnceLock::new();
     Arc::new(move |view, rows| {
         let scene = compiled.get_or_init(|| {
@@ -70,8 +71,8 @@ pub(crate) fn tracer(scene: FarmScene, stop: CancellationToken) -> Arc<Trace> {
         });
         let frame = PreparedFrame::new(scene.clone()?, view).map_err(|error| error.to_string())?;
         let mut pixels = vec![0; rows.len() * view.width as usize * 3];
-        let traced = render_rows(&frame, rows, &mut pixels, &|| stop.is_cancelled());
-        traced.map_err(|_| "the master ends".to_owned())?;
+        let rendered = render_rows(&frame, rows, &mut pixels, &|| stop.is_cancelled());
+        rendered.map_err(|_| "the master ends".to_owned())?;
         Ok(pixels)
     })
 }

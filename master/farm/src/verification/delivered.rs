@@ -1,20 +1,19 @@
-//! Which delivered pictures have rows of which worker, so that they can be named when a worker turns out to have sent
-//! wrong ones.
+//! Finished frames by the workers whose rows they have, to list the frames that may be wrong when a worker is found to have
+//! sent wrong pixels.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use rayfarm_protocol::FrameId;
-
 use rayfarm_scheduler::WorkerId;
 
-/// Workers whose frames are remembered; beyond that, those of the one that came first are forgotten.
+/// Workers whose frames are remembered; beyond that, the frames of the lowest number are dropped.
 const MAX_WORKERS: usize = 65_536;
-/// Runs of frames that are remembered of each worker, and of wrong frames.
+/// Runs of frames in one set.
 const MAX_RUNS: usize = 4096;
 
-/// Numbers of frames, as runs in ascending order. Where there are too many runs, the two with the smallest gap become
-/// one: a frame too many is named rather than one too few.
+/// A set of frame numbers, stored as runs in ascending order. Above 4096 runs, the two with the smallest gap are joined:
+/// the set then has frames too many, but never too few.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameSet(Vec<Range<u64>>);
 
@@ -43,24 +42,24 @@ impl FrameSet {
         }
     }
 
-    /// Whether a frame is one of them.
+    /// Whether a frame is in the set.
     pub fn contains(&self, frame: FrameId) -> bool {
         let at = self.0.partition_point(|run| run.end <= frame.0);
         self.0.get(at).is_some_and(|run| run.contains(&frame.0))
     }
 
-    /// How many they are.
+    /// Number of frames in the set.
     pub fn count(&self) -> u64 {
         self.0.iter().map(|run| run.end - run.start).sum()
     }
 
-    /// The runs, first and last frame of each.
+    /// The runs in ascending order, as the first and the last frame of each.
     pub fn runs(&self) -> impl Iterator<Item = (u64, u64)> {
         self.0.iter().map(|run| (run.start, run.end - 1))
     }
 }
 
-/// Numbers as a person writes them: `3, 7 to 9`.
+/// Runs of frame numbers as text: `3, 7 to 9`.
 pub fn as_text(runs: impl IntoIterator<Item = (u64, u64)>) -> String {
     const SHOWN: usize = 20;
     let mut runs = runs.into_iter();
@@ -77,7 +76,7 @@ pub fn as_text(runs: impl IntoIterator<Item = (u64, u64)>) -> String {
     text
 }
 
-/// All delivered frames, by worker.
+/// All finished frames, by worker.
 #[derive(Debug, Default)]
 pub(crate) struct Delivered {
     by_worker: BTreeMap<WorkerId, FrameSet>,
@@ -85,7 +84,7 @@ pub(crate) struct Delivered {
 }
 
 impl Delivered {
-    /// A picture with rows of these workers is delivered.
+    /// Adds a finished frame that has rows of these workers.
     pub(crate) fn add(&mut self, frame: FrameId, workers: impl IntoIterator<Item = WorkerId>) {
         for worker in workers {
             self.by_worker.entry(worker).or_default().add(frame.0..frame.0.saturating_add(1));
@@ -95,11 +94,11 @@ impl Delivered {
         }
     }
 
-    /// A worker has sent wrong pixels: its frames may be wrong. Returns which they are.
-    pub(crate) fn accuse(&mut self, worker: WorkerId) -> FrameSet {
-        let its = self.by_worker.remove(&worker).unwrap_or_default();
-        its.0.iter().for_each(|run| self.wrong.add(run.clone()));
-        its
+    /// Marks the frames of a worker as possibly wrong. Returns these frames.
+    pub(crate) fn mark_wrong(&mut self, worker: WorkerId) -> FrameSet {
+        let frames = self.by_worker.remove(&worker).unwrap_or_default();
+        frames.0.iter().for_each(|run| self.wrong.add(run.clone()));
+        frames
     }
 
     /// All frames that may be wrong.
@@ -117,27 +116,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_named_as_runs() {
+    fn runs_are_joined_in_the_text() {
         assert_eq!(as_text([(3, 3), (5, 6), (8, 11)]), "3, 5, 6, 8 to 11");
         let many = as_text((0..25).map(|n| (10 * n, 10 * n)));
         assert!(many.starts_with("0, 10, 20") && many.ends_with("190 and 5 more runs of frames"), "{many}");
     }
 
     #[test]
-    fn only_the_frames_of_the_accused_are_wrong() {
+    fn only_the_frames_of_a_marked_worker_are_wrong() {
         let mut delivered = Delivered::default();
         let [one, other] = [WorkerId(1), WorkerId(2)];
         for (frame, workers) in [(1, vec![one]), (2, vec![one, other]), (3, vec![other]), (5, vec![one])] {
             delivered.add(FrameId(frame), workers);
         }
-        assert_eq!(delivered.accuse(one).runs().collect::<Vec<_>>(), [(1, 2), (5, 5)]);
+        assert_eq!(delivered.mark_wrong(one).runs().collect::<Vec<_>>(), [(1, 2), (5, 5)]);
         let wrong: Vec<u64> = (0..7).filter(|&frame| delivered.wrong().contains(FrameId(frame))).collect();
         assert_eq!((wrong, delivered.wrong().count()), (vec![1, 2, 5], 3));
-        assert_eq!(delivered.accuse(one).count(), 0);
+        assert_eq!(delivered.mark_wrong(one).count(), 0);
     }
 
     #[test]
-    fn too_many_runs_become_fewer_and_lose_no_frame() {
+    fn joined_runs_lose_no_frame() {
         let mut set = FrameSet::default();
         let frames = || (0..2 * MAX_RUNS as u64).map(|n| 3 * n);
         frames().for_each(|frame| set.add(frame..frame + 1));
@@ -147,7 +146,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_set_has_what_was_added(frames in prop::collection::vec(0_u64..60, 0..80)) {
+        fn a_set_contains_what_was_added(frames in prop::collection::vec(0_u64..60, 0..80)) {
             let mut set = FrameSet::default();
             frames.iter().for_each(|&frame| set.add(frame..frame + 1));
             let expected: BTreeSet<u64> = frames.into_iter().collect();

@@ -1,41 +1,43 @@
-//! What rows that are to be verified look like: hashes of what was sent, and of which frame they are.
+//! Segments that are being verified, with the digest of each rendering.
 
 use std::collections::BTreeMap;
 
-use blake3::Hash;
 use rayfarm_protocol::{FrameAnnounce, FrameId, Lease};
+use rayfarm_scheduler::{Finding, WorkerId};
 use rayfarm_tracer::scene::FrameView;
 
-use rayfarm_scheduler::{Finding, WorkerId};
+use super::SegmentDigest;
 
-/// Rows that are verified.
+/// A segment that is being verified.
 #[derive(Clone, Debug)]
-pub(crate) struct Seal {
+pub(crate) struct OpenSegment {
     pub(crate) lease: Lease,
     pub(crate) view: FrameView,
+    /// The announcement of its frame, for a worker that renders it a second time after the frame is complete.
     pub(crate) announce: FrameAnnounce,
-    pub(crate) painter: Signed,
-    /// Whoever has sent other bytes last.
-    pub(crate) checker: Option<Signed>,
+    /// The rendering in the picture.
+    pub(crate) first: Rendering,
+    /// The last rendering that differs from the first.
+    pub(crate) second: Option<Rendering>,
 }
 
-/// Bytes, and whose.
+/// The digest of a worker's rendering.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Signed {
+pub(crate) struct Rendering {
     pub(crate) worker: WorkerId,
-    pub(crate) hash: Hash,
+    pub(crate) digest: SegmentDigest,
 }
 
-/// The seals of all open audits: the scheduler bounds how many.
+/// All segments that are being verified. The scheduler bounds their number.
 #[derive(Debug, Default)]
-pub(crate) struct Seals(BTreeMap<(FrameId, u32), Seal>);
+pub(crate) struct OpenSegments(BTreeMap<(FrameId, u32), OpenSegment>);
 
-impl Seals {
-    pub(crate) fn add(&mut self, seal: Seal) {
-        self.0.insert((seal.lease.frame, seal.lease.segment), seal);
+impl OpenSegments {
+    pub(crate) fn insert(&mut self, segment: OpenSegment) {
+        self.0.insert((segment.lease.frame, segment.lease.segment), segment);
     }
 
-    pub(crate) fn get(&self, frame: FrameId, segment: u32) -> Option<&Seal> {
+    pub(crate) fn get(&self, frame: FrameId, segment: u32) -> Option<&OpenSegment> {
         self.0.get(&(frame, segment))
     }
 
@@ -43,23 +45,23 @@ impl Seals {
         self.0.remove(&(frame, segment));
     }
 
-    /// A frame of which rows are sealed.
+    /// The announcement of a frame that has open segments.
     pub(crate) fn announce(&self, frame: FrameId) -> Option<&FrameAnnounce> {
-        self.0.range((frame, 0)..=(frame, u32::MAX)).next().map(|(_, seal)| &seal.announce)
+        self.0.range((frame, 0)..=(frame, u32::MAX)).next().map(|(_, segment)| &segment.announce)
     }
 
-    /// Compares what a worker has sent now with what was sent before.
-    pub(crate) fn compare(&mut self, lease: &Lease, now: Signed) -> Finding {
-        let Some(seal) = self.0.get_mut(&(lease.frame, lease.segment)) else { return Finding::Unknown };
-        if seal.painter.hash == now.hash {
+    /// Compares a second rendering with the first.
+    pub(crate) fn compare(&mut self, lease: &Lease, second: Rendering) -> Finding {
+        let Some(segment) = self.0.get_mut(&(lease.frame, lease.segment)) else { return Finding::Unknown };
+        if segment.first.digest == second.digest {
             return Finding::Same;
         }
-        // The latest counts: an earlier one may have come from somebody who no longer held the lease, and whoever is judged
-        // is judged at once.
-        seal.checker = Some(now);
-        let (painter, checker) = (seal.painter.worker, now.worker);
+        // A dispute is settled at once, so an earlier second rendering comes from a worker that had lost its lease: the
+        // latest one counts.
+        segment.second = Some(second);
+        let (first, second) = (segment.first.worker, second.worker);
         tracing::warn!(
-            "{painter} and {checker} have sent different pixels of {lease}: the master traces them itself"
+            "{first} and {second} have sent different pixels of {lease}; the master renders them itself"
         );
         Finding::Different
     }
@@ -73,21 +75,21 @@ mod tests {
     use super::*;
     use crate::testing::test_scene::view;
 
-    fn signed(worker: u64) -> Signed {
-        Signed { worker: WorkerId(worker), hash: blake3::hash(&worker.to_le_bytes()) }
+    fn rendering(worker: u64) -> Rendering {
+        Rendering { worker: WorkerId(worker), digest: SegmentDigest::of(&worker.to_le_bytes()) }
     }
 
     #[test]
-    fn the_one_who_answered_last_is_judged() {
+    fn the_latest_second_rendering_counts() {
         let lease = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count: 1 };
         let (frame, scene) = (lease.frame, AssetId([0; 32]));
         let announce = FrameAnnounce { frame, scene, width: 1, height: 1, view: Bytes::new() };
-        let mut seals = Seals::default();
-        seals.add(Seal { lease, view: view(), announce, painter: signed(1), checker: None });
-        assert_eq!(seals.compare(&lease, Signed { worker: WorkerId(2), ..signed(1) }), Finding::Same);
-        for checker in [3, 4] {
-            assert_eq!(seals.compare(&lease, signed(checker)), Finding::Different);
-            assert_eq!(seals.get(frame, 0).and_then(|seal| seal.checker).unwrap().worker, WorkerId(checker));
+        let mut open = OpenSegments::default();
+        open.insert(OpenSegment { lease, view: view(), announce, first: rendering(1), second: None });
+        assert_eq!(open.compare(&lease, Rendering { worker: WorkerId(2), ..rendering(1) }), Finding::Same);
+        for second in [3, 4] {
+            assert_eq!(open.compare(&lease, rendering(second)), Finding::Different);
+            assert_eq!(open.get(frame, 0).and_then(|open| open.second).unwrap().worker, WorkerId(second));
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Whatever happens: nothing is put down twice or not at all.
+//! Properties of accounts under random events: each nanosecond is attributed exactly once.
 
 use proptest::prelude::*;
 
 use super::super::span::{Mark, Span, What};
 use super::*;
 
-/// Something that happens, with small numbers for who and what.
+/// An event or action, with small numbers for workers and segments.
 #[derive(Clone, Debug)]
 enum Step {
     Join(u64, u32),
@@ -50,7 +50,7 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-impl Told {
+impl Fixture {
     fn step(&mut self, ns: u64, frame: u64, step: &Step) {
         let now = Duration::from_nanos(ns);
         match *step {
@@ -65,7 +65,7 @@ impl Told {
             }
             Step::Answer(worker, segment, cost, decode) => {
                 let worker = WorkerId(worker);
-                self.accounts.taken_in(worker, 10, Duration::from_nanos(decode));
+                self.accounts.received(worker, 10, Duration::from_nanos(decode));
                 self.accounts.event(now, &Event::SegmentDone { worker, lease: lease(frame, segment), cost });
             }
             Step::Cancel(worker) => {
@@ -76,7 +76,7 @@ impl Told {
                 let event = Event::WorkerFailed { worker: WorkerId(worker), frame: FrameId(frame) };
                 self.accounts.event(now, &event);
             }
-            Step::Asset(worker) => self.accounts.asset_wanted(now, WorkerId(worker)),
+            Step::Asset(worker) => self.accounts.asset_requested(now, WorkerId(worker)),
             Step::Pause(worker, true) => {
                 self.accounts.event(now, &Event::PauseRequested { worker: WorkerId(worker) });
             }
@@ -98,7 +98,7 @@ fn spans(accounts: &mut Accounts) -> Vec<Span> {
     marks.filter_map(|mark| if let Mark::Span(span) = mark { Some(span) } else { None }).collect()
 }
 
-/// Spans of one track follow each other or lie inside each other.
+/// Whether the spans of one track are disjoint or nested.
 fn nested(mut spans: Vec<Span>) -> bool {
     spans.sort_by_key(|span| (span.from, std::cmp::Reverse(span.to), matches!(span.what, What::Part(_))));
     let mut open: Vec<Duration> = Vec::new();
@@ -113,20 +113,20 @@ fn nested(mut spans: Vec<Span>) -> bool {
 }
 
 proptest! {
-    /// Whatever happens and whatever workers claim: each worker's parts sum to its thread time, frame for frame, but for
-    /// time under leases that nobody has answered yet.
+    /// Each worker's parts sum to its thread time in every frame, except for time under unanswered leases, whatever costs the
+    /// workers claim.
     #[test]
-    fn every_nanosecond_is_put_down_once(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
-        let mut told = Told { accounts: Accounts::default() };
-        told.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(9), threads: 3, host: HostId(1) });
+    fn every_nanosecond_is_attributed_once(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
+        let mut fixture = Fixture { accounts: Accounts::default() };
+        fixture.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(9), threads: 3, host: HostId(1) });
         let (mut now, mut frame, mut begun, mut settled) = (0, 1, None, 0);
         for (passed, step) in steps {
             now += passed;
-            told.step(now, frame, &step);
+            fixture.step(now, frame, &step);
             match step {
                 Step::Begin => { begun.get_or_insert(now); }
                 Step::Finish | Step::Drop => {
-                    let account = told.accounts.take_done();
+                    let account = fixture.accounts.take_done();
                     for worker in &account.workers {
                         let sum: f64 = worker.parts.percent().iter().sum();
                         prop_assert!(worker.parts.total() == 0 || (sum - 100.0).abs() < 1e-9, "{worker:?}");
@@ -139,49 +139,49 @@ proptest! {
             }
         }
         let end = Action::FrameDone { frame: FrameId(frame), cost: Cost::default(), elapsed: Duration::ZERO };
-        told.accounts.action(Duration::from_nanos(now), &end);
-        let own = told.accounts.take_done().workers.into_iter().find(|worker| worker.id == 9).unwrap();
-        settled += own.parts.total() + told.accounts.unsettled(WorkerId(9));
+        fixture.accounts.action(Duration::from_nanos(now), &end);
+        let own = fixture.accounts.take_done().workers.into_iter().find(|worker| worker.id == 9).unwrap();
+        settled += own.parts.total() + fixture.accounts.unsettled(WorkerId(9));
         prop_assert_eq!(settled, begun.map_or(0, |begun| 3 * (now - begun)));
     }
 
     #[test]
     fn a_busy_workers_parts_sum_to_its_time(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
-        let mut told = Told { accounts: Accounts::default() };
-        told.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(1), threads: 3, host: HostId(1) });
-        told.begin(0, 1);
+        let mut fixture = Fixture { accounts: Accounts::default() };
+        fixture.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(1), threads: 3, host: HostId(1) });
+        fixture.begin(0, 1);
         let (mut now, mut frame, mut settled) = (0, 1, 0);
-        // The same worker all the time, and never paused: what it does is its account.
+        // The worker stays connected and is never paused, so all its time is in its accounts.
         let steps = steps.into_iter().filter(|(_, step)| {
             !matches!(step, Step::Join(1, _) | Step::Leave(1) | Step::Pause(1, _))
         });
         for (passed, step) in steps {
             now += passed;
-            told.step(now, frame, &step);
+            fixture.step(now, frame, &step);
             if matches!(step, Step::Finish) {
-                let account = told.accounts.take_done();
+                let account = fixture.accounts.take_done();
                 settled += account.workers.iter().filter(|w| w.id == 1).map(|w| w.parts.total()).sum::<u64>();
                 frame += 1;
             }
         }
         let end = Action::FrameDone { frame: FrameId(frame), cost: Cost::default(), elapsed: Duration::ZERO };
-        told.accounts.action(Duration::from_nanos(now), &end);
-        let account = told.accounts.take_done();
+        fixture.accounts.action(Duration::from_nanos(now), &end);
+        let account = fixture.accounts.take_done();
         settled += account.workers.iter().find(|worker| worker.id == 1).unwrap().parts.total();
-        prop_assert_eq!(settled + told.accounts.unsettled(WorkerId(1)), 3 * now);
+        prop_assert_eq!(settled + fixture.accounts.unsettled(WorkerId(1)), 3 * now);
     }
 
     #[test]
-    fn a_timeline_nests(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
-        let mut told = Told { accounts: Accounts::default() };
-        told.accounts.keep_marks();
+    fn spans_of_a_timeline_are_nested(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
+        let mut fixture = Fixture { accounts: Accounts::default() };
+        fixture.accounts.keep_marks();
         let (mut now, mut frame) = (0, 1);
         for (passed, step) in steps {
             now += passed;
-            told.step(now, frame, &step);
+            fixture.step(now, frame, &step);
             frame += u64::from(matches!(step, Step::Finish | Step::Drop));
         }
-        let spans = spans(&mut told.accounts);
+        let spans = spans(&mut fixture.accounts);
         for track in [None, Some(WorkerId(1)), Some(WorkerId(2)), Some(WorkerId(3))] {
             let own: Vec<Span> = spans.iter().filter(|span| span.worker == track).cloned().collect();
             prop_assert!(nested(own.clone()), "{own:#?}");
