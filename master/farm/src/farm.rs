@@ -151,6 +151,12 @@ impl Farm {
         self.driver.record_timeline(sink);
     }
 
+    /// Sets a function that is called at the start of each decoding of pixels.
+    #[cfg(test)]
+    pub(crate) fn on_decode(&self, hook: impl Fn() + Send + Sync + 'static) {
+        self.driver.on_decode(hook);
+    }
+
     /// Disconnects all workers and waits until the local ones have exited; those that do not within three seconds are killed.
     pub async fn shut_down(self) {
         // First of all, so that no supervisor restarts a worker that exits because of its goodbye.

@@ -1,12 +1,17 @@
 //! Replies of workers: pixels for the picture, pixels to verify, failures.
 
+use std::time::Duration;
+
+use bytes::Bytes;
 use rayfarm_protocol::{Cost, FrameId, Lease, PixelsHeader};
 use rayfarm_scheduler::{Event, WorkerId};
 use rayfarm_tracer::scene::FrameView;
 
 use super::Driver;
+use super::reply::Reply;
 use crate::framebuffer::{Misfit, Written};
 use crate::sessions::lease_book::LeaseStatus;
+use crate::verification::SegmentDigest;
 
 /// An error in a reply, which ends its session.
 #[derive(Debug, thiserror::Error)]
@@ -40,7 +45,8 @@ fn plausible(cost: Cost, view: &FrameView, rows: u32) -> Cost {
 }
 
 impl Driver {
-    /// Handles pixels: checks their lease, writes them into the picture, and then reports them to the scheduler.
+    /// Handles pixels: checks their lease, writes them into the picture, and then reports them to the scheduler. They are
+    /// decoded and hashed outside of the driver's lock.
     ///
     /// # Errors
     /// The worker does not hold the lease, or the pixels do not fit it.
@@ -48,7 +54,7 @@ impl Driver {
         &self,
         worker: WorkerId,
         header: PixelsHeader,
-        bytes: &[u8],
+        bytes: &Bytes,
     ) -> Result<(), AnswerError> {
         let PixelsHeader { lease, encoding, cost } = header;
         let status = match self.lock().sessions.get_mut(worker) {
@@ -57,12 +63,11 @@ impl Driver {
         };
         match status {
             LeaseStatus::Granted => match self.framebuffers.write(worker, lease, encoding, bytes)? {
-                Written::Kept { decode } => {
-                    let mut inner = self.lock();
-                    inner.accounts.received(worker, bytes.len(), decode);
-                    let view = inner.requests.get(&lease.frame).map(|request| request.view);
-                    let cost = view.map_or(cost, |view| plausible(cost, &view, lease.row_count));
-                    self.drive(&mut inner, Event::SegmentDone { worker, lease, cost });
+                Written::Kept { rows, elapsed } => {
+                    let reply = Reply { worker, lease, rows: rows.clone() };
+                    let digests = self.segment_done(reply, cost, bytes.len(), elapsed);
+                    digests.iter().for_each(SegmentDigest::compute);
+                    self.framebuffers.recycle(rows);
                 }
                 Written::Superseded => {}
             },
@@ -71,6 +76,19 @@ impl Driver {
             LeaseStatus::Unknown => return Err(AnswerError::NotHeld(lease)),
         }
         Ok(())
+    }
+
+    /// Reports a reply whose rows are in their picture. Returns the digests to compute without the lock.
+    fn segment_done(&self, reply: Reply, cost: Cost, bytes: usize, elapsed: Duration) -> Vec<SegmentDigest> {
+        let Reply { worker, lease, .. } = reply;
+        let mut inner = self.lock();
+        inner.accounts.received(worker, bytes, elapsed);
+        let view = inner.requests.get(&lease.frame).map(|request| request.view);
+        let cost = view.map_or(cost, |view| plausible(cost, &view, lease.row_count));
+        inner.reply = Some(reply);
+        self.drive(&mut inner, Event::SegmentDone { worker, lease, cost });
+        inner.reply = None;
+        std::mem::take(&mut inner.uncomputed)
     }
 
     /// Handles a worker's report that it cannot render a frame.

@@ -1,7 +1,8 @@
 //! The driver: passes events to the scheduler and performs its actions. Only the driver reads the clock.
 //!
 //! Sessions, the timer and requests call the driver on their own threads. It handles each event under one lock and never
-//! waits there: messages to workers go into bounded queues, and a worker whose queue is full is disconnected.
+//! waits there: messages to workers go into bounded queues, and a worker whose queue is full is disconnected. Pixels are
+//! decoded and hashed outside of the lock.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,6 +19,7 @@ use tokio_util::sync::CancellationToken;
 
 mod answers;
 mod perform;
+mod reply;
 mod routing;
 mod verification;
 mod workers;
@@ -31,9 +33,10 @@ use crate::framebuffer::Framebuffers;
 use crate::options::FarmOptions;
 use crate::sessions::identity::Tickets;
 use crate::sessions::{ByteCount, Sessions};
-use crate::verification::OpenSegments;
 use crate::verification::arbiter::Dispute;
 use crate::verification::delivered::{Delivered, FrameSet};
+use crate::verification::{OpenSegments, SegmentDigest};
+use reply::Reply;
 
 pub(crate) use answers::AnswerError;
 
@@ -66,6 +69,10 @@ struct Inner {
     timeline: Option<TimelineSink>,
     sessions: Sessions,
     open_segments: OpenSegments,
+    /// The reply that is being handled.
+    reply: Option<Reply>,
+    /// Digests that are to be computed after the lock is released.
+    uncomputed: Vec<SegmentDigest>,
     delivered: Delivered,
     /// The requested frames that wait or are in flight.
     requests: BTreeMap<FrameId, Request>,
@@ -122,6 +129,8 @@ impl Driver {
             timeline: None,
             sessions: Sessions::default(),
             open_segments: OpenSegments::default(),
+            reply: None,
+            uncomputed: Vec::new(),
             delivered: Delivered::default(),
             requests: BTreeMap::new(),
             unfetched: VecDeque::new(),
@@ -248,6 +257,12 @@ impl Driver {
         let mut inner = self.lock();
         inner.accounts.keep_marks();
         inner.timeline = Some(sink);
+    }
+
+    /// Sets a function that is called at the start of each decoding of pixels.
+    #[cfg(test)]
+    pub(crate) fn on_decode(&self, hook: impl Fn() + Send + Sync + 'static) {
+        self.framebuffers.on_decode(hook);
     }
 
     /// Handles an event and all events that follow from it.

@@ -2,37 +2,54 @@
 
 use std::collections::VecDeque;
 
+use bytes::Bytes;
 use rayfarm_protocol::{FrameId, Lease, PixelsHeader};
 use rayfarm_scheduler::{Event, Finding, Return, Verdict, WorkerId};
 
 use super::{Driver, Inner, Request};
-use crate::framebuffer::{Misfit, digest};
+use crate::framebuffer::Misfit;
 use crate::verification::arbiter::Dispute;
 use crate::verification::delivered::as_text;
-use crate::verification::{OpenSegment, Rendering};
+use crate::verification::{OpenSegment, Rendering, SegmentDigest};
 
 impl Driver {
-    /// Opens a segment for verification, with the digest of its first rendering. A segment that has rows of another worker
-    /// is not opened: a mismatch could not be attributed.
+    /// Opens a segment for verification: rows of the reply that is being handled. The digest of its first rendering is
+    /// computed later, outside of the lock. A segment that has rows of another worker is not opened: a mismatch could not be
+    /// attributed.
     pub(super) fn open_segment(&self, inner: &mut Inner, worker: WorkerId, lease: Lease) {
         let Some(Request { view, announce, .. }) = inner.requests.get(&lease.frame) else { return };
-        let Some(digest) = self.framebuffers.digest(worker, lease) else { return };
+        if !self.framebuffers.is_all_of(worker, lease) {
+            return;
+        }
+        let Some(rows) = inner.reply.as_ref().and_then(|reply| reply.rows_of(worker, lease)) else { return };
+        let digest = SegmentDigest::of(rows);
+        inner.uncomputed.push(digest.clone());
         let (first, announce) = (Rendering { worker, digest }, announce.clone());
         inner.open_segments.insert(OpenSegment { lease, view: *view, announce, first, second: None });
     }
 
-    /// Compares a second rendering of an open segment with the first. Its pixels go into no picture.
+    /// Compares a second rendering of an open segment with the first. Its pixels go into no picture. They are decoded and
+    /// hashed without a lock.
     ///
     /// # Errors
     /// The pixels do not fit their lease.
-    pub(super) fn verify(&self, worker: WorkerId, header: PixelsHeader, bytes: &[u8]) -> Result<(), Misfit> {
+    pub(super) fn verify(&self, worker: WorkerId, header: PixelsHeader, bytes: &Bytes) -> Result<(), Misfit> {
         let PixelsHeader { lease, encoding, cost } = header;
-        let width = self.lock().open_segments.get(lease.frame, lease.segment).map(|open| open.view.width);
-        let digest = width.map(|width| digest(lease, width as usize * 3, encoding, bytes)).transpose()?;
+        let open = self.lock().open_segments.get(lease.frame, lease.segment).cloned();
+        let second = match open {
+            Some(OpenSegment { view, first, .. }) => {
+                let size = view.width as usize * 3 * lease.row_count as usize;
+                let rows = self.framebuffers.decode(lease, size, encoding, bytes)?;
+                let second = Rendering { worker, digest: SegmentDigest::of(rows.clone()) };
+                first.digest.compute();
+                second.digest.compute();
+                self.framebuffers.recycle(rows);
+                Some(second)
+            }
+            None => None,
+        };
         let mut inner = self.lock();
-        let finding = digest.map_or(Finding::Unknown, |digest| {
-            inner.open_segments.compare(&lease, Rendering { worker, digest })
-        });
+        let finding = second.map_or(Finding::Unknown, |second| inner.open_segments.compare(&lease, second));
         self.drive(&mut inner, Event::SegmentVerified { worker, lease, cost, finding });
         Ok(())
     }
@@ -41,7 +58,8 @@ impl Driver {
     pub(super) fn dispute(&self, inner: &Inner, frame: FrameId, segment: u32) -> Option<Event> {
         let no_fault = Event::SegmentJudged { frame, segment, verdict: Verdict::default() };
         let Some(open) = inner.open_segments.get(frame, segment) else { return Some(no_fault) };
-        let (first, second) = (open.first.digest, open.second.map(|second| second.digest));
+        let first = open.first.digest.clone();
+        let second = open.second.as_ref().map(|second| second.digest.clone());
         let Lease { first_row, row_count, .. } = open.lease;
         let rows = first_row..first_row.saturating_add(row_count);
         let dispute = Dispute { frame, segment, view: open.view, rows, first, second };

@@ -1,4 +1,4 @@
-//! Segments in any order, damaged ones, those of workers that lie.
+//! Segments in any order, damaged segments, and rejected workers.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -20,10 +20,27 @@ fn opened(width: u32, height: u32) -> Arc<Framebuffers> {
     framebuffers
 }
 
-/// Whether the pixels were kept.
+/// Writes pixels of a worker and recycles the decoded rows. Returns whether the pixels were kept.
+fn write_as(
+    framebuffers: &Framebuffers,
+    worker: WorkerId,
+    lease: Lease,
+    encoding: Encoding,
+    bytes: &[u8],
+) -> Result<bool, Misfit> {
+    let bytes = Bytes::copy_from_slice(bytes);
+    Ok(match framebuffers.write(worker, lease, encoding, &bytes)? {
+        Written::Kept { rows, .. } => {
+            framebuffers.recycle(rows);
+            true
+        }
+        Written::Superseded => false,
+    })
+}
+
+/// Writes raw pixels of worker A. Returns whether they were kept.
 fn write(framebuffers: &Framebuffers, lease: Lease, bytes: &[u8]) -> Result<bool, Misfit> {
-    let written = framebuffers.write(A, lease, Encoding::Raw, bytes)?;
-    Ok(matches!(written, Written::Kept { .. }))
+    write_as(framebuffers, A, lease, Encoding::Raw, bytes)
 }
 
 fn packed(bytes: &[u8], block_bytes: usize) -> Vec<u8> {
@@ -56,7 +73,7 @@ fn the_first_pixels_of_a_row_stay() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_writes_nothing() {
+fn pixels_that_do_not_fit_are_refused_and_write_nothing() {
     let framebuffers = opened(1, 2);
     let short = write(&framebuffers, lease(0, 2), &[9; 5]).unwrap_err();
     assert_eq!(short, Misfit::Bytes { lease: lease(0, 2), expected: 6, got: 5 });
@@ -76,7 +93,7 @@ fn a_closed_frame_takes_no_pixels() {
 }
 
 #[test]
-fn buffers_are_used_again_and_not_hoarded() {
+fn buffers_are_reused_and_their_number_is_bounded() {
     let framebuffers = opened(1, 1);
     let pictures: Vec<FramePixels> = (0..6)
         .map(|n| {
@@ -98,16 +115,16 @@ fn buffers_are_used_again_and_not_hoarded() {
 fn packed_pixels_are_unpacked_into_their_rows() {
     let framebuffers = opened(2, 4);
     let rows: Vec<u8> = (0..18).collect();
-    framebuffers.write(A, lease(1, 3), Encoding::Lz4, &packed(&rows, 7)).unwrap();
+    write_as(&framebuffers, A, lease(1, 3), Encoding::Lz4, &packed(&rows, 7)).unwrap();
     write(&framebuffers, lease(0, 2), &[9; 12]).unwrap();
     assert_eq!(*framebuffers.finish(FRAME).unwrap(), [vec![9; 6], rows].concat());
 }
 
 #[test]
-fn packed_pixels_leave_the_rows_alone_that_are_there() {
+fn packed_pixels_do_not_replace_rows() {
     let framebuffers = opened(1, 3);
     write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
-    framebuffers.write(A, lease(0, 3), Encoding::Lz4, &packed(&[2; 9], 9)).unwrap();
+    write_as(&framebuffers, A, lease(0, 3), Encoding::Lz4, &packed(&[2; 9], 9)).unwrap();
     assert_eq!(*framebuffers.finish(FRAME).unwrap(), [2, 2, 2, 1, 1, 1, 2, 2, 2]);
 }
 
@@ -115,31 +132,47 @@ fn packed_pixels_leave_the_rows_alone_that_are_there() {
 fn rows_of_a_rejected_worker_leave_the_picture_for_good() {
     let framebuffers = opened(1, 5);
     let write = |worker, lease, byte: u8| {
-        framebuffers.write(worker, lease, Encoding::Raw, &vec![byte; lease.row_count as usize * 3]).unwrap()
+        write_as(&framebuffers, worker, lease, Encoding::Raw, &vec![byte; lease.row_count as usize * 3])
+            .unwrap()
     };
     write(A, lease(0, 1), 1);
     write(B, lease(1, 2), 2);
     write(A, lease(2, 2), 3);
     write(B, lease(4, 1), 4);
     assert_eq!(framebuffers.reject(B), [(FRAME, 1..3), (FRAME, 4..5)]);
-    assert_eq!(write(B, lease(1, 2), 5), Written::Superseded);
+    assert!(!write(B, lease(1, 2), 5));
     assert!(framebuffers.reject(B).is_empty());
     write(A, lease(1, 4), 6);
     assert_eq!(*framebuffers.finish(FRAME).unwrap(), [1, 1, 1, 6, 6, 6, 6, 6, 6, 3, 3, 3, 6, 6, 6]);
 }
 
 #[test]
-fn a_digest_is_of_one_workers_rows_alone() {
+fn rows_are_attributed_to_the_worker_that_sent_them_first() {
     let framebuffers = opened(1, 3);
-    framebuffers.write(A, lease(0, 2), Encoding::Raw, &[1; 6]).unwrap();
-    framebuffers.write(B, lease(1, 2), Encoding::Raw, &[2; 6]).unwrap();
-    assert_eq!(framebuffers.digest(A, lease(0, 2)), Some(SegmentDigest::of(&[1; 6])));
-    assert_eq!(framebuffers.digest(B, lease(2, 1)), Some(SegmentDigest::of(&[2; 3])));
-    for other in [lease(0, 3), lease(1, 2), lease(2, 2)] {
-        assert_eq!(framebuffers.digest(B, other), None);
+    write_as(&framebuffers, A, lease(0, 2), Encoding::Raw, &[1; 6]).unwrap();
+    write_as(&framebuffers, B, lease(1, 2), Encoding::Raw, &[2; 6]).unwrap();
+    assert!(framebuffers.is_all_of(A, lease(0, 2)) && framebuffers.is_all_of(B, lease(2, 1)));
+    for other in [lease(0, 3), lease(1, 2), lease(2, 2), lease(u32::MAX, u32::MAX)] {
+        assert!(!framebuffers.is_all_of(B, other));
     }
-    assert_eq!(digest(lease(0, 2), 3, Encoding::Lz4, &packed(&[1; 6], 4)), Ok(SegmentDigest::of(&[1; 6])));
-    assert!(digest(lease(0, 2), 3, Encoding::Raw, &[1; 5]).is_err());
+}
+
+#[test]
+fn decoded_rows_share_the_received_bytes_or_a_recycled_buffer() {
+    let framebuffers = opened(1, 1);
+    let raw = Bytes::from(vec![1; 6]);
+    let decode = |encoding, bytes: &Bytes| framebuffers.decode(lease(0, 2), 6, encoding, bytes);
+    assert_eq!(decode(Encoding::Raw, &raw).unwrap().as_ptr(), raw.as_ptr());
+    let lz4 = Bytes::from(packed(&[1; 6], 4));
+    let rows = decode(Encoding::Lz4, &lz4).unwrap();
+    assert_eq!(*rows, *raw);
+    let buffer = rows.as_ptr();
+    framebuffers.recycle(rows);
+    let again = decode(Encoding::Lz4, &lz4).unwrap();
+    assert_eq!(again.as_ptr(), buffer);
+    framebuffers.recycle(again.clone());
+    assert_ne!(decode(Encoding::Lz4, &lz4).unwrap().as_ptr(), buffer, "a clone keeps its buffer");
+    assert!(decode(Encoding::Raw, &raw.slice(..5)).is_err());
 }
 
 /// Three pixels of reduced colours, and what they take at two bytes each.
@@ -152,11 +185,12 @@ fn narrow_pixels_are_widened_into_their_rows() {
     {
         let framebuffers = opened(1, 4);
         write(&framebuffers, lease(1, 1), &[1; 3]).unwrap();
-        framebuffers.write(B, lease(0, 3), encoding, &bytes).unwrap();
+        write_as(&framebuffers, B, lease(0, 3), encoding, &bytes).unwrap();
         write(&framebuffers, lease(3, 1), &[9; 3]).unwrap();
         let expected = [&FEW_COLORS[..3], &[1; 3], &FEW_COLORS[6..], &[9; 3]].concat();
         assert_eq!(*framebuffers.finish(FRAME).unwrap(), expected[..], "{encoding:?}");
-        assert_eq!(digest(lease(0, 3), 3, encoding, &bytes), Ok(SegmentDigest::of(&FEW_COLORS)));
+        let decoded = framebuffers.decode(lease(0, 3), 9, encoding, &Bytes::from(bytes));
+        assert_eq!(*decoded.unwrap(), FEW_COLORS);
     }
 }
 
@@ -164,11 +198,11 @@ fn narrow_pixels_are_widened_into_their_rows() {
 fn narrow_pixels_of_another_length_are_refused() {
     let framebuffers = opened(1, 3);
     for got in [0, 5, 7, 9] {
-        let refused = framebuffers.write(A, lease(0, 3), Encoding::Narrow, &vec![0; got]).unwrap_err();
+        let refused = write_as(&framebuffers, A, lease(0, 3), Encoding::Narrow, &vec![0; got]).unwrap_err();
         assert_eq!(refused, Misfit::Bytes { lease: lease(0, 3), expected: 6, got });
     }
     for broken in [packed(&NARROW[..5], 6), packed(&FEW_COLORS, 9), vec![0xff; 40]] {
-        let refused = framebuffers.write(A, lease(0, 3), Encoding::NarrowLz4, &broken).unwrap_err();
+        let refused = write_as(&framebuffers, A, lease(0, 3), Encoding::NarrowLz4, &broken).unwrap_err();
         assert!(matches!(refused, Misfit::Blocks { .. }), "{refused}");
     }
     write(&framebuffers, lease(0, 3), &[7; 9]).unwrap();
@@ -177,7 +211,7 @@ fn narrow_pixels_of_another_length_are_refused() {
 
 proptest! {
     #[test]
-    fn broken_blocks_fill_no_row_and_spoil_none(
+    fn broken_blocks_write_no_row(
         bytes in vec(any::<u8>(), 0..80),
         at in any::<prop::sample::Index>(),
         valid: bool,
@@ -188,7 +222,7 @@ proptest! {
         if valid {
             broken.truncate(at.index(broken.len()));
         }
-        let refused = framebuffers.write(A, lease(0, 4), Encoding::Lz4, &broken).is_err();
+        let refused = write_as(&framebuffers, A, lease(0, 4), Encoding::Lz4, &broken).is_err();
         prop_assert!(refused || !valid);
         if refused {
             write(&framebuffers, lease(0, 4), &[5; 48]).unwrap();

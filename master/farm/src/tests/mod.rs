@@ -25,6 +25,7 @@ use rayfarm_scheduler::{SegmentPolicy, WorkerState};
 
 mod asset_routing;
 mod commands;
+mod decoding;
 mod identity;
 mod invalid_peers;
 mod verification;

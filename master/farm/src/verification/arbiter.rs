@@ -55,7 +55,7 @@ pub(crate) async fn run(
 
 fn settle(dispute: Dispute, renderer: &RowRenderer) -> Result<Verdict, String> {
     let Dispute { view, rows, first, second, .. } = dispute;
-    let own = SegmentDigest::of(&renderer(&view, rows)?);
+    let own = SegmentDigest::of(renderer(&view, rows)?);
     Ok(Verdict { traced: true, painter: first != own, checker: second.is_some_and(|second| second != own) })
 }
 

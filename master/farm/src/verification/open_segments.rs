@@ -22,7 +22,7 @@ pub(crate) struct OpenSegment {
 }
 
 /// The digest of a worker's rendering.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Rendering {
     pub(crate) worker: WorkerId,
     pub(crate) digest: SegmentDigest,
@@ -50,7 +50,7 @@ impl OpenSegments {
         self.0.range((frame, 0)..=(frame, u32::MAX)).next().map(|(_, segment)| &segment.announce)
     }
 
-    /// Compares a second rendering with the first.
+    /// Compares a second rendering with the first. Both digests should be computed before, outside of locks.
     pub(crate) fn compare(&mut self, lease: &Lease, second: Rendering) -> Finding {
         let Some(segment) = self.0.get_mut(&(lease.frame, lease.segment)) else { return Finding::Unknown };
         if segment.first.digest == second.digest {
@@ -58,10 +58,10 @@ impl OpenSegments {
         }
         // A dispute is settled at once, so an earlier second rendering comes from a worker that had lost its lease: the
         // latest one counts.
+        let (first, other) = (segment.first.worker, second.worker);
         segment.second = Some(second);
-        let (first, second) = (segment.first.worker, second.worker);
         tracing::warn!(
-            "{first} and {second} have sent different pixels of {lease}; the master renders them itself"
+            "{first} and {other} have sent different pixels of {lease}; the master renders them itself"
         );
         Finding::Different
     }
@@ -76,7 +76,7 @@ mod tests {
     use crate::testing::test_scene::view;
 
     fn rendering(worker: u64) -> Rendering {
-        Rendering { worker: WorkerId(worker), digest: SegmentDigest::of(&worker.to_le_bytes()) }
+        Rendering { worker: WorkerId(worker), digest: SegmentDigest::of(worker.to_le_bytes().to_vec()) }
     }
 
     #[test]
@@ -89,7 +89,10 @@ mod tests {
         assert_eq!(open.compare(&lease, Rendering { worker: WorkerId(2), ..rendering(1) }), Finding::Same);
         for second in [3, 4] {
             assert_eq!(open.compare(&lease, rendering(second)), Finding::Different);
-            assert_eq!(open.get(frame, 0).and_then(|open| open.second).unwrap().worker, WorkerId(second));
+            assert_eq!(
+                open.get(frame, 0).and_then(|open| open.second.as_ref()).unwrap().worker,
+                WorkerId(second)
+            );
         }
     }
 }
