@@ -63,8 +63,8 @@ impl Driver {
         };
         match status {
             LeaseStatus::Granted => match self.framebuffers.write(worker, lease, encoding, bytes)? {
-                Written::Kept { rows, elapsed } => {
-                    let reply = Reply { worker, lease, rows: rows.clone() };
+                Written::Kept { rows, all_new, elapsed } => {
+                    let reply = Reply { worker, lease, rows: rows.clone(), all_new };
                     let digests = self.segment_done(reply, cost, bytes.len(), elapsed);
                     digests.iter().for_each(SegmentDigest::compute);
                     self.framebuffers.recycle(rows);

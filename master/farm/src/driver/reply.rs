@@ -12,6 +12,8 @@ pub(super) struct Reply {
     pub(super) worker: WorkerId,
     pub(super) lease: Lease,
     pub(super) rows: DecodedRows,
+    /// Whether the picture has all of the lease's rows from this reply.
+    pub(super) all_new: bool,
 }
 
 /// A run of the rows of a reply. It shares the reply's bytes.
@@ -22,10 +24,11 @@ pub(super) struct ReplyRows {
 }
 
 impl Reply {
-    /// The rows of `lease`, where they are a part of the reply's rows.
+    /// The rows of `lease`, where they are a part of the reply's rows and the picture has all of these from this reply.
     pub(super) fn rows_of(&self, worker: WorkerId, lease: Lease) -> Option<ReplyRows> {
         let (whole, part) = (self.lease.rows()?, lease.rows()?);
-        if (worker, lease.frame) != (self.worker, self.lease.frame) || part.end > whole.end {
+        let is_own = (worker, lease.frame) == (self.worker, self.lease.frame);
+        if !self.all_new || !is_own || part.end > whole.end {
             return None;
         }
         let row_bytes = self.rows.len() / self.lease.row_count as usize;

@@ -21,8 +21,14 @@ impl Driver {
         if !self.framebuffers.is_all_of(worker, lease) {
             return;
         }
-        let Some(rows) = inner.reply.as_ref().and_then(|reply| reply.rows_of(worker, lease)) else { return };
-        let digest = SegmentDigest::of(rows);
+        let digest = match inner.reply.as_ref().and_then(|reply| reply.rows_of(worker, lease)) {
+            Some(rows) => SegmentDigest::of(rows),
+            // The worker has sent some of these rows before, in a reply that the scheduler did not count.
+            None => match self.framebuffers.copy_of(worker, lease) {
+                Some(rows) => SegmentDigest::of(rows),
+                None => return,
+            },
+        };
         inner.uncomputed.push(digest.clone());
         let (first, announce) = (Rendering { worker, digest }, announce.clone());
         inner.open_segments.insert(OpenSegment { lease, view: *view, announce, first, second: None });

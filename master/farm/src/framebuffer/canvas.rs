@@ -41,11 +41,11 @@ impl Canvas {
         }
     }
 
-    /// Copies the rows of a lease into the picture. Rows that have pixels keep them.
+    /// Copies the rows of a lease into the picture. Rows that have pixels keep them. Returns whether no row had any.
     ///
     /// # Errors
     /// The lease has rows outside of the picture, or `rows` has another length than they; nothing is copied.
-    pub(super) fn write(&mut self, from: WorkerId, lease: Lease, rows: &[u8]) -> Result<(), Misfit> {
+    pub(super) fn write(&mut self, from: WorkerId, lease: Lease, rows: &[u8]) -> Result<bool, Misfit> {
         let expected = self.bytes_of(lease)?;
         if rows.len() != expected {
             return Err(Misfit::Bytes { lease, expected, got: rows.len() });
@@ -54,7 +54,8 @@ impl Canvas {
         let outside = Misfit::Rows { lease, rows: self.filled.len() };
         let filled = self.filled.get_mut(first..first + count).ok_or(outside)?;
         let target = self.pixels.get_mut(first * row_bytes..(first + count) * row_bytes).ok_or(outside)?;
-        if filled.iter().all(Option::is_none) {
+        let all_new = filled.iter().all(Option::is_none);
+        if all_new {
             target.copy_from_slice(rows);
         } else {
             let rows = target.chunks_exact_mut(row_bytes.max(1)).zip(rows.chunks_exact(row_bytes.max(1)));
@@ -65,7 +66,7 @@ impl Canvas {
             *filled = Some(from);
             self.missing -= 1;
         }
-        Ok(())
+        Ok(all_new)
     }
 
     /// Whether all rows of a lease have this worker's pixels.
@@ -73,6 +74,13 @@ impl Canvas {
         let end = (lease.first_row as usize).saturating_add(lease.row_count as usize);
         let rows = self.filled.get(lease.first_row as usize..end);
         rows.is_some_and(|rows| rows.iter().all(|filled| *filled == Some(worker)))
+    }
+
+    /// A copy of the rows of a lease, if all of them have this worker's pixels.
+    pub(super) fn copy_of(&self, worker: WorkerId, lease: Lease) -> Option<Vec<u8>> {
+        let start = lease.first_row as usize * self.row_bytes;
+        let rows = || self.pixels.get(start..start + lease.row_count as usize * self.row_bytes);
+        self.is_all_of(worker, lease).then(rows).flatten().map(<[u8]>::to_vec)
     }
 
     /// The workers whose rows are in the picture.

@@ -17,7 +17,7 @@ pub(crate) enum Misfit {
     Bytes { lease: Lease, expected: usize, got: usize },
     #[error("{lease}: {source}")]
     Blocks { lease: Lease, source: BlockError },
-    #[error("{lease} lies outside of the picture of {rows} rows")]
+    #[error("{lease} has rows outside of the picture of {rows} rows")]
     Rows { lease: Lease, rows: usize },
 }
 
@@ -29,7 +29,7 @@ pub(crate) struct DecodedRows(Storage);
 enum Storage {
     /// Raw pixels stay where they were received.
     Received(Bytes),
-    /// The first bytes of a buffer, as many as the number says.
+    /// The first bytes of a buffer; the number is their count.
     Buffer(Arc<Vec<u8>>, usize),
 }
 

@@ -46,9 +46,15 @@ struct Inner {
 /// Outcome of writing the pixels of a segment.
 #[derive(Clone, Debug)]
 pub(crate) enum Written {
-    /// The rows are in the picture, or the picture had them already. `elapsed` is the time for decoding and copying; give
-    /// `rows` back to [`Framebuffers::recycle`].
-    Kept { rows: DecodedRows, elapsed: Duration },
+    /// The rows are in the picture, or the picture had them already.
+    Kept {
+        /// The decoded rows; give them back to [`Framebuffers::recycle`].
+        rows: DecodedRows,
+        /// Whether all of them are in the picture: it had none of these rows before.
+        all_new: bool,
+        /// Time for decoding and copying.
+        elapsed: Duration,
+    },
     /// The frame is not open, or the worker is rejected: the pixels are dropped.
     Superseded,
 }
@@ -94,8 +100,8 @@ impl Framebuffers {
             return Ok(Written::Superseded);
         };
         let started = Instant::now();
-        canvas.write(from, lease, &rows)?;
-        Ok(Written::Kept { rows, elapsed: decoding + started.elapsed() })
+        let all_new = canvas.write(from, lease, &rows)?;
+        Ok(Written::Kept { rows, all_new, elapsed: decoding + started.elapsed() })
     }
 
     /// Decodes the pixels of a lease: `row_bytes` bytes of RGB8 rows. Takes no lock of the pictures.
@@ -120,6 +126,11 @@ impl Framebuffers {
     /// Whether all rows of a lease are in the picture with this worker's pixels.
     pub(crate) fn is_all_of(&self, worker: WorkerId, lease: Lease) -> bool {
         self.lock().open.get(&lease.frame).is_some_and(|canvas| canvas.is_all_of(worker, lease))
+    }
+
+    /// A copy of the rows of a lease, if all of them are in the picture with this worker's pixels.
+    pub(crate) fn copy_of(&self, worker: WorkerId, lease: Lease) -> Option<Vec<u8>> {
+        self.lock().open.get(&lease.frame)?.copy_of(worker, lease)
     }
 
     /// Removes a worker's rows from all pictures, and drops its pixels from now on. Returns the rows that are missing now.

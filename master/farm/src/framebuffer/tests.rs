@@ -158,6 +158,20 @@ fn rows_are_attributed_to_the_worker_that_sent_them_first() {
 }
 
 #[test]
+fn a_copy_has_the_pixels_of_the_picture_and_not_of_the_last_reply() {
+    let framebuffers = opened(1, 3);
+    for (byte, expected) in [(1, true), (2, false)] {
+        match framebuffers.write(A, lease(0, 2), Encoding::Raw, &Bytes::from(vec![byte; 6])).unwrap() {
+            Written::Kept { all_new, .. } => assert_eq!(all_new, expected),
+            Written::Superseded => panic!("the frame is open"),
+        }
+    }
+    assert_eq!(framebuffers.copy_of(A, lease(0, 2)).unwrap(), [1; 6]);
+    assert_eq!(framebuffers.copy_of(A, lease(1, 2)), None);
+    assert_eq!(framebuffers.copy_of(B, lease(0, 2)), None);
+}
+
+#[test]
 fn decoded_rows_share_the_received_bytes_or_a_recycled_buffer() {
     let framebuffers = opened(1, 1);
     let raw = Bytes::from(vec![1; 6]);

@@ -24,7 +24,7 @@ pub enum Script {
     /// Renders every lease correctly.
     Correct,
     /// Closes the connection without a goodbye at its n-th lease, from 0.
-    VanishAt(usize),
+    DisconnectAt(usize),
     /// Delays the reply to its first lease until the channel fires.
     Late(oneshot::Receiver<()>),
     /// Takes 2.44 microseconds a pixel: five milliseconds for a frame of 32 x 64 pixels.
@@ -40,7 +40,7 @@ pub enum Script {
     /// Reports that it cannot render its first lease.
     FailOnce,
     /// Sends bytes that are no envelope after its handshake.
-    Babble,
+    Garbage,
 }
 
 /// The end of a fake worker's session.
@@ -88,8 +88,8 @@ pub async fn start(address: SocketAddr, script: Script) -> JoinHandle<Outcome> {
 }
 
 async fn run(stream: TcpStream, mut script: Script) -> Outcome {
-    if matches!(script, Script::Babble) {
-        return babble(stream).await;
+    if matches!(script, Script::Garbage) {
+        return send_garbage(stream).await;
     }
     let (sender, mut receiver, _) = session::spawn::<_, ToMaster, ToWorker>(stream);
     let mut outcome = Outcome { goodbye: None, leases: 0, drained: false };
@@ -102,7 +102,7 @@ async fn run(stream: TcpStream, mut script: Script) -> Outcome {
             ToWorker::Segment(lease) => {
                 let view = views.iter().find(|(frame, _)| *frame == lease.frame).expect("announced").1;
                 outcome.leases += 1;
-                if matches!(script, Script::VanishAt(n) if n + 1 == outcome.leases) {
+                if matches!(script, Script::DisconnectAt(n) if n + 1 == outcome.leases) {
                     sender.abort();
                     return outcome;
                 }
@@ -117,7 +117,7 @@ async fn run(stream: TcpStream, mut script: Script) -> Outcome {
             | ToWorker::AssetUnknown { .. }
             | ToWorker::AssetFrom { .. }
             | ToWorker::ShareKey { .. } => {
-                unreachable!("a fake worker asks for no assets")
+                unreachable!("a fake worker requests no assets")
             }
         }
     }
@@ -128,7 +128,7 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
     let mut bytes = pixels(view, lease.first_row..lease.first_row + lease.row_count);
     // Every other deviation happens once.
     let deviation = match script {
-        Script::VanishAt(_) => Script::Correct,
+        Script::DisconnectAt(_) => Script::Correct,
         Script::Busy => Script::Busy,
         Script::WrongPixels => Script::WrongPixels,
         Script::OnlyNarrowerThan(width) if view.width >= *width => return,
@@ -140,7 +140,7 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
             tokio::time::sleep(PIXEL_TIME * (bytes.len() / 3) as u32).await;
             1
         }
-        Script::Correct | Script::VanishAt(_) | Script::OnlyNarrowerThan(_) | Script::Babble => 1,
+        Script::Correct | Script::DisconnectAt(_) | Script::OnlyNarrowerThan(_) | Script::Garbage => 1,
         Script::Late(go) => {
             let sender = sender.clone();
             tokio::spawn(async move {
@@ -176,7 +176,7 @@ async fn send_pixels(sender: &Sender<ToMaster>, lease: Lease, bytes: Vec<u8>) {
 }
 
 /// Sends bytes that are no envelope, until the master closes the connection.
-async fn babble(stream: TcpStream) -> Outcome {
+async fn send_garbage(stream: TcpStream) -> Outcome {
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
     let (mut read, mut write) = stream.into_split();
     write.write_all(&[0xff; 64]).await.unwrap();

@@ -8,7 +8,7 @@ async fn invalid_peers_do_not_disturb_the_farm() {
     fake_worker::start(farm.address(), Script::Correct).await;
     until_workers(&farm, 1).await;
     farm.request(view());
-    let garbage = fake_worker::start(farm.address(), Script::Babble).await;
+    let garbage = fake_worker::start(farm.address(), Script::Garbage).await;
     let mut silent = TcpStream::connect(farm.address()).await.unwrap();
     let mut browser = TcpStream::connect(farm.address()).await.unwrap();
     browser.write_all(b"GET / HTTP/1.1\r\nHost: farm\r\n\r\n").await.unwrap();

@@ -99,7 +99,7 @@ async fn a_frame_survives_a_lost_worker() {
     for policy in [SegmentPolicy::Static(4), SegmentPolicy::Adaptive] {
         for lease in 0..3 {
             let mut farm = farm(policy).await;
-            let lost = fake_worker::start(farm.address(), Script::VanishAt(lease)).await;
+            let lost = fake_worker::start(farm.address(), Script::DisconnectAt(lease)).await;
             until_workers(&farm, 1).await;
             farm.request(view());
             in_time(lost).await.unwrap();
