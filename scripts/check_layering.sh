@@ -29,17 +29,15 @@ forbid_dependency() {
     fi
 }
 
-forbid_dependency tracer 'rayfarm-(protocol|ids|scheduler|farm|master|worker)|tokio|minifb' \
+forbid_dependency tracer 'rayfarm-(protocol|scheduler|farm|master|worker)|tokio|minifb' \
     'tracer: no sockets, no async runtime, no window, no other crate of the farm but text'
 forbid_dependency protocol 'rayfarm-(tracer|scheduler|farm|master|worker)|image|glam' \
     'protocol: carries scenes and pixels as bytes and interprets neither'
-forbid_dependency protocol/ids 'rayfarm-.*|tokio' \
-    'ids: plain data'
 forbid_dependency protocol/text 'rayfarm-.*' \
     'text: knows no other crate of the farm'
 forbid_dependency worker 'rayfarm-(scheduler|farm|master)|minifb' \
     'worker: knows tracer and protocol only'
-forbid_dependency master/scheduler 'rayfarm-(protocol|tracer|farm|master|worker)|tokio.*|minifb' \
+forbid_dependency master/scheduler 'rayfarm-(tracer|farm|master|worker)|tokio.*|minifb' \
     'scheduler: pure; pixels bypass it'
 forbid_dependency master/farm 'rayfarm-master|clap|minifb' \
     'farm: no command line and no display'

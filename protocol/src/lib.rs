@@ -20,6 +20,7 @@ pub mod codec;
 pub mod envelope;
 mod error;
 pub mod handshake;
+mod ids;
 pub mod limits;
 pub mod message;
 pub mod passing;
@@ -28,9 +29,9 @@ pub mod session;
 pub mod tcp;
 
 pub use error::{ProtocolError, Role};
+pub use ids::{AssetId, FrameId, Lease};
 pub use message::{FrameAnnounce, Hello, Reconnect, ToMaster, ToWorker, Welcome};
-pub use pixels::{Encoding, PixelsHeader};
-pub use rayfarm_ids::{AssetId, Cost, FrameId, Lease};
+pub use pixels::{Cost, Encoding, PixelsHeader};
 
 /// Version of everything behind the preamble. It grows with every change that an older peer would misread.
 pub const PROTOCOL_VERSION: u16 = 4;

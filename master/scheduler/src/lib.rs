@@ -42,7 +42,7 @@ pub use action::{Action, Return};
 pub use audits::{Finding, Verdict, Verification};
 pub use event::{Event, HostId, WorkerId};
 pub use policy::SegmentPolicy;
-pub use rayfarm_ids::{Cost, FrameId, Lease};
+pub use rayfarm_protocol::{Cost, FrameId, Lease};
 pub use record::{Progress, WorkerRecord, WorkerState};
 
 use assign::MAX_FRAMES;

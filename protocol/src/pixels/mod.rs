@@ -11,9 +11,9 @@ mod blocks;
 mod narrow;
 
 use bytes::{Buf, BufMut};
-use rayfarm_ids::{Cost, FrameId, Lease};
 
 use crate::envelope::Kind;
+use crate::ids::{FrameId, Lease};
 use crate::{ProtocolError, limits};
 
 pub use blocks::{BlockError, Packer, unpack};
@@ -33,6 +33,28 @@ pub enum Encoding {
     Narrow,
     /// These in blocks of LZ4.
     NarrowLz4,
+}
+
+/// What a segment cost the worker. Times are the worker's own: no two clocks are compared.
+///
+/// From the lease's arrival to the moment its pixels are handed to the session it takes `wait_ns + span_ns`; what the
+/// master waits beyond that went into the wire and its queues.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Nanoseconds of tracing, summed over the render threads.
+    pub trace_ns: u64,
+    /// From the moment the lease arrived until its first row was begun: earlier leases, the scene on its way.
+    pub wait_ns: u64,
+    /// Nanoseconds of encoding the pixels, summed over the render threads.
+    pub encode_ns: u64,
+    /// From the moment its first row was begun until all of it was traced and encoded, by the clock on the wall.
+    pub span_ns: u64,
+    /// Primary rays.
+    pub primary: u64,
+    /// Shadow rays.
+    pub shadow: u64,
+    /// Rays of reflection and transmission.
+    pub secondary: u64,
 }
 
 /// What a run of pixels is.
@@ -63,7 +85,7 @@ impl PixelsHeader {
             Encoding::NarrowLz4 => 3,
         });
         rest.put_u32_le(0);
-        put_cost(cost, &mut rest);
+        cost.put(&mut rest);
         bytes
     }
 
@@ -85,28 +107,42 @@ impl PixelsHeader {
                 return Err(ProtocolError::malformed(Kind::Pixels, format!("encoding {other} is not known")));
             }
         };
-        Ok(Self { lease, encoding, cost: get_cost(&mut rest) })
+        Ok(Self { lease, encoding, cost: Cost::get(&mut rest) })
     }
 }
 
-/// Appends a cost: seven numbers of eight bytes.
-fn put_cost(cost: Cost, to: &mut impl BufMut) {
-    let Cost { trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary } = cost;
-    [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary]
-        .into_iter()
-        .for_each(|value| to.put_u64_le(value));
+impl std::ops::AddAssign for Cost {
+    /// What several segments cost together.
+    fn add_assign(&mut self, other: Self) {
+        let add = |sum: &mut u64, more| *sum = sum.saturating_add(more);
+        add(&mut self.trace_ns, other.trace_ns);
+        add(&mut self.wait_ns, other.wait_ns);
+        add(&mut self.encode_ns, other.encode_ns);
+        add(&mut self.span_ns, other.span_ns);
+        add(&mut self.primary, other.primary);
+        add(&mut self.shadow, other.shadow);
+        add(&mut self.secondary, other.secondary);
+    }
 }
 
-/// Reads what [`put_cost`] has written.
-fn get_cost(from: &mut impl Buf) -> Cost {
-    Cost {
-        trace_ns: from.get_u64_le(),
-        wait_ns: from.get_u64_le(),
-        encode_ns: from.get_u64_le(),
-        span_ns: from.get_u64_le(),
-        primary: from.get_u64_le(),
-        shadow: from.get_u64_le(),
-        secondary: from.get_u64_le(),
+impl Cost {
+    fn put(self, to: &mut impl BufMut) {
+        let Self { trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary } = self;
+        [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary]
+            .into_iter()
+            .for_each(|value| to.put_u64_le(value));
+    }
+
+    fn get(from: &mut impl Buf) -> Self {
+        Self {
+            trace_ns: from.get_u64_le(),
+            wait_ns: from.get_u64_le(),
+            encode_ns: from.get_u64_le(),
+            span_ns: from.get_u64_le(),
+            primary: from.get_u64_le(),
+            shadow: from.get_u64_le(),
+            secondary: from.get_u64_le(),
+        }
     }
 }
 
