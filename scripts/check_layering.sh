@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# The walls between the rooms, checked by a machine:
-# - tracer and protocol know neither each other nor master nor worker; the tracer no sockets, the protocol no pixels;
-# - the scheduler knows neither clock, socket, async runtime, window nor image; nor does the accounting.
+# Checks the walls between crates that Cargo cannot enforce. Cargo itself keeps apart what depends on nothing: a crate can name
+# only what its Cargo.toml lists. Left for this script:
+# - the dependency lists themselves: tracer and protocol do not know each other, the scheduler has no async runtime and no tracer;
+# - parts of the standard library: sockets, clocks and threads;
+# - rooms inside a crate: the accounting of the farm is pure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,18 +19,33 @@ forbid() {
     fi
 }
 
-forbid tracer/src 'rayfarm_(protocol|master|worker)|\b(tokio|minifb)::|std::net' \
-    'tracer: no sockets, no async, no window, no other crate of the farm but text'
-forbid protocol/text/src 'rayfarm_' \
-    'text: knows no other crate of the farm'
-forbid protocol/src 'rayfarm_(tracer|master|worker)|\b(image|glam)::' \
-    'protocol: carries scenes and pixels as bytes and interprets neither'
-forbid worker/src 'rayfarm_master|minifb::' \
-    'worker: knows tracer and protocol only'
-forbid master/src/scheduler '\btokio\b|Instant::now|SystemTime|std::net|minifb|rayfarm_tracer|std::thread' \
-    'scheduler: pure; time is passed in, pixels bypass it'
-forbid master/src/accounting '\btokio\b|Instant::now|SystemTime|std::net|minifb|rayfarm_tracer' \
-    'accounting: time is passed in; it is told what happens, and asks nobody'
+# forbid_dependency CRATE_FOLDER PATTERN REASON: no dependency, also not for tests, may match.
+forbid_dependency() {
+    local found
+    found=$(grep -nE "^($2)([.[:space:]]|=)" "$1/Cargo.toml" || true)
+    if [ -n "$found" ]; then
+        printf '%s/Cargo.toml:%s\n  ^ %s\n' "$1" "$found" "$3"
+        failed=1
+    fi
+}
 
-[ "$failed" = 0 ] && echo "the walls stand"
+forbid_dependency tracer 'rayfarm-(protocol|scheduler|farm|master|worker)|tokio|minifb' \
+    'tracer: no sockets, no async runtime, no window, no other crate of the farm but text'
+forbid_dependency protocol 'rayfarm-(tracer|scheduler|farm|master|worker)|image|glam' \
+    'protocol: carries scenes and pixels as bytes and interprets neither'
+forbid_dependency protocol/text 'rayfarm-.*' \
+    'text: knows no other crate of the farm'
+forbid_dependency worker 'rayfarm-(scheduler|farm|master)|minifb' \
+    'worker: knows tracer and protocol only'
+forbid_dependency master/scheduler 'rayfarm-(tracer|farm|master|worker)|tokio.*|minifb' \
+    'scheduler: pure; pixels bypass it'
+forbid_dependency master/farm 'rayfarm-master|clap|minifb' \
+    'farm: no command line and no display'
+
+forbid tracer/src 'std::net' 'tracer: no sockets'
+forbid master/scheduler/src 'Instant::now|SystemTime|std::net|std::thread' 'scheduler: time is passed in'
+forbid master/farm/src/accounting '\btokio\b|Instant::now|SystemTime|std::net|rayfarm_tracer' \
+    'accounting: pure; time is passed in'
+
+[ "$failed" = 0 ] && echo "the walls hold"
 exit "$failed"

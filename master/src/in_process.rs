@@ -1,20 +1,20 @@
-//! Frames rendered by the threads of this one process, without the farm.
+//! Frames rendered by the threads of this process, without a farm.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use rayfarm_tracer::{Cancelled, PreparedFrame, RayCounts, render_rows};
 
-/// Threads that can run at once here.
+/// Number of threads that run at the same time on this machine.
 pub(crate) fn all_cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Traces a frame into `pixels` (RGB8) with `threads` threads, each taking the next band of rows that nobody has begun. `cancelled` is asked
-/// before each band, and `done` is told how many rows each had.
+/// Traces a frame into `pixels` (RGB8 rows) with `threads` threads. Each takes the next band of rows, calls `cancelled` before
+/// it and `done` with its row count after it.
 ///
 /// # Errors
-/// [`Cancelled`], when `cancelled` says so.
+/// [`Cancelled`], when `cancelled` returns true.
 pub(crate) fn trace(
     frame: &PreparedFrame,
     pixels: &mut [u8],

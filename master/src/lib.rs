@@ -4,59 +4,35 @@
 //! reports) asks for frames and shows them; everything below it (scheduler, sessions, framebuffers, local worker
 //! processes) sees to it that each one completes.
 
-mod accounting;
-mod addresses;
-mod assets;
 mod camera_control;
-mod chains;
 mod cli;
 mod commands;
 mod control;
-mod delivered;
 mod dial;
 mod display;
-mod driver;
 mod error;
-pub mod farm;
-mod farm_control;
-mod framebuffer;
-mod identity;
 mod in_process;
-mod judge;
-mod lease_book;
-mod local_workers;
 mod logging;
 mod orbit;
 mod output;
-mod pace;
 mod plan;
 mod plot;
 mod progress;
 mod report;
-mod roster;
-pub mod scheduler;
-mod seals;
-mod server;
 pub mod simulator;
 mod tradeoff;
-mod transfers;
 mod wanted;
 
-#[cfg(test)]
-mod fake_worker;
-#[cfg(test)]
-mod farm_tests;
-#[cfg(test)]
-mod passing_tests;
-#[cfg(test)]
-mod test_scene;
-#[cfg(test)]
-mod verify_tests;
+pub use rayfarm_farm as farm;
+pub use rayfarm_scheduler as scheduler;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use cli::Invocation;
+use rayfarm_farm::accounting;
+#[cfg(test)]
+use rayfarm_farm::testing::{fake_worker, test_scene};
 
 /// The whole program: does what the command line (program name first) asks for and says how it went.
 ///

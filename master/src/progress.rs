@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::addresses::Reachable;
+use crate::accounting::duration_text;
 use crate::farm::FarmStatus;
-use crate::pace::spoken;
+use crate::farm::Reachable;
 
 /// Between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -70,7 +70,7 @@ impl Progress {
     /// Shows what the farm is doing; several times a second.
     pub(crate) fn look(&mut self, status: &FarmStatus) {
         self.left = status.totals.left;
-        let left = self.left.map_or(String::new(), |left| format!("{} left, ", spoken(left)));
+        let left = self.left.map_or(String::new(), |left| format!("{} left, ", duration_text(left)));
         self.bar.set_message(format!("{left}{}", message(status, self.fps)));
         self.remind_of_workers(status.workers.is_empty());
         if self.bar.is_hidden() && !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
@@ -101,7 +101,7 @@ impl Progress {
     }
 
     fn line(&self, status: &FarmStatus) -> String {
-        let left = self.left.map_or(String::new(), |left| format!(", {} left", spoken(left)));
+        let left = self.left.map_or(String::new(), |left| format!(", {} left", duration_text(left)));
         format!("{} of {} frames{left}; {}", self.done, self.frames, message(status, self.fps))
     }
 }
@@ -121,7 +121,7 @@ fn message(status: &FarmStatus, fps: f64) -> String {
         1 => "1 worker".to_owned(),
         n => format!("{n} workers"),
     };
-    let workers = match status.transfers.words() {
+    let workers = match status.transfers.to_text() {
         Some(transfers) => format!("{workers}, {transfers}"),
         None => workers,
     };

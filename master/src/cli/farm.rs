@@ -4,8 +4,9 @@ use std::net::SocketAddr;
 
 use clap::Args;
 
+use super::LOCAL_WORKER;
 use super::values::{listen_address, thread_count, worker_count};
-use crate::farm::{FarmOptions, SegmentPolicy};
+use crate::farm::{FarmOptions, LocalWorkerCommand, SegmentPolicy};
 
 /// Who renders.
 #[derive(Clone, Debug, Args)]
@@ -44,10 +45,21 @@ impl FarmArgs {
         FarmOptions {
             listen: self.listen,
             local_workers: self.local_workers(),
+            local_worker: local_worker(),
             threads: self.threads,
             policy: self.segment,
             sequential: self.pipeline == 0,
             verify_percent: self.verify,
         }
+    }
+}
+
+/// This program, run again as a worker.
+fn local_worker() -> LocalWorkerCommand {
+    LocalWorkerCommand {
+        // Without a known path, the search path may have the program, and a failure to start it is reported.
+        program: std::env::current_exe().unwrap_or_else(|_| "rayfarm-master".into()),
+        args: vec![LOCAL_WORKER.into()],
+        name_variable: rayfarm_worker::cli::NAME_VARIABLE.to_owned(),
     }
 }

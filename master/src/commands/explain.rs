@@ -16,9 +16,9 @@ use serde::Serialize;
 
 use self::features::{FeatureFacts, features, kernels};
 use super::source::Source;
-use crate::assets::Assets;
 use crate::cli::ExplainArgs;
 use crate::error::CommandError;
+use crate::farm::Assets;
 use crate::report::print_json;
 use crate::wanted::{Knobs, WantedPicture};
 

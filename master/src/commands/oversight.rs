@@ -2,7 +2,7 @@
 
 use tokio_util::sync::CancellationToken;
 
-use crate::accounting::TraceFile;
+use crate::accounting::{TimelineError, TimelineFile};
 use crate::cli::OversightArgs;
 use crate::control::{self, Console, Place};
 use crate::error::CommandError;
@@ -10,7 +10,7 @@ use crate::farm::Farm;
 
 /// As asked for on the command line.
 pub(super) struct Oversight {
-    trace: Option<TraceFile>,
+    trace: Option<TimelineFile>,
     control: Option<Place>,
     /// Cancelled when the run is over.
     over: CancellationToken,
@@ -22,7 +22,7 @@ impl Oversight {
     /// # Errors
     /// A place that cannot be written.
     pub(super) fn new(args: &OversightArgs) -> Result<Self, CommandError> {
-        let trace = args.trace.as_deref().map(TraceFile::create).transpose()?;
+        let trace = args.trace.as_deref().map(TimelineFile::create).transpose().map_err(refused)?;
         Ok(Self { trace, control: args.control.clone(), over: CancellationToken::new() })
     }
 
@@ -33,7 +33,7 @@ impl Oversight {
     /// A place that cannot be listened at.
     pub(super) fn begin(&self, farm: &Farm, quit: &CancellationToken) -> Result<(), CommandError> {
         if let Some(trace) = &self.trace {
-            farm.trace_into(trace.sink());
+            farm.record_timeline(trace.sink());
         }
         match &self.control {
             Some(place) => {
@@ -50,7 +50,15 @@ impl Oversight {
     /// A trace that could not be written.
     pub(super) fn end(&mut self) -> Result<(), CommandError> {
         self.over.cancel();
-        self.trace.take().map_or(Ok(()), TraceFile::finish)
+        self.trace.take().map_or(Ok(()), |trace| trace.finish().map_err(refused))
+    }
+}
+
+/// A path that cannot be written is wrong input; a full disk is not.
+fn refused(error: TimelineError) -> CommandError {
+    match error {
+        TimelineError::Create { .. } | TimelineError::NotSeekable { .. } => CommandError::wrong_input(error),
+        TimelineError::Thread(_) | TimelineError::Write { .. } => CommandError::failed(error),
     }
 }
 

@@ -10,12 +10,11 @@ use super::oversight::Oversight;
 use super::source::{Source, animation, default_scene};
 use crate::camera_control::CameraControl;
 use crate::cli::ViewArgs;
-use crate::delivered::as_text;
 use crate::display::feed::{self, NewsDesk, Orders};
 use crate::display::requests::{Pace, WindowState};
 use crate::display::window::{About, Display, Link};
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmScene};
+use crate::farm::{Farm, FarmScene, as_text};
 use crate::report::FpsLog;
 
 /// `--orbit` without `--frames` goes round over this many frames, and on.

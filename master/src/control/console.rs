@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::command::{COMMANDS, Command, Whom};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
-use crate::farm::{FarmControl, FarmStatus, KickedWorker, TransferStatus, UnknownWorker, WorkerStatus};
+use crate::farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
 
 /// What a kicked worker is told.
 pub(crate) const KICKED: &str = "it was kicked by the master's user";
@@ -78,7 +78,7 @@ impl Console {
             Command::Drain(whom) => self.to_each(&status, whom, FarmControl::drain)?,
             Command::Pause(whom) => self.to_each(&status, whom, FarmControl::pause)?,
             Command::Resume(whom) => self.to_each(&status, whom, FarmControl::resume)?,
-            Command::Kick(whom) => self.to_each(&status, whom, |farm, id| farm.kick(id, KICKED))?,
+            Command::Kick(whom) => self.to_each(&status, whom, |farm, id| farm.ban(id, KICKED))?,
             Command::Allow(whom) => {
                 let worker = find_kicked(&status, whom)?;
                 json!({ "ok": true, "allowed": usize::from(self.farm.allow_worker(worker)) })
@@ -115,7 +115,7 @@ fn find(status: &FarmStatus, whom: &str) -> Result<u64, String> {
 
 /// The one kicked worker of that number, or else of that name.
 fn find_kicked(status: &FarmStatus, whom: &str) -> Result<u64, String> {
-    let known = status.kicked.iter().map(|worker| (worker.id, worker.name.as_str()));
+    let known = status.banned.iter().map(|worker| (worker.id, worker.name.as_str()));
     let none = |whom: Cow<str>| format!("no worker \"{whom}\" was kicked; status lists those that were");
     one_of(known, whom, none)
 }
@@ -151,7 +151,7 @@ fn workers(status: &FarmStatus) -> Vec<Value> {
             "state": worker.state.to_string(),
             "segments_done": worker.segments_done,
             "rows_per_second": (worker.speed * 10.0).round() / 10.0,
-            "trouble": worker.trouble,
+            "trouble": worker.last_failure,
         })
     };
     status.workers.iter().map(one).collect()
@@ -168,9 +168,9 @@ fn progress(status: &FarmStatus) -> Value {
         "rows": status.rows,
         "workers": status.workers.len(),
         "threads": threads,
-        "kicked": status.kicked.iter().map(|kicked| &kicked.name).collect::<Vec<_>>(),
-        "kicked_workers": status.kicked.iter().map(kicked).collect::<Vec<_>>(),
-        "local_gone": status.local_gone,
+        "kicked": status.banned.iter().map(|kicked| &kicked.name).collect::<Vec<_>>(),
+        "kicked_workers": status.banned.iter().map(kicked).collect::<Vec<_>>(),
+        "local_gone": status.local_exited,
         "frames_done": totals.frames_done,
         "frames": totals.frames,
         "fps": rounded(totals.fps),
@@ -185,7 +185,7 @@ fn progress(status: &FarmStatus) -> Value {
     })
 }
 
-fn kicked(worker: &KickedWorker) -> Value {
+fn kicked(worker: &BannedWorker) -> Value {
     json!({ "id": worker.id, "name": worker.name, "address": worker.address.map(|address| address.to_string()) })
 }
 

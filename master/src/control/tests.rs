@@ -122,7 +122,7 @@ fn an_endless_line_is_refused_and_the_next_one_is_not() {
 #[tokio::test]
 async fn workers_are_listed_paused_resumed_kicked_and_allowed() {
     let mut farm = farm().await;
-    let worker = fake_worker::start(farm.address(), Script::Honest).await;
+    let worker = fake_worker::start(farm.address(), Script::Correct).await;
     until_workers(&farm, 1).await;
     let (console, quit) = console(&farm);
     let listed = ask(&console, "workers");
@@ -152,8 +152,8 @@ async fn workers_are_listed_paused_resumed_kicked_and_allowed() {
 async fn a_name_that_two_workers_have_is_not_guessed_at() {
     let farm = farm().await;
     let _workers = [
-        fake_worker::start(farm.address(), Script::Honest).await,
-        fake_worker::start(farm.address(), Script::Honest).await,
+        fake_worker::start(farm.address(), Script::Correct).await,
+        fake_worker::start(farm.address(), Script::Correct).await,
     ];
     until_workers(&farm, 2).await;
     let (console, _quit) = console(&farm);

@@ -7,8 +7,7 @@ use accounts::AccountPanel;
 use legend::Entry;
 
 use super::canvas::{Canvas, GLYPH, Rect};
-use crate::addresses::Reachable;
-use crate::farm::KickedWorker;
+use crate::farm::{BannedWorker, Reachable};
 
 pub(super) mod accounts;
 mod kicked;
@@ -156,7 +155,7 @@ pub(super) fn waiting_for_workers(
     address: SocketAddr,
     local_workers: u32,
     trouble: Option<&str>,
-    kicked: &[KickedWorker],
+    kicked: &[BannedWorker],
 ) -> Vec<String> {
     let first = match (trouble, local_workers) {
         (Some(trouble), _) => format!("Waiting for a worker: {trouble}."),

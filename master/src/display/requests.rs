@@ -28,7 +28,7 @@ impl Renderer for Farm {
     }
 
     fn give_up(&self) {
-        Self::give_up(self);
+        Self::drop_requests(self);
     }
 }
 

@@ -83,8 +83,8 @@ impl Wish {
             Self::Pause(ids) => each(ids, FarmControl::pause),
             Self::Resume(ids) => each(ids, FarmControl::resume),
             Self::Drain(id) => each(&[*id], FarmControl::drain),
-            Self::Kick(id) => each(&[*id], |farm, id| farm.kick(id, KICKED)),
-            Self::BringBack => farm.bring_back(),
+            Self::Kick(id) => each(&[*id], |farm, id| farm.ban(id, KICKED)),
+            Self::BringBack => farm.allow_all(),
         }
     }
 }
@@ -103,7 +103,7 @@ mod tests {
             segments_done: 0,
             speed: 0.0,
             state,
-            trouble: None,
+            last_failure: None,
         };
         FarmStatus { workers: states.iter().enumerate().map(worker).collect(), ..FarmStatus::default() }
     }

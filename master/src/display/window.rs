@@ -269,7 +269,7 @@ impl Display {
                 link.address,
                 local,
                 trouble.as_deref(),
-                &status.kicked,
+                &status.banned,
             ));
         }
         if steering::all_paused(status) {
@@ -318,7 +318,7 @@ fn first_picture(status: &FarmStatus) -> Vec<String> {
         _ => "Sending the scene to the workers.".to_owned(),
     };
     let troubles = status.workers.iter().filter_map(|worker| {
-        let trouble = worker.trouble.as_ref()?;
+        let trouble = worker.last_failure.as_ref()?;
         Some(format!("{} cannot render it: {trouble}", worker.name))
     });
     std::iter::once(first).chain(troubles.take(MAX_TROUBLES)).collect()

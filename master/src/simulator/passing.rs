@@ -1,5 +1,5 @@
 //! How long a large asset takes to all workers, chunk by chunk over links with bandwidth and latency: from the master
-//! alone, or passed on from worker to worker as the real [`Chains`] say.
+//! alone, or passed on from worker to worker as the real [`AssetRouting`] decides.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SECOND;
 use super::dice::Dice;
 use super::link::{Lane, bytes};
-use crate::chains::{Chains, Source};
+use crate::farm::{AssetRouting, AssetSource};
 use crate::scheduler::WorkerId;
 
 const ASSET: AssetId = AssetId([1; 32]);
@@ -55,7 +55,7 @@ pub struct Passed {
 /// One that receives.
 #[derive(Clone, Debug)]
 struct Node {
-    source: Source,
+    source: AssetSource,
     /// Chunks that are here.
     chunks: u64,
     /// Chunks that were sent to it by its present source, or are being sent.
@@ -91,7 +91,7 @@ struct Net {
     now: u64,
     agenda: BTreeMap<(u64, u64), Step>,
     planned: u64,
-    chains: Chains,
+    routing: AssetRouting,
     nodes: BTreeMap<WorkerId, Node>,
     master_up: Lane,
     master_chunks: u64,
@@ -119,7 +119,7 @@ impl Net {
             now: 0,
             agenda: BTreeMap::new(),
             planned: 0,
-            chains: Chains::default(),
+            routing: AssetRouting::default(),
             nodes: BTreeMap::new(),
             master_up: Lane::default(),
             master_chunks: 0,
@@ -135,7 +135,7 @@ impl Net {
         let ids: Vec<WorkerId> = (1..=u64::from(self.setup.workers)).map(WorkerId).collect();
         for &id in &ids {
             if self.setup.pass_on {
-                self.chains.shares(id);
+                self.routing.add_peer_server(id);
             }
             self.plan(dice.roll(SPREAD), Step::Asks(id));
         }
@@ -183,7 +183,7 @@ impl Net {
     /// A worker asks the master, and begins to receive from wherever it is told to.
     fn ask(&mut self, id: WorkerId, again: bool) {
         let now = Duration::from_nanos(self.now);
-        let source = self.chains.wanted(now, id, ASSET, again, |_| true);
+        let source = self.routing.route(now, id, ASSET, again, |_| true);
         let old = self.nodes.remove(&id);
         let (up, down, chunks, turn) = old.map_or((Lane::default(), Lane::default(), 0, 0), |node| {
             (node.up, node.down, node.chunks, node.turn + 1)
@@ -211,9 +211,9 @@ impl Net {
             return;
         };
         let (has, begins) = match source {
-            Source::Master => (self.chunks, self.setup.round_trip),
+            AssetSource::Master => (self.chunks, self.setup.round_trip),
             // A connection and a question more.
-            Source::Worker(of) => {
+            AssetSource::Worker(of) => {
                 let there = self.nodes.get(&of).filter(|node| node.alive && !node.hanging);
                 (there.map_or(0, |node| node.chunks), 2 * self.setup.round_trip)
             }
@@ -223,11 +223,11 @@ impl Net {
         }
         let begin = self.now + if begun { 0 } else { begins };
         let lane = match source {
-            Source::Master => {
+            AssetSource::Master => {
                 self.master_chunks += 1;
                 Some(&mut self.master_up)
             }
-            Source::Worker(of) => self.nodes.get_mut(&of).map(|node| &mut node.up),
+            AssetSource::Worker(of) => self.nodes.get_mut(&of).map(|node| &mut node.up),
         };
         let Some(left) = lane.map(|lane| lane.pass(begin, MAX_CHUNK_BYTES as f64, rate)) else { return };
         let chunk_ns = (MAX_CHUNK_BYTES as f64 / rate * SECOND as f64) as u64;
@@ -245,7 +245,7 @@ impl Net {
         let Some(node) = node else { return };
         node.chunks += 1;
         if node.chunks == self.chunks {
-            self.chains.complete(Duration::from_nanos(self.now), id, ASSET);
+            self.routing.complete(Duration::from_nanos(self.now), id, ASSET);
         }
         for follower in self.followers(id) {
             self.feed(follower);
@@ -253,7 +253,7 @@ impl Net {
     }
 
     fn followers(&self, of: WorkerId) -> Vec<WorkerId> {
-        let follow = self.nodes.iter().filter(|(_, node)| node.source == Source::Worker(of));
+        let follow = self.nodes.iter().filter(|(_, node)| node.source == AssetSource::Worker(of));
         follow.map(|(&id, _)| id).collect()
     }
 
@@ -263,7 +263,7 @@ impl Net {
         let Some(node) = self.nodes.get_mut(&id) else { return };
         (node.alive, node.hanging) = (hangs, hangs);
         if !hangs {
-            self.chains.left(id);
+            self.routing.remove_worker(id);
         }
         let after = if hangs { PEER_TIMEOUT.as_nanos() as u64 } else { self.setup.round_trip / 2 };
         for follower in self.followers(id) {

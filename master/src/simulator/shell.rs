@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::lies::Lie;
 use super::pictures::Picture;
-use crate::lease_book::{LeaseBook, Standing};
+use crate::farm::{LeaseBook, LeaseStatus};
 use crate::scheduler::{Event, Finding, FrameId, Lease, Verdict, WorkerId};
 
 /// What the driver keeps.
@@ -101,12 +101,12 @@ impl Shell {
     /// Pixels arrive, as the driver would let them.
     pub(crate) fn answer(&mut self, worker: WorkerId, lease: &Lease, fits: bool, content: u64) -> Answer {
         let Some(book) = self.books.get_mut(&worker) else { return Answer::Late };
-        match (book.answer(lease), self.pictures.get_mut(&lease.frame)) {
-            (Standing::Unknown, _) => Answer::Refused,
-            (Standing::Granted | Standing::Verifying, _) if !fits => Answer::Refused,
-            (Standing::Verifying, _) => Answer::Compared(self.compare(lease, content)),
-            (Standing::Revoked, _) | (Standing::Granted, None) => Answer::Late,
-            (Standing::Granted, Some(picture)) => {
+        match (book.check_reply(lease), self.pictures.get_mut(&lease.frame)) {
+            (LeaseStatus::Unknown, _) => Answer::Refused,
+            (LeaseStatus::Granted | LeaseStatus::Verifying, _) if !fits => Answer::Refused,
+            (LeaseStatus::Verifying, _) => Answer::Compared(self.compare(lease, content)),
+            (LeaseStatus::Revoked, _) | (LeaseStatus::Granted, None) => Answer::Late,
+            (LeaseStatus::Granted, Some(picture)) => {
                 picture.fill(worker, lease, content);
                 Answer::Kept
             }

@@ -6,8 +6,7 @@ use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 use super::{OPEN_REQUESTS, Run};
-use crate::delivered::as_text;
-use crate::farm::{Farm, FarmError, FinishedFrame, FrameId};
+use crate::farm::{Farm, FarmError, FinishedFrame, FrameId, as_text};
 use crate::report::VerificationReport;
 
 /// How long what is left to verify may take when the last frame is complete.

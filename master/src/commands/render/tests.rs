@@ -112,7 +112,7 @@ async fn frames_with_wrong_rows_are_rendered_again_and_their_files_replaced() {
     // What a fake worker takes for pixels is not what this scene looks like.
     let run = renders.start("mended", 3);
     renders.ready().await;
-    let liar = fake_worker::start(renders.address, Script::Honest).await;
+    let liar = fake_worker::start(renders.address, Script::Correct).await;
     patiently(liar).await.unwrap();
     renders.honest_worker();
     patiently(run).await.unwrap().unwrap();
@@ -130,7 +130,7 @@ async fn a_run_that_cannot_mend_its_frames_names_them_and_fails() {
     let run = renders.start("wrong", 1);
     renders.ready().await;
     // The only segment is the frame: it is complete before it is verified.
-    let liar = fake_worker::start(renders.address, Script::Honest).await;
+    let liar = fake_worker::start(renders.address, Script::Correct).await;
     patiently(liar).await.unwrap();
     let error = patiently(run).await.unwrap().unwrap_err();
     assert_eq!(error.exit_code(), std::process::ExitCode::from(1));

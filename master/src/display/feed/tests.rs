@@ -95,7 +95,7 @@ fn is_reduced(arrival: &Arrival) -> bool {
 
 #[tokio::test]
 async fn what_moves_is_reduced_and_what_rests_is_the_full_picture_to_the_last_bit() {
-    let plain = Feed::start(Script::Honest, STILL, None).await;
+    let plain = Feed::start(Script::Correct, STILL, None).await;
     let feed = Feed::start(Script::Busy, STILL, Some(dial(false))).await;
     let first = feed.picture(|| (), |_| true).await;
     assert!(is_at_rest(&first) && is_picture(&turned(0).view, &first.frame.pixels));
@@ -156,7 +156,7 @@ const A_WHILE: Duration = Duration::from_millis(1500);
 #[tokio::test]
 async fn at_rest_there_is_one_full_picture_and_then_silence_until_something_changes() {
     for dial in [None, Some(dial(false))] {
-        let feed = Feed::start(Script::Honest, STILL, dial).await;
+        let feed = Feed::start(Script::Correct, STILL, dial).await;
         let first = feed.picture(|| (), |_| true).await;
         assert!(is_picture(&turned(0).view, &first.frame.pixels));
         tokio::time::sleep(A_WHILE).await;

@@ -103,7 +103,7 @@ fn lines(
 ) -> Vec<(String, u32)> {
     let workers = &status.workers;
     let mut lines = vec![(layout.header(), SOFT)];
-    let below = 4 + usize::from(status.verification.is_some()) + usize::from(!status.kicked.is_empty());
+    let below = 4 + usize::from(status.verification.is_some()) + usize::from(!status.banned.is_empty());
     let visible = room.saturating_sub(below).clamp(1, workers.len().max(1));
     let place = workers.iter().position(|worker| Some(worker.id) == selected).unwrap_or(0);
     let first = place.saturating_sub(visible - 1);
@@ -128,8 +128,8 @@ fn lines(
         let text = format!("  verified {}, wrong {}", grouped(verified), grouped(mismatches));
         lines.push((text, if mismatches > 0 { WHITE } else { SOFT }));
     }
-    if !status.kicked.is_empty() {
-        let text = format!("  {} (B: bring back)", kicked::told(&status.kicked));
+    if !status.banned.is_empty() {
+        let text = format!("  {} (B: bring back)", kicked::told(&status.banned));
         lines.push((text.chars().take(layout.columns()).collect(), SOFT));
     }
     lines.push((layout.hint.to_owned(), SOFT));
@@ -183,7 +183,7 @@ mod tests {
             segments_done: 7,
             speed: 12_345.6,
             state: if id == 2 { WorkerState::Paused } else { WorkerState::Working },
-            trouble: None,
+            last_failure: None,
         };
         FarmStatus { workers: (1..=count).map(worker).collect(), ..FarmStatus::default() }
     }
@@ -247,9 +247,9 @@ mod tests {
     #[test]
     fn workers_that_were_kicked_are_named_with_the_key_that_brings_them_back() {
         let kicked = ["mill", "barn"]
-            .map(|name| crate::farm::KickedWorker { id: 1, name: name.to_owned(), address: None })
+            .map(|name| crate::farm::BannedWorker { id: 1, name: name.to_owned(), address: None })
             .to_vec();
-        let status = FarmStatus { kicked, ..status(1) };
+        let status = FarmStatus { banned: kicked, ..status(1) };
         let lines = lines(&Layout::of(120), &status, &accounts(), None, 20);
         let told = "  Kicked and kept out: mill, barn (B: bring back)";
         assert!(lines.iter().any(|(text, _)| text == told), "{lines:#?}");

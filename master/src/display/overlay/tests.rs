@@ -115,10 +115,10 @@ fn text_can_be_read_on_any_picture_also_where_the_window_waits() {
         speed: 12_345.6,
         state,
         local: false,
-        trouble: None,
+        last_failure: None,
     };
     let workers = vec![worker(1, WorkerState::Paused), worker(2, WorkerState::Working)];
-    let status = FarmStatus { workers, kicked: vec![kicked("barn")], ..FarmStatus::default() };
+    let status = FarmStatus { workers, banned: vec![kicked("barn")], ..FarmStatus::default() };
     let accounts = AccountPanel::new((1024, 768), &status, &Fading::default(), Some(1));
     for message in [None, Some(all_paused())] {
         let overlay = Overlay {
@@ -225,6 +225,6 @@ fn numbers_are_short() {
     assert_eq!([three_digits(0.254), three_digits(31.25), three_digits(240.4)], ["0.25", "31.2", "240"]);
 }
 
-fn kicked(name: &str) -> crate::farm::KickedWorker {
-    crate::farm::KickedWorker { id: 1, name: name.to_owned(), address: None }
+fn kicked(name: &str) -> crate::farm::BannedWorker {
+    crate::farm::BannedWorker { id: 1, name: name.to_owned(), address: None }
 }

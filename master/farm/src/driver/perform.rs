@@ -1,0 +1,110 @@
+//! Performs the scheduler's actions.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use rayfarm_protocol::{FrameId, ToWorker};
+use rayfarm_scheduler::{Action, Cost, Event, Return, WorkerId};
+
+use super::{Driver, Inner, Request};
+use crate::error::FarmError;
+use crate::finished::FinishedFrame;
+use crate::sessions::SendFailed;
+
+impl Driver {
+    /// Performs an action. Events that follow from it at once are appended to `events`.
+    pub(super) fn perform(&self, inner: &mut Inner, action: Action, events: &mut VecDeque<Event>) {
+        match action {
+            Action::BeginFrame { frame } => {
+                if let Some(Request { view, .. }) = inner.requests.get(&frame) {
+                    self.framebuffers.open(frame, view.width, view.height);
+                }
+            }
+            Action::FrameDone { frame, cost, elapsed } => self.frame_done(inner, frame, cost, elapsed),
+            Action::FrameDropped { frame } => {
+                inner.requests.remove(&frame);
+                self.framebuffers.discard(frame);
+            }
+            Action::FrameFailed { frame } => {
+                inner.requests.remove(&frame);
+                self.framebuffers.discard(frame);
+                let reasons = inner.sessions.failures();
+                self.deliver(inner, Err(FarmError::Refused { frame, reasons }));
+            }
+            Action::Announce { worker, frame } => {
+                let requested = inner.requests.get(&frame).map(|request| &request.announce);
+                let announce = requested.or_else(|| inner.open_segments.announce(frame)).cloned();
+                if let Some(announce) = announce {
+                    events.extend(send(inner, worker, ToWorker::Frame(announce)));
+                }
+            }
+            Action::Grant { worker, lease } => {
+                if let Some(session) = inner.sessions.get_mut(worker) {
+                    session.leases.grant(lease);
+                    events.extend(send(inner, worker, ToWorker::Segment(lease)));
+                }
+            }
+            Action::Cancel { worker, before } => {
+                if let Some(session) = inner.sessions.get_mut(worker) {
+                    session.leases.cancel(before);
+                    events.extend(send(inner, worker, ToWorker::Cancel { before }));
+                }
+            }
+            Action::Ping { worker, nonce } => events.extend(send(inner, worker, ToWorker::Ping { nonce })),
+            Action::Drain { worker } => events.extend(send(inner, worker, ToWorker::Drain)),
+            Action::Dismiss { worker, reason, again } => {
+                match again {
+                    // The worker was drained on request.
+                    Return::Unwanted => inner.sessions.log_leave(worker, &reason),
+                    Return::Welcome | Return::NextMaster => inner.sessions.log_disconnect(worker, &reason),
+                }
+                inner.sessions.disconnect(worker, &reason, again);
+            }
+            Action::Seal { worker, lease } => self.open_segment(inner, worker, lease),
+            Action::Verify { worker, lease } => {
+                if let Some(session) = inner.sessions.get_mut(worker) {
+                    session.leases.verify(lease);
+                    events.extend(send(inner, worker, ToWorker::Segment(lease)));
+                }
+            }
+            Action::Judge { frame, segment } => events.extend(self.dispute(inner, frame, segment)),
+            Action::Unseal { frame, segment } => inner.open_segments.remove(frame, segment),
+            Action::Expel { worker, reason } => self.ban_for_wrong_pixels(inner, worker, &reason, events),
+        }
+    }
+
+    fn frame_done(&self, inner: &mut Inner, frame: FrameId, cost: Cost, elapsed: Duration) {
+        if inner.scheduler.verification().percent > 0 {
+            inner.delivered.add(frame, self.framebuffers.workers(frame));
+        }
+        let picture = inner.requests.remove(&frame).zip(self.framebuffers.finish(frame));
+        let Some((Request { view, at, .. }, pixels)) = picture else {
+            debug_assert!(false, "frame {frame} is done without all of its pixels");
+            return;
+        };
+        inner.run.done += 1;
+        inner.run.pace.note(self.started.elapsed(), inner.run.done as f64);
+        let now = inner.sessions.byte_count();
+        let bytes = now.since(std::mem::replace(&mut inner.counted, now));
+        let finished = FinishedFrame {
+            frame,
+            view,
+            pixels,
+            counts: cost,
+            elapsed,
+            latency: self.started.elapsed().saturating_sub(at),
+            workers: u32::try_from(inner.sessions.len()).unwrap_or(u32::MAX),
+            threads: inner.sessions.threads(),
+            sent_bytes: bytes.sent,
+            received_bytes: bytes.received,
+            scene_bytes: bytes.scene,
+            account: inner.accounts.take_done(),
+        };
+        self.deliver(inner, Ok(finished));
+    }
+}
+
+/// Queues a message. Returns the event that follows when the worker is disconnected because its queue is full.
+pub(super) fn send(inner: &mut Inner, worker: WorkerId, message: ToWorker) -> Option<Event> {
+    inner.sessions.send(worker, message).err().map(|SendFailed| Event::WorkerLeft { worker })
+}

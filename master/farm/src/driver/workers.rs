@@ -1,0 +1,191 @@
+//! Workers that join and leave, commands to them, and the farm's status.
+
+use std::time::Duration;
+
+use rayfarm_protocol::Hello;
+use rayfarm_protocol::handshake::Refusal;
+use rayfarm_scheduler::{Event, Return, WorkerId};
+
+use super::{Driver, Inner, Run};
+use crate::assets::TransferStatus;
+use crate::sessions::identity::{Identity, host};
+use crate::sessions::{PastWorker, Session};
+use crate::status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
+
+/// Workers that are admitted.
+const MAX_WORKERS: usize = 1024;
+
+impl Driver {
+    /// Number of connected workers.
+    pub(crate) fn worker_count(&self) -> usize {
+        self.lock().sessions.len()
+    }
+
+    /// Whether a worker's session is current. The master may have ended it before its connection closes.
+    pub(crate) fn is_connected(&self, worker: WorkerId) -> bool {
+        self.lock().sessions.get(worker).is_some()
+    }
+
+    /// The number of the next worker.
+    pub(crate) fn next_worker(&self) -> WorkerId {
+        let mut inner = self.lock();
+        inner.last_worker += 1;
+        WorkerId(inner.last_worker)
+    }
+
+    /// Adds a session after its handshake.
+    pub(crate) fn join(&self, worker: WorkerId, session: Session) {
+        let Hello { name, threads, .. } = session.hello.clone();
+        let host = host(session.address.ip());
+        let mut inner = self.lock();
+        inner.sessions.insert(worker, session);
+        self.drive(&mut inner, Event::WorkerJoined { worker, threads, host });
+        inner.accounts.name(worker, &name);
+    }
+
+    /// Handles a user's command to a worker. Returns whether the worker is connected.
+    pub(crate) fn command(&self, worker: WorkerId, event: Event) -> bool {
+        let mut inner = self.lock();
+        let known = inner.sessions.get(worker).is_some();
+        if known {
+            self.drive(&mut inner, event);
+        }
+        known
+    }
+
+    /// Disconnects and bans a worker. Returns whether it was connected.
+    pub(crate) fn ban(&self, worker: WorkerId, reason: &str) -> bool {
+        let mut inner = self.lock();
+        let known = inner.sessions.get(worker).is_some();
+        if known {
+            inner.sessions.log_disconnect(worker, reason);
+            inner.sessions.ban(worker);
+            inner.sessions.disconnect(worker, reason, Return::Unwanted);
+            self.drive(&mut inner, Event::WorkerLeft { worker });
+        }
+        known
+    }
+
+    /// Lifts the bans that `which` selects. Returns the identities.
+    pub(crate) fn allow(&self, which: impl Fn(&PastWorker) -> bool) -> Vec<Identity> {
+        self.lock().sessions.allow(which)
+    }
+
+    /// The reason to refuse a worker in its handshake; `None`: it is admitted.
+    pub(crate) fn refusal(&self, identity: &Identity) -> Option<Refusal> {
+        let inner = self.lock();
+        if inner.is_ending {
+            return Some(Refusal::NotNow("the master ends".to_owned()));
+        }
+        let count = inner.sessions.len();
+        if inner.sessions.is_banned(identity) {
+            return Some(Refusal::Final(format!(
+                "worker {} is banned from this master; the ban ends when the master allows the worker or exits",
+                identity.name()
+            )));
+        }
+        let full = || Refusal::NotNow(format!("it has {count} workers, its limit"));
+        (count >= MAX_WORKERS).then(full)
+    }
+
+    /// Removes a session that has ended. The reason is sent to the worker if its connection still works.
+    pub(crate) fn leave(&self, worker: WorkerId, reason: &str) {
+        let mut inner = self.lock();
+        inner.sessions.disconnect(worker, reason, Return::Welcome);
+        self.drive(&mut inner, Event::WorkerLeft { worker });
+    }
+
+    /// The current status, except for local workers that have exited.
+    pub(crate) fn status(&self) -> FarmStatus {
+        let inner = self.lock();
+        let workers = inner.scheduler.workers().filter_map(|record| {
+            let session = inner.sessions.get(record.worker)?;
+            Some(WorkerStatus {
+                id: record.worker.0,
+                name: session.hello.name.clone(),
+                local: session.identity.is_local(),
+                address: session.address,
+                threads: session.hello.threads,
+                segments_done: record.segments_done,
+                speed: record.speed,
+                state: record.state,
+                last_failure: session.last_failure.clone(),
+            })
+        });
+        let banned = inner.sessions.banned().map(|PastWorker { worker, identity }| BannedWorker {
+            id: worker.0,
+            name: identity.name(),
+            address: match identity {
+                Identity::Local(_) => None,
+                Identity::Remote { address, .. } => Some(*address),
+            },
+        });
+        let progress = inner.scheduler.progress();
+        let part =
+            progress.map_or(0.0, |progress| f64::from(progress.rows_done) / f64::from(progress.rows.max(1)));
+        FarmStatus {
+            transfers: transfers(&inner),
+            totals: self.totals(&inner, part),
+            workers: workers.collect(),
+            banned: banned.collect(),
+            local_exited: 0,
+            frame: progress.map(|progress| progress.frame),
+            rows_done: progress.map_or(0, |progress| progress.rows_done),
+            rows: progress.map_or(0, |progress| progress.rows),
+            wrong_frames: inner.delivered.wrong().count(),
+            verification: Some(inner.scheduler.verification())
+                .filter(|verification| verification.percent > 0),
+        }
+    }
+
+    /// Sets the number of frames of the run.
+    pub(crate) fn expect_frames(&self, frames: u64) {
+        self.lock().run.frames = Some(frames);
+    }
+
+    /// Sums over the run; `part` is the finished share of the frame in flight, 0 to 1.
+    fn totals(&self, inner: &Inner, part: f64) -> RunTotals {
+        let Run { frames, done, begun, pace } = &inner.run;
+        let (now, bytes) = (self.started.elapsed(), inner.sessions.byte_count());
+        let so_far = *done as f64 + part;
+        RunTotals {
+            frames_done: *done,
+            frames: *frames,
+            elapsed: begun.map_or(Duration::ZERO, |begun| now.saturating_sub(begun)),
+            fps: pace.per_second(now, so_far),
+            left: frames.and_then(|frames| pace.left(now, so_far, frames as f64)),
+            sent_bytes: bytes.sent,
+            received_bytes: bytes.received,
+            scene_bytes: bytes.scene,
+        }
+    }
+
+    /// Disconnects all workers and admits no more. Returns when each goodbye is sent or has timed out.
+    pub(crate) async fn disconnect_all(&self, reason: &str) {
+        let goodbyes: Vec<_> = {
+            let mut inner = self.lock();
+            inner.is_ending = true;
+            let goodbyes = inner.sessions.ids().into_iter().map(|worker| {
+                let goodbye = inner.sessions.disconnect(worker, reason, Return::NextMaster);
+                self.drive(&mut inner, Event::WorkerLeft { worker });
+                goodbye
+            });
+            goodbyes.flatten().collect()
+        };
+        for goodbye in goodbyes {
+            // The task has a time limit and does not panic.
+            let _ = goodbye.await;
+        }
+    }
+}
+
+/// Progress of the scene's transfer to the workers that have finished no segment yet: one that has, has the scene.
+fn transfers(inner: &Inner) -> TransferStatus {
+    let mut status = TransferStatus::default();
+    for record in inner.scheduler.workers().filter(|record| record.segments_done == 0) {
+        if let Some(session) = inner.sessions.get(record.worker) {
+            session.transfers.add_to(&mut status);
+        }
+    }
+    status
+}

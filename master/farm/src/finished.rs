@@ -1,0 +1,41 @@
+//! A finished frame.
+
+use std::time::Duration;
+
+use rayfarm_protocol::FrameId;
+use rayfarm_tracer::scene::FrameView;
+
+use crate::accounting::FrameAccount;
+use crate::framebuffer::FramePixels;
+
+pub use rayfarm_protocol::Cost as FrameCounts;
+
+/// A completed picture with its costs.
+#[derive(Debug)]
+pub struct FinishedFrame {
+    /// The request that it answers.
+    pub frame: FrameId,
+    /// The requested view.
+    pub view: FrameView,
+    /// RGB8 sRGB rows, top to bottom: `view.width * view.height * 3` bytes.
+    pub pixels: FramePixels,
+    /// The costs of the picture's segments, summed: nanoseconds over all threads, and rays by kind. Each row counts once,
+    /// even if several workers rendered it.
+    pub counts: FrameCounts,
+    /// Time from the start of the frame to its last row.
+    pub elapsed: Duration,
+    /// Time from the request to the last row: the age of the camera in the picture.
+    pub latency: Duration,
+    /// Workers that were connected when the frame completed.
+    pub workers: u32,
+    /// Render threads of these workers together.
+    pub threads: u32,
+    /// Bytes sent to all workers since the previous frame completed.
+    pub sent_bytes: u64,
+    /// Bytes received from all workers since the previous frame completed.
+    pub received_bytes: u64,
+    /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
+    pub scene_bytes: u64,
+    /// How the workers' thread time was spent since the previous frame, and which worker rendered which rows.
+    pub account: FrameAccount,
+}

@@ -1,0 +1,47 @@
+//! The setup of a farm and the scene that it draws.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use rayfarm_scheduler::SegmentPolicy;
+use rayfarm_tracer::mesh::CompiledMesh;
+use rayfarm_tracer::scene::Scene;
+use rayfarm_tracer::texture::Texture;
+
+use crate::supervisor::LocalWorkerCommand;
+
+/// The default port for workers.
+pub const DEFAULT_PORT: u16 = 7117;
+
+/// The setup of a farm.
+#[derive(Clone, Debug, Default)]
+pub struct FarmOptions {
+    /// The address to listen at for workers. `None`: 127.0.0.1 at [`DEFAULT_PORT`], or at a free port when that one is
+    /// taken. An explicit address that is taken is an error.
+    pub listen: Option<SocketAddr>,
+    /// Worker processes to start on this machine. They end with the farm.
+    pub local_workers: u32,
+    /// The command line of a local worker.
+    pub local_worker: LocalWorkerCommand,
+    /// Render threads of each local worker; `None` divides the cores among them, at least one each.
+    pub threads: Option<usize>,
+    /// How frames are cut into segments.
+    pub policy: SegmentPolicy,
+    /// Whether each frame starts only when its predecessor is complete. Otherwise workers without work in one frame start
+    /// the next: more frames per second, each with an older camera.
+    pub sequential: bool,
+    /// The share of the segments, in percent (0 to 100), that are rendered a second time, by another worker or the master,
+    /// to find workers that send wrong pixels. They are drawn at random after their pixels have arrived.
+    pub verify_percent: u8,
+}
+
+/// A scene with its meshes and textures.
+#[derive(Clone)]
+pub struct FarmScene {
+    /// The scene as data.
+    pub scene: Scene,
+    /// The meshes that the scene refers to; others are neither kept nor sent.
+    pub meshes: Vec<Arc<CompiledMesh>>,
+    /// The textures that the scene refers to; others are neither kept nor sent.
+    pub textures: Vec<Arc<Texture>>,
+}

@@ -1,0 +1,219 @@
+//! The listener: accepts connections, shakes hands, and runs one task per session. An error of a peer ends its own session
+//! only.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
+use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
+use rayfarm_protocol::{AssetId, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
+use rayfarm_scheduler::{Event, WorkerId};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, mpsc};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+use crate::driver::{AnswerError, Driver};
+use crate::sessions::Session;
+use crate::sessions::identity::Identity;
+
+/// Connections in their handshake; more wait in the operating system's queue.
+const MAX_HANDSHAKES: usize = 64;
+/// Asset requests of a worker that wait to be served.
+const MAX_ASSET_REQUESTS: usize = 4096;
+/// Delay after a failed accept, which usually means that file descriptors have run out.
+const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(100);
+
+/// An error that ends a session.
+#[derive(Debug, thiserror::Error)]
+enum SessionError {
+    #[error(transparent)]
+    Protocol(#[from] ProtocolError),
+    #[error(transparent)]
+    Answer(#[from] AnswerError),
+    #[error("it closed the connection without a goodbye")]
+    Closed,
+    #[error("it requests more than {MAX_ASSET_REQUESTS} assets at once")]
+    TooManyRequests,
+}
+
+/// Accepts connections until `stop`, and runs their sessions.
+pub(crate) async fn accept(
+    listener: TcpListener,
+    driver: Arc<Driver>,
+    sessions: TaskTracker,
+    stop: CancellationToken,
+) {
+    let handshakes = Arc::new(Semaphore::new(MAX_HANDSHAKES));
+    loop {
+        let accepted = tokio::select! {
+            () = stop.cancelled() => return,
+            accepted = async {
+                let permit = handshakes.clone().acquire_owned().await;
+                (listener.accept().await, permit)
+            } => accepted,
+        };
+        match accepted {
+            (Ok((stream, address)), permit) => {
+                let (driver, stop) = (driver.clone(), stop.clone());
+                sessions.spawn(async move {
+                    let session = async {
+                        if let Some(admitted) = shake_hands(&driver, stream, address).await {
+                            drop(permit);
+                            run_session(&driver, admitted, address).await;
+                        }
+                    };
+                    tokio::select! {
+                        () = stop.cancelled() => {}
+                        () = session => {}
+                    }
+                });
+            }
+            (Err(error), _) => {
+                tracing::warn!("cannot accept a connection: {error}; retrying");
+                tokio::time::sleep(ACCEPT_RETRY_DELAY).await;
+            }
+        }
+    }
+}
+
+/// A worker that has been admitted.
+struct Admitted {
+    worker: WorkerId,
+    hello: Hello,
+    identity: Identity,
+    stream: TcpStream,
+}
+
+/// Shakes hands with a peer. Failures are logged.
+async fn shake_hands(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> Option<Admitted> {
+    if let Err(error) = tcp::configure(&stream) {
+        tracing::debug!("{address}: cannot send small messages at once: {error}");
+    }
+    let mut admitted = None;
+    let decide = |hello: &Hello| {
+        let identity = driver.tickets.identify(&hello.name, address.ip());
+        match driver.refusal(&identity) {
+            Some(reason) => Err(reason),
+            None => Ok(Welcome { worker: admitted.insert((driver.next_worker(), identity)).0.0 }),
+        }
+    };
+    match handshake::as_master(&mut stream, decide).await {
+        Ok(hello) => admitted.map(|(worker, identity)| {
+            // A ticket is never displayed.
+            let hello = Hello { name: identity.name(), ..hello };
+            Admitted { worker, hello, identity, stream }
+        }),
+        // The worker retries every few seconds.
+        Err(error @ ProtocolError::NotNow { .. }) => {
+            tracing::debug!("{address} is refused: {error}");
+            None
+        }
+        Err(error) => {
+            tracing::warn!("{address} is refused: {error}");
+            None
+        }
+    }
+}
+
+/// Runs a session to its end.
+async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
+    let Admitted { worker, hello, identity, stream } = admitted;
+    let Hello { name, threads, simd, software } = hello.clone();
+    tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
+    let (sender, receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
+    let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
+    driver.join(worker, Session::new(hello, identity, address, sender.clone(), traffic));
+    let ended = tokio::select! {
+        ended = receive(driver, worker, receiver, request) => ended,
+        () = send_assets(driver, worker, &sender, requests) => Err(SessionError::Closed),
+    };
+    match ended {
+        Ok(reason) => {
+            tracing::info!("{worker} ({name}, {address}) leaves: {reason}");
+            driver.leave(worker, "goodbye");
+        }
+        Err(error) => {
+            // A session that the driver has ended is logged already.
+            if driver.is_connected(worker) {
+                tracing::warn!("{worker} ({name}, {address}) is lost: {error}");
+            }
+            driver.leave(worker, &error.to_string());
+        }
+    }
+}
+
+/// Handles a worker's messages. Returns the reason in its goodbye.
+///
+/// # Errors
+/// The connection fails, or a message breaks a rule.
+async fn receive(
+    driver: &Driver,
+    worker: WorkerId,
+    mut receiver: Receiver<ToMaster>,
+    request: mpsc::Sender<(AssetId, u64)>,
+) -> Result<String, SessionError> {
+    while let Some(message) = receiver.recv().await {
+        match message? {
+            ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
+            ToMaster::NeedAsset { id, offset, again } => {
+                if !driver.asset_requested(worker, id, offset, again) {
+                    request.try_send((id, offset)).map_err(|_| SessionError::TooManyRequests)?;
+                }
+            }
+            ToMaster::Sharing { port } => driver.add_peer_server(worker, port),
+            ToMaster::HaveAsset { id } => driver.asset_received(worker, id),
+            ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
+            ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
+            ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
+            ToMaster::Disconnect { reason } => return Ok(reason),
+        }
+    }
+    Err(SessionError::Closed)
+}
+
+/// Sends the assets that a worker requests, one after the other, as fast as it reads them. Ends with the session.
+async fn send_assets(
+    driver: &Driver,
+    worker: WorkerId,
+    sender: &Sender<ToWorker>,
+    mut requests: mpsc::Receiver<(AssetId, u64)>,
+) {
+    while let Some((id, offset)) = requests.recv().await {
+        let sent = match driver.assets.get(id) {
+            Some(bytes) => send_asset(driver, worker, sender, id, bytes, offset).await,
+            None => sender.send(ToWorker::AssetUnknown { id }).await,
+        };
+        match sent {
+            Ok(()) => {}
+            // The receiving half of the session reports why it has ended.
+            Err(SendError::Closed) => return std::future::pending().await,
+            Err(SendError::Invalid(error)) => tracing::error!("asset {id} cannot be sent: {error}"),
+        }
+    }
+}
+
+/// Sends an asset from byte `offset` on.
+async fn send_asset(
+    driver: &Driver,
+    worker: WorkerId,
+    sender: &Sender<ToWorker>,
+    id: AssetId,
+    mut bytes: Bytes,
+    mut offset: u64,
+) -> Result<(), SendError> {
+    sender.send(ToWorker::AssetBegin { id, size: bytes.len() as u64 }).await?;
+    // An offset beyond the end leaves nothing to send.
+    let _ = bytes.split_to(usize::try_from(offset).unwrap_or(usize::MAX).min(bytes.len()));
+    while !bytes.is_empty() {
+        let chunk = bytes.split_to(bytes.len().min(MAX_CHUNK_BYTES));
+        let next = offset + chunk.len() as u64;
+        sender.send(ToWorker::AssetChunk { id, offset, bytes: chunk }).await?;
+        offset = next;
+        // On a slow link, pings wait behind megabytes in the operating system's buffers: this report counts as a sign of life.
+        driver.asset_sent(worker, id, offset);
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! The identity of a worker across sessions. Names are not unique: any worker may choose any name.
+//!
+//! A local worker proves its identity with a *ticket*: a secret that the master passes to that process only, and that it
+//! sends as its name. All other workers are identified by name and address. The address also groups workers by host,
+//! so that a verification is assigned to a worker of another host.
+
+use std::net::IpAddr;
+
+use blake3::Hash;
+use rayfarm_scheduler::HostId;
+
+/// What identifies a worker when it reconnects.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Identity {
+    /// A process that this master has started: the number of its slot, from 1.
+    Local(u32),
+    /// Any other worker.
+    Remote {
+        /// The name that it sends.
+        name: String,
+        /// The address from which it connects, in canonical form.
+        address: IpAddr,
+    },
+}
+
+impl Identity {
+    /// Whether this master has started the worker.
+    pub(crate) fn is_local(&self) -> bool {
+        matches!(self, Self::Local(_))
+    }
+
+    /// The name to display.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::Local(number) => local_name(*number),
+            Self::Remote { name, .. } => name.clone(),
+        }
+    }
+}
+
+/// The displayed name of the local worker in slot `number`.
+pub(crate) fn local_name(number: u32) -> String {
+    format!("local-{number}")
+}
+
+/// The tickets of all local workers. Without random numbers there are none, and local workers are identified as remote
+/// ones are.
+#[derive(Debug, Default)]
+pub(crate) struct Tickets(Vec<Hash>);
+
+impl Tickets {
+    /// Tickets for the slots 1 to `count`: hashes with a secret key of this master.
+    pub(crate) fn new(secret: Option<&[u8; 32]>, count: u32) -> Self {
+        let ticket = |secret, number: u32| {
+            let mut hasher = blake3::Hasher::new_keyed(secret);
+            hasher.update(b"ticket of local worker ").update(&number.to_le_bytes()).finalize()
+        };
+        Self(secret.into_iter().flat_map(|secret| (1..=count).map(move |n| ticket(secret, n))).collect())
+    }
+
+    /// The ticket of a slot, in hexadecimal.
+    pub(crate) fn of(&self, number: u32) -> Option<String> {
+        let hash = self.0.get(number.checked_sub(1)? as usize)?;
+        Some(hash.to_hex().to_string())
+    }
+
+    /// The identity of a worker that sends this name from this address. Tickets are compared in constant time.
+    pub(crate) fn identify(&self, name: &str, address: IpAddr) -> Identity {
+        let sent = Hash::from_hex(name).ok();
+        let slot = sent.and_then(|sent| (1..).zip(&self.0).find(|(_, ticket)| **ticket == sent));
+        match slot {
+            Some((number, _)) => Identity::Local(number),
+            None => Identity::Remote { name: name.to_owned(), address: address.to_canonical() },
+        }
+    }
+}
+
+/// The host of an address. All loopback addresses are one host, and so is each IPv6 network of 64 bits, because one
+/// machine may use any number of addresses in it.
+pub(crate) fn host(address: IpAddr) -> HostId {
+    let address = address.to_canonical();
+    HostId(match address {
+        _ if address.is_loopback() => 1,
+        IpAddr::V4(v4) => v4.to_ipv6_mapped().to_bits(),
+        IpAddr::V6(v6) => v6.to_bits() >> 64 << 64,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ticket_identifies_its_slot_and_a_name_identifies_none() {
+        let here = IpAddr::from([127, 0, 0, 1]);
+        let tickets = Tickets::new(Some(&[7; 32]), 2);
+        for number in [1, 2] {
+            let ticket = tickets.of(number).unwrap();
+            assert_eq!(tickets.identify(&ticket, here), Identity::Local(number));
+            assert_eq!(Identity::Local(number).name(), format!("local-{number}"));
+            let remote = Identity::Remote { name: ticket.clone(), address: here };
+            assert_eq!(Tickets::new(Some(&[8; 32]), 2).identify(&ticket, here), remote);
+        }
+        assert_eq!((tickets.of(0), tickets.of(3), Tickets::new(None, 2).of(1)), (None, None, None));
+        let mapped = "::ffff:127.0.0.1".parse().unwrap();
+        let named = Identity::Remote { name: "local-1".into(), address: here };
+        assert_eq!(tickets.identify("local-1", mapped), named);
+    }
+
+    #[test]
+    fn addresses_of_one_machine_belong_to_one_host() {
+        let of = |text: &str| host(text.parse().unwrap());
+        for (one, same) in [
+            ("127.0.0.1", "127.9.9.9"),
+            ("127.0.0.1", "::1"),
+            ("10.0.0.7", "::ffff:10.0.0.7"),
+            ("2001:db8:1:2::1", "2001:db8:1:2:ffff::9"),
+        ] {
+            assert_eq!(of(one), of(same));
+        }
+        for (one, other) in
+            [("10.0.0.7", "10.0.0.8"), ("127.0.0.1", "10.0.0.1"), ("2001:db8::1", "2001:db8:0:1::1")]
+        {
+            assert_ne!(of(one), of(other));
+        }
+    }
+}

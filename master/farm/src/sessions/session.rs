@@ -1,0 +1,78 @@
+//! One connected worker.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rayfarm_protocol::peer::ShareKey;
+use rayfarm_protocol::session::{Sender, Traffic};
+use rayfarm_protocol::{Hello, Reconnect, ToWorker};
+use rayfarm_scheduler::Return;
+use tokio::task::JoinHandle;
+
+use super::identity::Identity;
+use super::lease_book::LeaseBook;
+use crate::assets::transfers::Transfers;
+
+/// Time limit for sending the messages that are queued when a session ends, the goodbye included.
+const GOODBYE_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// A connected worker.
+pub(crate) struct Session {
+    /// The worker's introduction. Its name is the one to display, never a ticket.
+    pub(crate) hello: Hello,
+    pub(crate) identity: Identity,
+    pub(crate) address: SocketAddr,
+    pub(crate) leases: LeaseBook,
+    /// Why it last failed to render a frame.
+    pub(crate) last_failure: Option<String>,
+    /// Where it serves assets to other workers, and the key that its tokens are made with.
+    pub(crate) peer_server: Option<(SocketAddr, ShareKey)>,
+    /// Assets that it has requested.
+    pub(crate) transfers: Transfers,
+    pub(super) sender: Sender<ToWorker>,
+    pub(super) traffic: Arc<Traffic>,
+}
+
+impl Session {
+    /// A session after its handshake.
+    pub(crate) fn new(
+        hello: Hello,
+        identity: Identity,
+        address: SocketAddr,
+        sender: Sender<ToWorker>,
+        traffic: Arc<Traffic>,
+    ) -> Self {
+        Self {
+            hello,
+            identity,
+            address,
+            leases: LeaseBook::default(),
+            last_failure: None,
+            peer_server: None,
+            transfers: Transfers::default(),
+            sender,
+            traffic,
+        }
+    }
+}
+
+/// Sends a goodbye in the background and closes the connection. The task ends within [`GOODBYE_TIMEOUT`].
+pub(super) fn say_goodbye(sender: Sender<ToWorker>, reason: &str, again: Return) -> JoinHandle<()> {
+    let reconnect = match again {
+        Return::Welcome => Reconnect::Now,
+        Return::Unwanted => Reconnect::Never,
+        Return::NextMaster => Reconnect::NextMaster,
+    };
+    let goodbye = ToWorker::Disconnect { reason: reason.to_owned(), reconnect };
+    tokio::spawn(async move {
+        let flush = async {
+            // Sending fails where the session has ended already; then there is nothing to flush.
+            if sender.send(goodbye).await.is_ok() {
+                sender.closed().await;
+            }
+        };
+        let _ = tokio::time::timeout(GOODBYE_TIMEOUT, flush).await;
+        sender.abort();
+    })
+}

@@ -1,0 +1,37 @@
+//! Connections that are not from a worker of this version.
+
+use super::*;
+
+#[tokio::test]
+async fn invalid_peers_do_not_disturb_the_farm() {
+    let mut farm = farm(SegmentPolicy::Adaptive).await;
+    fake_worker::start(farm.address(), Script::Correct).await;
+    until_workers(&farm, 1).await;
+    farm.request(view());
+    let garbage = fake_worker::start(farm.address(), Script::Garbage).await;
+    let mut silent = TcpStream::connect(farm.address()).await.unwrap();
+    let mut browser = TcpStream::connect(farm.address()).await.unwrap();
+    browser.write_all(b"GET / HTTP/1.1\r\nHost: farm\r\n\r\n").await.unwrap();
+    let mut early_close = TcpStream::connect(farm.address()).await.unwrap();
+    early_close.write_all(b"RAYF").await.unwrap();
+    drop(early_close);
+    in_time(garbage).await.unwrap();
+    let _ = browser.read_to_end(&mut Vec::new()).await;
+    assert!(is_picture(&view(), &finished(&mut farm).await.pixels));
+    until_workers(&farm, 1).await;
+    render(&mut farm, turned(1)).await;
+    silent.shutdown().await.unwrap();
+}
+
+#[tokio::test]
+async fn a_worker_of_another_version_gets_a_message() {
+    let mut farm = farm(SegmentPolicy::Adaptive).await;
+    let mut skewed = TcpStream::connect(farm.address()).await.unwrap();
+    skewed.write_all(b"RAYFARM\n\x63\0\x02\0").await.unwrap();
+    let mut answer = Vec::new();
+    skewed.read_to_end(&mut answer).await.unwrap();
+    let text = String::from_utf8_lossy(&answer);
+    assert!(text.contains("version 99") && text.contains("install the same release"), "{text}");
+    fake_worker::start(farm.address(), Script::Correct).await;
+    render(&mut farm, view()).await;
+}
