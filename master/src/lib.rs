@@ -26,19 +26,17 @@ mod judge;
 mod lease_book;
 mod local_workers;
 mod logging;
+mod measure;
 mod orbit;
 mod output;
 mod pace;
 mod plan;
-mod plot;
 mod progress;
 mod report;
 mod roster;
 pub mod scheduler;
 mod seals;
 mod server;
-pub mod simulator;
-mod tradeoff;
 mod transfers;
 mod wanted;
 
@@ -57,6 +55,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use cli::Invocation;
+pub use measure::simulator;
 
 /// The whole program: does what the command line (program name first) asks for and says how it went.
 ///

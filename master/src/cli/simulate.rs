@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::values::{Size, frame_count, size};
 use crate::farm::SegmentPolicy;
-use crate::simulator::{PassingSetup, Setup};
+use crate::measure::simulator::{PassingSetup, Setup};
 
 /// Workers that are simulated at most.
 const MAX_WORKERS: i64 = 4096;

@@ -3,7 +3,7 @@
 use crate::cli::PlotArgs;
 use crate::error::CommandError;
 use crate::output::check_writable;
-use crate::plot::{Axis, Chart, Columns, PlotError, read_series};
+use crate::measure::plot::{Axis, Chart, Columns, PlotError, read_series};
 
 /// Reads the tables and writes each output.
 ///

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::cli::{Profile, SimulateArgs};
 use crate::error::CommandError;
-use crate::simulator::{
+use crate::measure::simulator::{
     CostProfile, Measured, Passed, PassingSetup, Schedule, Setup, Survivor, measure, pass, survive,
 };
 

@@ -20,12 +20,12 @@ use crate::error::CommandError;
 use crate::in_process::all_cores;
 use crate::output::check_writable;
 use crate::report::print_json;
-use crate::tradeoff::measure::{Studio, summary};
-use crate::tradeoff::oracle::{Verdict, affordable, chosen, judge};
-use crate::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
-use crate::tradeoff::setting::{Asked, Setting};
-use crate::tradeoff::steps::Steps;
-use crate::tradeoff::table::{Row, Table};
+use crate::measure::tradeoff::measure::{Studio, summary};
+use crate::measure::tradeoff::oracle::{Verdict, affordable, chosen, judge};
+use crate::measure::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
+use crate::measure::tradeoff::setting::{Asked, Setting};
+use crate::measure::tradeoff::steps::Steps;
+use crate::measure::tradeoff::table::{Row, Table};
 
 /// What is written last, when all is measured.
 const TABLE: &str = "tradeoff.csv";

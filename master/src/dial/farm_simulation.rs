@@ -9,9 +9,9 @@ use rayfarm_tracer::scene::{Attenuation, ColorDepth, FrameView, Light, LightKind
 use super::ladder::Rung;
 use super::*;
 use crate::accounting::{Parts, WorkerAccount};
-use crate::simulator::Dice;
+use crate::measure::simulator::Dice;
 use crate::test_scene;
-use crate::tradeoff::table::Table;
+use crate::measure::tradeoff::table::Table;
 
 const ROOM: &[u8] = include_bytes!("../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;

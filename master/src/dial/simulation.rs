@@ -6,7 +6,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::governor::Governor;
-use crate::simulator::Dice;
+use crate::measure::simulator::Dice;
 
 /// Requests that are open at a time: what the governor says counts from the second frame on.
 const IN_FLIGHT: usize = 2;

@@ -53,7 +53,7 @@ use lapses::FIRST_PATIENCE;
 use worker::{PING_EVERY, Service, Worker};
 
 /// What a band of tiles costs however few of its rows are traced, as a share of the whole: measured, see
-/// [`CostProfile`](crate::simulator::CostProfile).
+/// [`CostProfile`](crate::measure::simulator::CostProfile).
 const TILE_SHARE: f64 = 0.38;
 /// What each finished lease leaves of an earlier surprise...
 const SURPRISE_MEMORY: f64 = 0.98;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::oracle::Verdict;
 use super::table::{Row, Table};
-use crate::plot::{Axis, Chart, Line, Point, Series};
+use crate::measure::plot::{Axis, Chart, Line, Point, Series};
 
 /// All that came of a measurement; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
