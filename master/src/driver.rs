@@ -203,7 +203,7 @@ impl Driver {
     pub(crate) fn give_up(&self) {
         let mut inner = self.lock();
         let next = FrameId(inner.last_frame + 1);
-        self.drive(&mut inner, Event::RequestsGivenUp { next });
+        self.drive(&mut inner, Event::RequestsDropped { next });
     }
 
     /// A frame as the workers are told of it: serialised once, the same bytes for all.

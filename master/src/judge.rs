@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::driver::Driver;
 use crate::farm::FarmScene;
-use crate::scheduler::{Event, Verdict};
+use crate::scheduler::{ArbiterResult, Event};
 
 /// RGB8 sRGB rows of a frame, or why there are none.
 pub(crate) type Trace = dyn Fn(&FrameView, Range<u32>) -> Result<Vec<u8>, String> + Send + Sync;
@@ -42,21 +42,21 @@ pub(crate) async fn hold_court(
         let Case { frame, segment, view, rows, painter, checker } = case;
         let trace = trace.clone();
         let traced = tokio::task::spawn_blocking(move || trace(&view, rows)).await;
-        let verdict = match traced.map_err(|error| error.to_string()).flatten() {
+        let result = match traced.map_err(|error| error.to_string()).flatten() {
             Ok(bytes) => {
                 let own = blake3::hash(&bytes);
-                Verdict {
-                    traced: true,
-                    painter: painter != own,
-                    checker: checker.is_some_and(|hash| hash != own),
+                ArbiterResult {
+                    rendered: true,
+                    first_differs: painter != own,
+                    second_differs: checker.is_some_and(|hash| hash != own),
                 }
             }
             Err(error) => {
                 tracing::error!("the master cannot verify rows of frame {frame} itself: {error}");
-                Verdict::default()
+                ArbiterResult::default()
             }
         };
-        driver.handle(Event::SegmentJudged { frame, segment, verdict });
+        driver.handle(Event::SegmentArbitrated { frame, segment, result });
     }
 }
 

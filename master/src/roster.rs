@@ -13,7 +13,7 @@ use tokio::task::JoinHandle;
 use crate::chains::{Chains, Source};
 use crate::identity::Identity;
 use crate::lease_book::LeaseBook;
-use crate::scheduler::{Return, WorkerId};
+use crate::scheduler::WorkerId;
 use crate::transfers::Transfers;
 
 /// How long a worker's last messages may take.
@@ -137,7 +137,7 @@ impl Roster {
         let Some(session) = self.sessions.get(&worker) else { return Ok(()) };
         let Err(error) = session.sender.try_send(message) else { return Ok(()) };
         self.log_dismissal(worker, &format!("cannot send to it: {error}"));
-        self.end(worker, "you do not read what you are sent", Return::Welcome);
+        self.end(worker, "you do not read what you are sent", Reconnect::Now);
         Err(Unreachable)
     }
 
@@ -156,7 +156,12 @@ impl Roster {
     }
 
     /// Forgets a session and sees it off in the background: a last word, if there is room for it, then the end.
-    pub(crate) fn end(&mut self, worker: WorkerId, reason: &str, again: Return) -> Option<JoinHandle<()>> {
+    pub(crate) fn end(
+        &mut self,
+        worker: WorkerId,
+        reason: &str,
+        reconnect: Reconnect,
+    ) -> Option<JoinHandle<()>> {
         let Session { sender, traffic, identity, .. } = self.sessions.remove(&worker)?;
         self.ended.add(&traffic);
         self.chains.left(worker);
@@ -164,11 +169,6 @@ impl Roster {
         while self.left.len() > MAX_LEFT {
             self.left.pop_front();
         }
-        let reconnect = match again {
-            Return::Welcome => Reconnect::Now,
-            Return::Unwanted => Reconnect::Never,
-            Return::NextMaster => Reconnect::NextMaster,
-        };
         let goodbye = ToWorker::Goodbye { reason: reason.to_owned(), reconnect };
         Some(tokio::spawn(async move {
             let last_words = async {

@@ -3,7 +3,7 @@ use std::time::Duration;
 use rayfarm_protocol::{Cost, FrameId, Lease};
 
 use super::*;
-use crate::scheduler::{Action, Event, HostId, Return, WorkerId};
+use crate::scheduler::{Action, Event, HostId, Reconnect, WorkerId};
 
 mod properties;
 
@@ -172,8 +172,8 @@ fn who_leaves_is_in_the_account_of_the_frame_and_in_no_other() {
     told.begin(0, 1);
     told.grant(0, BARN, lease(1, 0));
     told.event(10, Event::WorkerLeft { worker: BARN });
-    let (reason, again) = (String::new(), Return::Welcome);
-    told.action(15, Action::Dismiss { worker: MILL, reason, again });
+    let (reason, reconnect) = (String::new(), Reconnect::Now);
+    told.action(15, Action::Disconnect { worker: MILL, reason, reconnect });
     let FrameAccount { workers, .. } = told.frame(20, 1);
     assert_eq!(workers.iter().map(|worker| in_ms(worker.parts)[5]).collect::<Vec<_>>(), [30, 10]);
     told.begin(20, 2);

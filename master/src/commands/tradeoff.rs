@@ -18,14 +18,14 @@ use super::source::Source;
 use crate::cli::{QualityArgs, TradeoffArgs};
 use crate::error::CommandError;
 use crate::in_process::all_cores;
-use crate::output::check_writable;
-use crate::report::print_json;
 use crate::measure::tradeoff::measure::{Studio, summary};
 use crate::measure::tradeoff::oracle::{Verdict, affordable, chosen, judge};
 use crate::measure::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
 use crate::measure::tradeoff::setting::{Asked, Setting};
 use crate::measure::tradeoff::steps::Steps;
 use crate::measure::tradeoff::table::{Row, Table};
+use crate::output::check_writable;
+use crate::report::print_json;
 
 /// What is written last, when all is measured.
 const TABLE: &str = "tradeoff.csv";

@@ -10,8 +10,8 @@ use super::ladder::Rung;
 use super::*;
 use crate::accounting::{Parts, WorkerAccount};
 use crate::measure::simulator::Dice;
-use crate::test_scene;
 use crate::measure::tradeoff::table::Table;
+use crate::test_scene;
 
 const ROOM: &[u8] = include_bytes!("../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;

@@ -9,7 +9,7 @@ use super::{Driver, Inner, Run};
 use crate::farm::{FarmStatus, KickedWorker, RunTotals, TransferStatus, WorkerStatus};
 use crate::identity::{Identity, host};
 use crate::roster::{Kicked, Session};
-use crate::scheduler::{Event, Return, WorkerId};
+use crate::scheduler::{Event, Reconnect, WorkerId};
 
 /// Workers that are let in.
 const MAX_WORKERS: usize = 1024;
@@ -59,7 +59,7 @@ impl Driver {
         if known {
             inner.roster.log_dismissal(worker, reason);
             inner.roster.bar(worker);
-            inner.roster.end(worker, reason, Return::Unwanted);
+            inner.roster.end(worker, reason, Reconnect::Never);
             self.drive(&mut inner, Event::WorkerLeft { worker });
         }
         known
@@ -90,7 +90,7 @@ impl Driver {
     /// A session has ended; its worker is told why, where it still listens.
     pub(crate) fn leave(&self, worker: WorkerId, reason: &str) {
         let mut inner = self.lock();
-        inner.roster.end(worker, reason, Return::Welcome);
+        inner.roster.end(worker, reason, Reconnect::Now);
         self.drive(&mut inner, Event::WorkerLeft { worker });
     }
 
@@ -165,7 +165,7 @@ impl Driver {
             let mut inner = self.lock();
             inner.is_ending = true;
             let farewells = inner.roster.ids().into_iter().map(|worker| {
-                let farewell = inner.roster.end(worker, reason, Return::NextMaster);
+                let farewell = inner.roster.end(worker, reason, Reconnect::NextMaster);
                 self.drive(&mut inner, Event::WorkerLeft { worker });
                 farewell
             });

@@ -8,7 +8,7 @@ use rayfarm_protocol::{FrameId, ToWorker};
 use super::{Driver, Inner, Requested};
 use crate::farm::{FarmError, FinishedFrame};
 use crate::roster::Unreachable;
-use crate::scheduler::{Action, Cost, Event, Return, WorkerId};
+use crate::scheduler::{Action, Cost, Event, Reconnect, WorkerId};
 
 impl Driver {
     /// Performs an action; what comes of it at once goes to `events`.
@@ -51,24 +51,24 @@ impl Driver {
             }
             Action::Ping { worker, nonce } => events.extend(send(inner, worker, ToWorker::Ping { nonce })),
             Action::Drain { worker } => events.extend(send(inner, worker, ToWorker::Drain)),
-            Action::Dismiss { worker, reason, again } => {
-                match again {
+            Action::Disconnect { worker, reason, reconnect } => {
+                match reconnect {
                     // It was drained, as its user or the master's wanted.
-                    Return::Unwanted => inner.roster.log_departure(worker, &reason),
-                    Return::Welcome | Return::NextMaster => inner.roster.log_dismissal(worker, &reason),
+                    Reconnect::Never => inner.roster.log_departure(worker, &reason),
+                    Reconnect::Now | Reconnect::NextMaster => inner.roster.log_dismissal(worker, &reason),
                 }
-                inner.roster.end(worker, &reason, again);
+                inner.roster.end(worker, &reason, reconnect);
             }
-            Action::Seal { worker, lease } => self.seal(inner, worker, lease),
+            Action::RecordDigest { worker, lease } => self.seal(inner, worker, lease),
             Action::Verify { worker, lease } => {
                 if let Some(session) = inner.roster.get_mut(worker) {
                     session.leases.verify(lease);
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
             }
-            Action::Judge { frame, segment } => events.extend(self.judge(inner, frame, segment)),
-            Action::Unseal { frame, segment } => inner.seals.remove(frame, segment),
-            Action::Expel { worker, reason } => self.expel(inner, worker, &reason, events),
+            Action::Arbitrate { frame, segment } => events.extend(self.judge(inner, frame, segment)),
+            Action::DropDigest { frame, segment } => inner.seals.remove(frame, segment),
+            Action::Ban { worker, reason } => self.expel(inner, worker, &reason, events),
         }
     }
 

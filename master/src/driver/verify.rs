@@ -8,7 +8,7 @@ use super::{Driver, Inner, Requested};
 use crate::delivered::as_text;
 use crate::framebuffer::{Misfit, digest};
 use crate::judge::Case;
-use crate::scheduler::{Event, Finding, Return, Verdict, WorkerId};
+use crate::scheduler::{ArbiterResult, Event, Finding, Reconnect, WorkerId};
 use crate::seals::{Seal, Signed};
 
 impl Driver {
@@ -37,7 +37,7 @@ impl Driver {
 
     /// Has the master trace sealed rows. Those that were never sealed are nobody's fault.
     pub(super) fn judge(&self, inner: &Inner, frame: FrameId, segment: u32) -> Option<Event> {
-        let acquitted = Event::SegmentJudged { frame, segment, verdict: Verdict::default() };
+        let acquitted = Event::SegmentArbitrated { frame, segment, result: ArbiterResult::default() };
         let Some(seal) = inner.seals.get(frame, segment) else { return Some(acquitted) };
         let (painter, checker) = (seal.painter.hash, seal.checker.map(|checker| checker.hash));
         let Lease { first_row, row_count, .. } = seal.lease;
@@ -58,7 +58,7 @@ impl Driver {
     ) {
         inner.roster.bar(worker);
         inner.roster.log_dismissal(worker, reason);
-        inner.roster.end(worker, reason, Return::Unwanted);
+        inner.roster.end(worker, reason, Reconnect::Never);
         let wrong = inner.delivered.accuse(worker);
         if wrong.count() > 0 {
             let (count, frames) = (wrong.count(), as_text(wrong.runs()));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::scheduler::{Cost, FrameId, Lease, Verdict, WorkerId};
+use crate::scheduler::{ArbiterResult, Cost, FrameId, Lease, WorkerId};
 
 /// Something that happens at its time.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ pub(crate) enum Happening {
     /// Something goes wrong.
     Fault,
     /// The master has traced rows itself.
-    Judged { frame: FrameId, segment: u32, verdict: Verdict },
+    Judged { frame: FrameId, segment: u32, verdict: ArbiterResult },
 }
 
 /// What a master says.

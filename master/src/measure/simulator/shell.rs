@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::lies::Lie;
 use super::pictures::Picture;
 use crate::lease_book::{LeaseBook, Standing};
-use crate::scheduler::{Event, Finding, FrameId, Lease, Verdict, WorkerId};
+use crate::scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
 
 /// What the driver keeps.
 #[derive(Debug, Default)]
@@ -134,12 +134,12 @@ impl Shell {
         self.seals.remove(&(frame, segment));
     }
 
-    pub(crate) fn judge(&self, frame: FrameId, segment: u32) -> Verdict {
+    pub(crate) fn judge(&self, frame: FrameId, segment: u32) -> ArbiterResult {
         let seal = self.seals.get(&(frame, segment));
-        seal.map_or(Verdict::default(), |seal| Verdict {
-            traced: true,
-            painter: seal.painter != 0,
-            checker: seal.checker.is_some_and(|content| content != 0),
+        seal.map_or(ArbiterResult::default(), |seal| ArbiterResult {
+            rendered: true,
+            first_differs: seal.painter != 0,
+            second_differs: seal.checker.is_some_and(|content| content != 0),
         })
     }
 

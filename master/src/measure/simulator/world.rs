@@ -232,7 +232,7 @@ impl World {
             Happening::Request => self.request(),
             Happening::Fault => self.fault(),
             Happening::Judged { frame, segment, verdict } => {
-                self.tell(Event::SegmentJudged { frame, segment, verdict });
+                self.tell(Event::SegmentArbitrated { frame, segment, result: verdict });
             }
         }
     }
@@ -264,11 +264,11 @@ impl World {
                 self.send(worker, Down::Drain);
                 Ok(())
             }
-            Action::Dismiss { worker, .. } => {
+            Action::Disconnect { worker, .. } => {
                 self.part(worker);
                 Ok(())
             }
-            Action::Seal { worker, lease } => {
+            Action::RecordDigest { worker, lease } => {
                 self.shell.seal(worker, lease);
                 Ok(())
             }
@@ -276,16 +276,16 @@ impl World {
                 self.send(worker, Down::Lease(lease));
                 self.shell.verify(worker, lease)
             }
-            Action::Judge { frame, segment } => {
+            Action::Arbitrate { frame, segment } => {
                 let verdict = self.shell.judge(frame, segment);
                 self.clock.plan(self.clock.now + JUDGEMENT, Happening::Judged { frame, segment, verdict });
                 Ok(())
             }
-            Action::Unseal { frame, segment } => {
+            Action::DropDigest { frame, segment } => {
                 self.shell.unseal(frame, segment);
                 Ok(())
             }
-            Action::Expel { worker, .. } => {
+            Action::Ban { worker, .. } => {
                 self.part(worker);
                 self.tally.expelled += 1;
                 let (rejected, checked) = self.shell.expel(worker);
