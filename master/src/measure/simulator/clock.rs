@@ -1,38 +1,38 @@
-//! What is going to happen, in order.
+//! Virtual time and the queue of future events.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::scheduler::{ArbiterResult, Cost, FrameId, Lease, WorkerId};
 
-/// Something that happens at its time.
+/// An event of the simulation.
 #[derive(Clone, Debug)]
-pub(crate) enum Happening {
-    /// A message has reached its worker.
-    AtWorker(WorkerId, Down),
-    /// A message has reached the master's link.
-    AtLink(WorkerId, Up),
-    /// A message has been read by the master.
-    AtMaster(WorkerId, Up),
-    /// A thread of a worker has finished a band.
+pub(crate) enum SimEvent {
+    /// A message reaches its worker.
+    AtWorker(WorkerId, MasterMessage),
+    /// A message reaches the master's link.
+    AtLink(WorkerId, WorkerMessage),
+    /// The master reads a message.
+    AtMaster(WorkerId, WorkerMessage),
+    /// A thread of a worker finishes a band.
     BandDone { worker: WorkerId, thread: usize },
-    /// The master learns that a connection is gone.
+    /// The master learns that a connection is closed.
     Closed(WorkerId),
-    /// A worker that stood still goes on, or one that was slow is not any more.
+    /// A stopped or slow worker recovers.
     Recovered(WorkerId),
     /// The camera moves.
     Input,
-    /// A frame is complete, and the next one is wanted.
+    /// A frame is complete and the next one is requested.
     Request,
-    /// Something goes wrong.
+    /// A fault is injected.
     Fault,
-    /// The master has traced rows itself.
-    Judged { frame: FrameId, segment: u32, verdict: ArbiterResult },
+    /// The arbiter has rendered rows on the master.
+    Arbitrated { frame: FrameId, segment: u32, result: ArbiterResult },
 }
 
-/// What a master says.
+/// A message from the master to a worker.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Down {
+pub(crate) enum MasterMessage {
     Announce,
     Lease(Lease),
     Cancel(FrameId),
@@ -40,10 +40,10 @@ pub(crate) enum Down {
     Drain,
 }
 
-/// What a worker says.
+/// A message from a worker to the master.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Up {
-    /// `content` is 0 in each row where the pixels are the right ones.
+pub(crate) enum WorkerMessage {
+    /// `content` is the error value of each of its rows: 0 where the pixels are right.
     Pixels {
         lease: Lease,
         cost: Cost,
@@ -55,31 +55,32 @@ pub(crate) enum Up {
     Drain,
 }
 
-/// Virtual time and its agenda. What happens at one time happens in the order in which it was planned.
+/// Virtual time in nanoseconds, and future events in order. Events of the same time keep the order in which they
+/// were scheduled.
 #[derive(Debug, Default)]
 pub(crate) struct Clock {
     pub(crate) now: u64,
-    agenda: BTreeMap<(u64, u64), Happening>,
-    planned: u64,
+    queue: BTreeMap<(u64, u64), SimEvent>,
+    scheduled: u64,
 }
 
 impl Clock {
-    pub(crate) fn plan(&mut self, at: u64, happening: Happening) {
-        self.planned += 1;
-        self.agenda.insert((at.max(self.now), self.planned), happening);
+    pub(crate) fn schedule(&mut self, at: u64, event: SimEvent) {
+        self.scheduled += 1;
+        self.queue.insert((at.max(self.now), self.scheduled), event);
     }
 
     pub(crate) fn next_at(&self) -> Option<u64> {
-        self.agenda.first_key_value().map(|((at, _), _)| *at)
+        self.queue.first_key_value().map(|((at, _), _)| *at)
     }
 
-    pub(crate) fn pop(&mut self) -> Option<Happening> {
-        self.agenda.pop_first().map(|(_, happening)| happening)
+    pub(crate) fn pop(&mut self) -> Option<SimEvent> {
+        self.queue.pop_first().map(|(_, event)| event)
     }
 
-    /// Nothing of this kind will happen.
-    pub(crate) fn forget(&mut self, which: impl Fn(&Happening) -> bool) {
-        self.agenda.retain(|_, happening| !which(happening));
+    /// Cancels future events.
+    pub(crate) fn cancel(&mut self, which: impl Fn(&SimEvent) -> bool) {
+        self.queue.retain(|_, event| !which(event));
     }
 
     pub(crate) fn time(&self) -> Duration {

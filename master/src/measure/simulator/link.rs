@@ -1,22 +1,22 @@
-//! Links: bandwidth, latency, jitter. A connection keeps its messages in order.
+//! Links with bandwidth, and connections that keep messages in order.
 
 use super::SECOND;
 
-/// One direction of a link: messages follow each other.
+/// One direction of a link; it carries one message at a time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Lane {
     free_at: u64,
 }
 
 impl Lane {
-    /// When a message that wants to pass at `now` has passed, at `bytes_per_second`.
+    /// When a message that is sent at `now` has passed the link, at `bytes_per_second`.
     pub(crate) fn pass(&mut self, now: u64, bytes: f64, bytes_per_second: f64) -> u64 {
         self.free_at = self.free_at.max(now) + (bytes / bytes_per_second * SECOND as f64) as u64;
         self.free_at
     }
 }
 
-/// One direction of a connection: nothing overtakes.
+/// One direction of a connection: messages arrive in the order in which they were sent.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Order {
     last_at: u64,
@@ -30,11 +30,11 @@ impl Order {
     }
 }
 
-/// Bytes of messages: payload, envelope, and what TCP and Ethernet add to small ones.
+/// Sizes of messages in bytes: payload, envelope, and the overhead of TCP and Ethernet for small ones.
 pub(crate) mod bytes {
     pub(crate) const ANNOUNCE: f64 = 330.0;
     pub(crate) const CONTROL: f64 = 130.0;
     pub(crate) const PIXELS_HEAD: f64 = 200.0;
-    /// Of a gigabit link, 117.5 MB of 125 are payload.
+    /// 117.5 MB of the 125 MB per second of a gigabit link are payload.
     pub(crate) const PAYLOAD_SHARE: f64 = 0.94;
 }

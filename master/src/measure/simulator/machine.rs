@@ -1,45 +1,45 @@
-//! A simulated worker: its queue of leases, its threads, and what may be wrong with it.
+//! A simulated worker: its queue of leases, its threads, its condition.
 
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use super::clock::Down;
+use super::clock::MasterMessage;
 use super::link::{Lane, Order};
 use crate::scheduler::{FrameId, Lease};
 
-/// A machine.
+/// State of one worker's machine.
 #[derive(Debug)]
 pub(crate) struct Machine {
-    /// Work a second of all threads together.
+    /// Work per second of all threads together.
     pub(crate) speed: f64,
     pub(crate) latency: u64,
     pub(crate) threads: Vec<Option<Band>>,
     queue: VecDeque<Job>,
-    pub(crate) ailment: Ailment,
-    /// What it was sent while it stood still.
-    pub(crate) unread: Vec<Down>,
-    /// Threads that finished while it stood still.
+    pub(crate) condition: Condition,
+    /// Messages that arrived while it was stopped.
+    pub(crate) unread: Vec<MasterMessage>,
+    /// Threads that finished while it was stopped.
     pub(crate) unfinished: Vec<usize>,
     pub(crate) up: Lane,
     pub(crate) up_order: Order,
     pub(crate) down_order: Order,
 }
 
-/// What is wrong with a machine.
+/// Health of a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Ailment {
+pub(crate) enum Condition {
     Healthy,
-    /// So many times slower than it should be.
+    /// Slower by this factor.
     Slow(f64),
-    /// It stands still, as a stopped process, or as one beyond a network that is cut: it goes on later.
+    /// Stopped and later continued, as a suspended process or one in a cut-off part of the network.
     Stopped,
     /// It answers pings and never a lease.
     Stuck,
-    /// It is gone, and nobody was told: the connection is half open.
+    /// Gone without closing the connection, which is half open.
     Vanished,
 }
 
-/// A lease that it was given.
+/// A lease in its queue.
 #[derive(Debug)]
 struct Job {
     lease: Lease,
@@ -67,7 +67,7 @@ impl Machine {
             latency,
             threads: vec![None; threads.max(1) as usize],
             queue: VecDeque::new(),
-            ailment: Ailment::Healthy,
+            condition: Condition::Healthy,
             unread: Vec::new(),
             unfinished: Vec::new(),
             up: Lane::default(),
@@ -76,17 +76,17 @@ impl Machine {
         }
     }
 
-    /// Work a second of one thread, now.
+    /// Present work per second of one thread.
     pub(crate) fn thread_speed(&self) -> f64 {
         let full = self.speed / self.threads.len() as f64;
-        if let Ailment::Slow(times) = self.ailment { full / times } else { full }
+        if let Condition::Slow(times) = self.condition { full / times } else { full }
     }
 
     pub(crate) fn lease(&mut self, lease: Lease) {
         self.queue.push_back(Job { lease, next_row: lease.first_row, rows_done: 0, traced: 0 });
     }
 
-    /// Forgets leases of frames before `before`; threads finish the bands they are at.
+    /// Drops leases of frames before `before`; threads finish their bands.
     pub(crate) fn cancel(&mut self, before: FrameId) {
         self.queue.retain(|job| job.lease.frame >= before);
         for band in self.threads.iter_mut().flatten() {
@@ -98,7 +98,7 @@ impl Machine {
         self.threads.iter().position(Option::is_none)
     }
 
-    /// The next rows that no thread has, of the earliest lease, up to a multiple of `tile_rows`.
+    /// The next untraced rows of the earliest lease, up to a multiple of `tile_rows`.
     pub(crate) fn next_band(&mut self, tile_rows: u32) -> Option<(Lease, Range<u32>)> {
         let job =
             self.queue.iter_mut().find(|job| job.next_row < job.lease.first_row + job.lease.row_count)?;
@@ -109,7 +109,7 @@ impl Machine {
         Some((job.lease, rows))
     }
 
-    /// Takes a finished band; the whole lease and the nanoseconds it took, if it was the last one.
+    /// Finishes a band. Returns the lease and its tracing time in nanoseconds if this was its last band.
     pub(crate) fn finish(&mut self, band: &Band) -> Option<(Lease, u64)> {
         let job = self.queue.iter_mut().find(|job| job.lease == band.lease)?;
         job.rows_done += band.rows.end - band.rows.start;

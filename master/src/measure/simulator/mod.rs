@@ -1,95 +1,95 @@
-//! A farm in virtual time: the real [`Scheduler`](crate::scheduler::Scheduler) and the real book of leases, with
-//! simulated workers, links and faults. Everything follows from a seed.
+//! A farm in virtual time: the real [`Scheduler`](crate::scheduler::Scheduler) and lease book, with simulated
+//! workers, links and faults. Everything follows from a seed.
 //!
-//! Two uses. [`measure`] renders frames with healthy workers and tells how much of their power became picture.
-//! [`survive`] lets faults happen first and stops them then: after every event the invariants of
-//! [`check`](crate::scheduler::check) hold, and what was asked for completes.
+//! [`measure`] renders frames with healthy workers and reports how much of their power became picture.
+//! [`run_schedule`] runs a phase with faults and a phase without: the invariants of
+//! [`check`](crate::scheduler::check) hold after every event, and every request completes.
 //!
-//! Time is in nanoseconds. Work is in average workers' seconds: a frame is `frame_seconds` of it, and a worker of
-//! speed 2 does two of it a second.
+//! Time is in nanoseconds. The unit of work is a second of an average worker: a frame has `frame_seconds` of it,
+//! and a worker of speed 2 does two units per second.
 
 mod clock;
+mod corruption;
 mod costs;
-mod dice;
+mod counters;
+mod distribution;
+mod fault_schedule;
 mod faults;
-mod lies;
 mod link;
 mod machine;
-mod passing;
+mod network;
 mod pictures;
-mod post;
 mod render;
+mod rng;
 mod shell;
-mod survival;
-mod tally;
 mod world;
 
 #[cfg(test)]
 mod tests;
 
+pub use corruption::Corruption;
 pub use costs::CostProfile;
+pub use counters::Measured;
+pub use distribution::{Distribution, DistributionSetup, distribute};
+pub use fault_schedule::{Schedule, ScheduleOutcome, run_schedule};
 #[cfg(test)]
-pub(crate) use dice::Dice;
-pub use lies::Lie;
-pub use passing::{Passed, PassingSetup, pass};
-pub use survival::{Schedule, Survivor, survive};
-pub use tally::Measured;
+pub(crate) use rng::Rng;
 
 use crate::scheduler::SegmentPolicy;
 
-/// Nanoseconds of a second.
+/// Nanoseconds per second.
 pub(crate) const SECOND: u64 = 1_000_000_000;
 
-/// What is simulated. The defaults are the project's own measure: 1024x768 pixels, a frame of one second of work,
+/// What is simulated. The defaults are the workload of the reports: 1024x768 pixels, frames of one second of work,
 /// gigabit links, 0.2 ms round trip, speeds spread 4 to 1.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Connected workers.
     pub workers: u32,
-    /// Render threads of each.
+    /// Render threads of each worker.
     pub threads: u32,
-    /// The fastest worker's speed over the slowest one's; the average is 1.
+    /// Ratio of the fastest worker's speed to the slowest one's; the average is 1.
     pub spread: f64,
-    /// How frames are cut.
+    /// How frames are cut into segments.
     pub policy: SegmentPolicy,
     /// Whether idle workers begin the next frame.
     pub pipeline: bool,
-    /// Pixels of a row, and rows.
+    /// Pixels per row, and rows.
     pub size: (u32, u32),
-    /// Which rows cost how much.
+    /// Costs of rows.
     pub costs: CostProfile,
-    /// What a frame takes an average worker, in seconds.
+    /// Time of a frame on an average worker, in seconds.
     pub frame_seconds: f64,
-    /// Rows that are traced together, from multiples of it on: a tile's height. A tile has 256 rays, so it is 16 rows high
-    /// with one sample a pixel, and one row with 81 and more.
+    /// Rows of a tile band; bands begin at multiples of it. A tile has 256 rays, so it is 16 rows high with one
+    /// sample per pixel and one row high with 81 and more.
     pub tile_rows: u32,
-    /// What a band of a tile's height costs however few of its rows are traced, as a share.
+    /// The part of a band's cost that does not depend on how many of its rows are traced, 0 to 1.
     pub tile_share: f64,
-    /// Bits a second of every link; the master's is shared by all workers.
+    /// Bits per second of every link; all workers share the master's link.
     pub link_bits: f64,
-    /// Raw pixel bytes over bytes on the wire.
+    /// Ratio of raw pixel bytes to bytes on the wire.
     pub compression: f64,
-    /// Round trip, in nanoseconds.
+    /// Round trip time in nanoseconds.
     pub round_trip: u64,
-    /// What a message takes longer at most, at random, in nanoseconds.
+    /// Largest random delay of a message, in nanoseconds.
     pub jitter: u64,
-    /// What a lease costs its worker besides tracing, in nanoseconds.
+    /// Cost of a lease for its worker besides tracing, in nanoseconds.
     pub lease_cost: u64,
-    /// What a segment that arrives costs the master, one at a time, in nanoseconds.
+    /// Cost of an arriving segment for the master, in nanoseconds; segments are handled one at a time.
     pub message_cost: u64,
-    /// Requests a second of a moving camera; 0: one as soon as a frame is complete.
+    /// Requests per second of a moving camera; 0 requests the next frame when one completes.
     pub input_rate: f64,
-    /// The share of the segments that is verified, in per cent.
+    /// Share of the segments to verify, in per cent.
     pub verify_percent: u8,
-    /// Workers that send wrong pixels: the first to join.
-    pub liars: u32,
-    /// How they lie.
-    pub lie: Lie,
-    /// Workers that share one machine: the first to join. Each of the others has its own.
-    pub neighbours: u32,
-    /// Frames measured, after some that are not.
+    /// Number of workers that send wrong pixels: the first to join.
+    pub corrupt_workers: u32,
+    /// How they send wrong pixels.
+    pub corruption: Corruption,
+    /// Number of workers on one shared machine: the first to join. Each other worker has its own machine.
+    pub colocated_workers: u32,
+    /// Frames to measure, after a warm-up.
     pub frames: u64,
-    /// What everything random follows from.
+    /// Seed of all random choices.
     pub seed: u64,
 }
 
@@ -104,7 +104,7 @@ impl Default for Setup {
             size: (1024, 768),
             costs: CostProfile::Bust,
             frame_seconds: 1.0,
-            // The bust takes a second with 100 samples a pixel.
+            // The bust takes a second with 100 samples per pixel.
             tile_rows: 1,
             // Measured: see `costs`.
             tile_share: 0.38,
@@ -116,17 +116,17 @@ impl Default for Setup {
             message_cost: 10_000,
             input_rate: 0.0,
             verify_percent: 0,
-            liars: 0,
-            lie: Lie::Half,
-            neighbours: 0,
+            corrupt_workers: 0,
+            corruption: Corruption::Random,
+            colocated_workers: 0,
             frames: 30,
             seed: 1,
         }
     }
 }
 
-/// Renders `setup.frames` frames with healthy workers, after as many as make the scheduler know them. `None` if they
-/// are not done within an hour of virtual time.
+/// Renders `setup.frames` frames with healthy workers after a warm-up, in which the scheduler learns speeds and
+/// costs. `None` if they are not done within an hour of virtual time.
 pub fn measure(setup: &Setup) -> Option<Measured> {
     world::World::new(setup.clone()).measure()
 }

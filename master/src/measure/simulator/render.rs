@@ -1,8 +1,8 @@
-//! Workers at work: which thread renders what, and how long that takes.
+//! Rendering of simulated workers: rows of each thread, and their duration.
 
 use super::SECOND;
-use super::clock::{Happening, Up};
-use super::machine::{Ailment, Band};
+use super::clock::{SimEvent, WorkerMessage};
+use super::machine::{Band, Condition};
 use super::world::World;
 use crate::scheduler::{Cost, FrameId, Lease, WorkerId};
 
@@ -10,7 +10,7 @@ impl World {
     /// Gives rows to idle threads.
     pub(super) fn start(&mut self, id: WorkerId) {
         while let Some(machine) = self.machines.get_mut(&id) {
-            if matches!(machine.ailment, Ailment::Stopped | Ailment::Vanished) {
+            if matches!(machine.condition, Condition::Stopped | Condition::Vanished) {
                 return;
             }
             let Some(thread) = machine.idle_thread() else { return };
@@ -20,21 +20,21 @@ impl World {
             let lease_seconds = if last { self.setup.lease_cost as f64 / SECOND as f64 } else { 0.0 };
             let (work, cutting) = self.work(lease.frame, rows.clone());
             let nanoseconds = (((work + cutting) / speed + lease_seconds) * SECOND as f64) as u64;
-            self.tally.cutting += cutting;
-            self.tally.leases += lease_seconds * speed;
-            self.tally.trace(self.clock.now, speed);
+            self.counters.cutting += cutting;
+            self.counters.leases += lease_seconds * speed;
+            self.counters.trace(self.clock.now, speed);
             let done_at = self.clock.now + nanoseconds;
             if let Some(machine) = self.machines.get_mut(&id) {
                 machine.threads[thread] = Some(Band { lease, rows, nanoseconds, speed, stale: false });
             }
-            self.clock.plan(done_at, Happening::BandDone { worker: id, thread });
+            self.clock.schedule(done_at, SimEvent::BandDone { worker: id, thread });
         }
     }
 
-    /// The work of rows, and what cutting their tiles adds to it.
+    /// Work of rows, and the work that cutting their tile bands adds.
     fn work(&mut self, frame: FrameId, rows: std::ops::Range<u32>) -> (f64, f64) {
         let height = self.setup.size.1;
-        // Costs that never change are computed once.
+        // Constant costs are computed once.
         let key = if self.setup.costs.moves() { frame.0 } else { 0 };
         let costs = self.costs.entry(key).or_insert_with(|| {
             let mut sums = vec![0.0];
@@ -61,14 +61,14 @@ impl World {
 
     pub(super) fn band_done(&mut self, id: WorkerId, thread: usize) {
         let Some(machine) = self.machines.get_mut(&id) else { return };
-        match machine.ailment {
-            Ailment::Stopped => return machine.unfinished.push(thread),
-            Ailment::Vanished => return,
-            Ailment::Healthy | Ailment::Slow(_) | Ailment::Stuck => {}
+        match machine.condition {
+            Condition::Stopped => return machine.unfinished.push(thread),
+            Condition::Vanished => return,
+            Condition::Healthy | Condition::Slow(_) | Condition::Stuck => {}
         }
         let Some(band) = machine.threads.get_mut(thread).and_then(Option::take) else { return };
-        self.tally.trace(self.clock.now, -band.speed);
-        let stuck = machine.ailment == Ailment::Stuck;
+        self.counters.trace(self.clock.now, -band.speed);
+        let stuck = machine.condition == Condition::Stuck;
         let whole = if band.stale { None } else { machine.finish(&band) };
         if let Some((lease, trace_ns)) = whole.filter(|_| !stuck) {
             let cost = Cost { trace_ns, primary: u64::from(lease.row_count), ..Cost::default() };
@@ -77,20 +77,20 @@ impl World {
         self.start(id);
     }
 
-    /// A finished lease goes to the master; where faults happen, now and then late, twice or wrong.
+    /// Sends a finished lease to the master; with faults, sometimes twice or invalid.
     fn deliver(&mut self, id: WorkerId, lease: Lease, cost: Cost) {
-        let fits = !(self.faults && self.dice.one_in(500));
+        let fits = !(self.faults && self.rng.one_in(500));
         let content = self.content(id, &lease);
-        self.say(id, Up::Pixels { lease, cost, fits, content });
-        if self.faults && self.dice.one_in(300) {
-            self.say(id, Up::Pixels { lease, cost, fits, content });
+        self.send_to_master(id, WorkerMessage::Pixels { lease, cost, fits, content });
+        if self.faults && self.rng.one_in(300) {
+            self.send_to_master(id, WorkerMessage::Pixels { lease, cost, fits, content });
         }
     }
 
-    /// A machine is well again: it reads what it was sent meanwhile, and goes on.
+    /// Recovers a machine: it reads the messages that arrived meanwhile, and goes on.
     pub(super) fn recover(&mut self, id: WorkerId) {
         let Some(machine) = self.machines.get_mut(&id) else { return };
-        machine.ailment = Ailment::Healthy;
+        machine.condition = Condition::Healthy;
         let unread = std::mem::take(&mut machine.unread);
         let unfinished = std::mem::take(&mut machine.unfinished);
         for thread in unfinished {

@@ -1,47 +1,47 @@
-//! The master's shell without its sockets: the books of leases, the rows of the pictures and what is sealed of them, and
-//! what must hold there.
+//! The shell of the master without sockets: lease books, pictures and digests, with checks of what must hold for
+//! them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::lies::Lie;
+use super::corruption::Corruption;
 use super::pictures::Picture;
 use crate::lease_book::{LeaseBook, Standing};
 use crate::scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
 
-/// What the driver keeps.
+/// State that the driver keeps in the real master.
 #[derive(Debug, Default)]
 pub(crate) struct Shell {
     pub(crate) books: BTreeMap<WorkerId, LeaseBook>,
     announced: BTreeMap<WorkerId, BTreeSet<FrameId>>,
     pictures: BTreeMap<FrameId, Picture>,
-    seals: BTreeMap<(FrameId, u32), Seal>,
-    /// Workers that send wrong pixels, and those that were sent away for it.
-    pub(crate) liars: BTreeMap<WorkerId, Lie>,
-    pub(crate) expelled: BTreeSet<WorkerId>,
+    digests: BTreeMap<(FrameId, u32), RowDigests>,
+    /// Workers that send wrong pixels, and banned workers.
+    pub(crate) corrupt: BTreeMap<WorkerId, Corruption>,
+    pub(crate) banned: BTreeSet<WorkerId>,
     /// Frames that have ended, complete or not.
     pub(crate) ended: BTreeSet<FrameId>,
     pub(crate) last_done: Option<FrameId>,
 }
 
-/// What was sent for the picture, and what was sent to verify it.
+/// Digests of the first and the second rendering of a segment.
 #[derive(Debug)]
-struct Seal {
+struct RowDigests {
     worker: WorkerId,
-    painter: u64,
-    checker: Option<u64>,
+    first: u64,
+    second: Option<u64>,
 }
 
-/// What became of pixels.
+/// Outcome of checking a reply against its lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
-    /// They are in the picture: the scheduler is told.
+pub(crate) enum ReplyOutcome {
+    /// The pixels are in the picture; the scheduler gets an event.
     Kept,
-    /// They were compared with those in the picture: the scheduler is told.
+    /// They were compared with the first rendering; the scheduler gets an event.
     Compared(Finding),
-    /// Nobody wants them any more.
+    /// They are dropped: their frame or lease is gone.
     Late,
-    /// The worker is dismissed.
-    Refused,
+    /// The reply is invalid, and the worker is disconnected.
+    Invalid,
 }
 
 impl Shell {
@@ -75,16 +75,16 @@ impl Shell {
         }
     }
 
-    /// The book of a worker that can render a lease.
+    /// The lease book of a worker that knows the frame of a lease.
     fn book(&mut self, worker: WorkerId, lease: Lease) -> Result<&mut LeaseBook, String> {
-        let told = self.announced.get(&worker).is_some_and(|frames| frames.contains(&lease.frame));
-        if !told {
+        let announced = self.announced.get(&worker).is_some_and(|frames| frames.contains(&lease.frame));
+        if !announced {
             return Err(format!("{lease} goes to {worker}, which does not know the frame"));
         }
         self.books.get_mut(&worker).ok_or_else(|| format!("{lease} goes to {worker}, which is gone"))
     }
 
-    /// A lease goes out. Returns whether it was the one that gave away the last row of its frame.
+    /// Grants a lease. Returns whether it covers the last ungranted row of its frame.
     pub(crate) fn grant(&mut self, worker: WorkerId, lease: Lease) -> Result<bool, String> {
         self.book(worker, lease)?.grant(lease);
         let picture = self.pictures.get_mut(&lease.frame);
@@ -92,89 +92,97 @@ impl Shell {
         picture.grant(&lease).ok_or_else(|| format!("{lease} leaves the picture"))
     }
 
-    /// A lease of rows that are compared goes out.
+    /// Grants a lease of a second rendering.
     pub(crate) fn verify(&mut self, worker: WorkerId, lease: Lease) -> Result<(), String> {
         self.book(worker, lease)?.verify(lease);
         Ok(())
     }
 
-    /// Pixels arrive, as the driver would let them.
-    pub(crate) fn answer(&mut self, worker: WorkerId, lease: &Lease, fits: bool, content: u64) -> Answer {
-        let Some(book) = self.books.get_mut(&worker) else { return Answer::Late };
+    /// Applies a reply as the driver would.
+    pub(crate) fn reply(
+        &mut self,
+        worker: WorkerId,
+        lease: &Lease,
+        fits: bool,
+        content: u64,
+    ) -> ReplyOutcome {
+        let Some(book) = self.books.get_mut(&worker) else { return ReplyOutcome::Late };
         match (book.answer(lease), self.pictures.get_mut(&lease.frame)) {
-            (Standing::Unknown, _) => Answer::Refused,
-            (Standing::Granted | Standing::Verifying, _) if !fits => Answer::Refused,
-            (Standing::Verifying, _) => Answer::Compared(self.compare(lease, content)),
-            (Standing::Revoked, _) | (Standing::Granted, None) => Answer::Late,
+            (Standing::Unknown, _) => ReplyOutcome::Invalid,
+            (Standing::Granted | Standing::Verifying, _) if !fits => ReplyOutcome::Invalid,
+            (Standing::Verifying, _) => ReplyOutcome::Compared(self.compare(lease, content)),
+            (Standing::Revoked, _) | (Standing::Granted, None) => ReplyOutcome::Late,
             (Standing::Granted, Some(picture)) => {
                 picture.fill(worker, lease, content);
-                Answer::Kept
+                ReplyOutcome::Kept
             }
         }
     }
 
     fn compare(&mut self, lease: &Lease, content: u64) -> Finding {
-        let Some(seal) = self.seals.get_mut(&(lease.frame, lease.segment)) else { return Finding::Unknown };
+        let Some(digest) = self.digests.get_mut(&(lease.frame, lease.segment)) else {
+            return Finding::Unknown;
+        };
         let content = content.wrapping_mul(u64::from(lease.row_count));
-        if content == seal.painter {
+        if content == digest.first {
             return Finding::Same;
         }
-        seal.checker = Some(content);
+        digest.second = Some(content);
         Finding::Different
     }
 
-    pub(crate) fn seal(&mut self, worker: WorkerId, lease: Lease) {
+    pub(crate) fn record_digest(&mut self, worker: WorkerId, lease: Lease) {
         let picture = self.pictures.get(&lease.frame);
-        if let Some(painter) = picture.and_then(|picture| picture.digest(worker, &lease)) {
-            self.seals.insert((lease.frame, lease.segment), Seal { worker, painter, checker: None });
+        if let Some(first) = picture.and_then(|picture| picture.digest(worker, &lease)) {
+            self.digests.insert((lease.frame, lease.segment), RowDigests { worker, first, second: None });
         }
     }
 
-    pub(crate) fn unseal(&mut self, frame: FrameId, segment: u32) {
-        self.seals.remove(&(frame, segment));
+    pub(crate) fn drop_digest(&mut self, frame: FrameId, segment: u32) {
+        self.digests.remove(&(frame, segment));
     }
 
-    pub(crate) fn judge(&self, frame: FrameId, segment: u32) -> ArbiterResult {
-        let seal = self.seals.get(&(frame, segment));
-        seal.map_or(ArbiterResult::default(), |seal| ArbiterResult {
+    pub(crate) fn arbitrate(&self, frame: FrameId, segment: u32) -> ArbiterResult {
+        let digest = self.digests.get(&(frame, segment));
+        digest.map_or(ArbiterResult::default(), |digest| ArbiterResult {
             rendered: true,
-            first_differs: seal.painter != 0,
-            second_differs: seal.checker.is_some_and(|content| content != 0),
+            first_differs: digest.first != 0,
+            second_differs: digest.second.is_some_and(|content| content != 0),
         })
     }
 
-    /// Where a lease is a second rendering: whose the first one was, and what was sent for each row.
-    pub(super) fn sealed_by(&self, lease: &Lease) -> Option<(WorkerId, u64)> {
-        let seal = self.seals.get(&(lease.frame, lease.segment))?;
-        Some((seal.worker, seal.painter / u64::from(lease.row_count.max(1))))
+    /// For a lease of a second rendering: the worker of the first rendering, and its error value per row.
+    pub(super) fn first_rendering(&self, lease: &Lease) -> Option<(WorkerId, u64)> {
+        let digest = self.digests.get(&(lease.frame, lease.segment))?;
+        Some((digest.worker, digest.first / u64::from(lease.row_count.max(1))))
     }
 
-    /// Rows that are sealed.
-    pub(crate) fn sealed(&self) -> u64 {
-        self.seals.len() as u64
+    /// Number of recorded digests.
+    pub(crate) fn digest_count(&self) -> u64 {
+        self.digests.len() as u64
     }
 
-    /// A worker is sent away for good: its rows leave all pictures.
-    pub(crate) fn expel(&mut self, worker: WorkerId) -> (Vec<Event>, Result<(), String>) {
-        self.expelled.insert(worker);
+    /// Bans a worker and rejects its rows in all pictures in flight. Returns the events that follow.
+    pub(crate) fn ban(&mut self, worker: WorkerId) -> (Vec<Event>, Result<(), String>) {
+        self.banned.insert(worker);
         let rejected = |(&frame, picture): (&FrameId, &mut Picture)| {
             let event = move |row| Event::RowsRejected { frame, first_row: row, row_count: 1 };
             picture.reject(worker).into_iter().map(event)
         };
         let events = self.pictures.iter_mut().flat_map(rejected).collect();
-        let deserved = self.liars.contains_key(&worker);
-        (events, if deserved { Ok(()) } else { Err(format!("{worker} is expelled and never lied")) })
+        let deserved = self.corrupt.contains_key(&worker);
+        (events, if deserved { Ok(()) } else { Err(format!("{worker} is banned and sent no wrong pixels")) })
     }
 
-    /// A frame is shown. Whether it is the wrong picture.
+    /// Completes a frame. Returns whether its picture is wrong.
     pub(crate) fn done(&mut self, frame: FrameId) -> Result<bool, String> {
         let picture =
             self.pictures.remove(&frame).ok_or_else(|| format!("{frame:?} is done and never began"))?;
         if let Some(row) = picture.missing() {
-            return Err(format!("{frame:?} is called complete without row {row}"));
+            return Err(format!("{frame:?} completes without row {row}"));
         }
-        if let Some(liar) = picture.wrong().find(|worker| self.expelled.contains(worker)) {
-            return Err(format!("{frame:?} shows wrong rows of {liar}, which was expelled"));
+        if let Some(owner) = picture.wrong().find(|worker| self.banned.contains(worker)) {
+            return Err(format!("{frame:?} shows wrong rows of {owner}, which was banned"));
         }
         if self.last_done >= Some(frame) {
             return Err(format!("{frame:?} is done after {:?}", self.last_done));
@@ -184,7 +192,7 @@ impl Shell {
         Ok(picture.wrong().next().is_some())
     }
 
-    /// A frame that is given up.
+    /// Drops a frame.
     pub(crate) fn drop(&mut self, frame: FrameId) -> Result<(), String> {
         self.pictures.remove(&frame);
         self.end(frame)

@@ -1,10 +1,11 @@
-//! Chance, from a seed.
+//! Random numbers from a seed.
 
-/// splitmix64 (Steele, Lea, Flood 2014): small, and good enough to choose faults with.
+/// splitmix64 generator (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014). Good enough
+/// to choose faults.
 #[derive(Clone, Debug)]
-pub(crate) struct Dice(u64);
+pub(crate) struct Rng(u64);
 
-impl Dice {
+impl Rng {
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -17,29 +18,29 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// 0 to `sides - 1`; 0 for a die without sides.
-    pub(crate) fn roll(&mut self, sides: u64) -> u64 {
+    /// A random number below `bound`; 0 if `bound` is 0.
+    pub(crate) fn below(&mut self, sides: u64) -> u64 {
         self.next().checked_rem(sides).unwrap_or(0)
     }
 
     pub(crate) fn one_in(&mut self, n: u64) -> bool {
-        self.roll(n) == 0
+        self.below(n) == 0
     }
 
-    /// In [0, 1).
+    /// A random number in [0, 1).
     pub(crate) fn fraction(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// One of them, if there are any.
+    /// A random element; `None` if there are none.
     pub(crate) fn pick<T: Copy>(&mut self, from: &[T]) -> Option<T> {
-        from.get(self.roll(from.len() as u64) as usize).copied()
+        from.get(self.below(from.len() as u64) as usize).copied()
     }
 
-    /// In any order (Fisher and Yates).
+    /// Shuffles in place (Fisher and Yates).
     pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
-            items.swap(last, self.roll(last as u64 + 1) as usize);
+            items.swap(last, self.below(last as u64 + 1) as usize);
         }
     }
 }
