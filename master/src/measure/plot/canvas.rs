@@ -1,4 +1,4 @@
-//! A picture that `plotters` can draw on, with letters of its own: no font is looked for on the machine.
+//! RGB picture as a backend of `plotters`, with letters of its own: no system font is needed.
 
 use std::convert::Infallible;
 
@@ -11,7 +11,7 @@ use rayfarm_tracer::image::RgbImage;
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
-/// Pixels, white at first. Lines and discs have smooth edges.
+/// Picture with a white background. Lines and discs are anti-aliased.
 pub(super) struct Canvas {
     picture: RgbImage,
 }
@@ -26,7 +26,7 @@ impl Canvas {
         self.picture
     }
 
-    /// Lays a colour over a pixel, as far as it covers it; beside the picture, nothing happens.
+    /// Blends a colour over a pixel by its coverage, 0 to 1; pixels outside the picture are ignored.
     fn blend(&mut self, (x, y): BackendCoord, color: BackendColor, coverage: f64) {
         let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
         if x >= self.picture.width || y >= self.picture.height {
@@ -40,7 +40,7 @@ impl Canvas {
         }
     }
 
-    /// Covers all pixels of a box by what `distance` says of their centres: inside, below zero.
+    /// Fills the pixels of a box by the signed distance of their centres, negative inside.
     fn cover(
         &mut self,
         [left, top, right, bottom]: [i32; 4],
@@ -162,7 +162,7 @@ fn distance_to_segment(x: f64, y: f64, from: BackendCoord, to: BackendCoord) -> 
     (x - share * along_x).hypot(y - share * along_y)
 }
 
-/// The letters that are nearest to a size in the units of `plotters`, of which an SVG's font gets 1 / 1.24.
+/// The raster font nearest to a size in units of `plotters`; an SVG font of that size has size / 1.24 pixels.
 fn face(size: f64) -> RasterHeight {
     match size {
         ..20.0 => RasterHeight::Size20,
@@ -171,7 +171,7 @@ fn face(size: f64) -> RasterHeight {
     }
 }
 
-/// Pixels of a line of text.
+/// Width and height of a line of text, in pixels.
 fn extent(text: &str, face: RasterHeight) -> (i32, i32) {
     let advance = get_raster_width(FontWeight::Regular, face);
     ((text.chars().count() * advance) as i32, face.val() as i32)

@@ -1,4 +1,4 @@
-//! A chart drawn by `plotters`: title, axes, series, legend.
+//! Drawing of a chart with `plotters`: title, axes, series, legend.
 
 use std::fmt::Display;
 
@@ -12,8 +12,8 @@ use super::labels::{self, Drawn, Label};
 use super::scale::Scale;
 use super::{Chart, Line, PlotError, Series};
 
-/// Told apart by people who see colours differently as well (Okabe and Ito, "Color Universal Design", 2008); the yellow, which is faint
-/// on white, is left out.
+/// Colours that colour-blind readers can distinguish (Okabe and Ito, "Color Universal Design", 2008), without the
+/// yellow, which is faint on white.
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -23,32 +23,33 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
 ];
-/// From points to text that has no room beside them.
+/// Colour of the lines from points to labels that are farther away.
 const LEADER: RGBColor = RGBColor(150, 150, 150);
 const GRID: RGBColor = RGBColor(225, 225, 225);
-/// Sizes of text, in the units of `plotters`.
+/// Text sizes in units of `plotters`.
 const TITLE: f64 = 28.0;
 const LABEL: f64 = 22.0;
 const SMALL: f64 = 18.0;
-/// Pixels of a label upwards.
+/// Height of a label in pixels.
 const LABEL_HEIGHT: i32 = 20;
-/// Pixels of a letter in the legend and of a label, of a line of the legend, and before its text.
+/// Width of a letter of the legend and of labels, in pixels.
 const LETTER: usize = 11;
+/// Height of a line of the legend, and width of its mark, in pixels.
 const LEGEND_LINE: i32 = 28;
-/// Pixels to the right of a plot without a legend: half of the last number stands there.
-const RIGHT: u32 = 24;
 const LEGEND_MARK: i32 = 44;
-/// With more points than this, marks would hide the line.
+/// Pixels to the right of a plot without a legend: room for half of the last tick's number.
+const RIGHT: u32 = 24;
+/// Series with more points are drawn without marks, which would hide the line.
 const MAX_MARKS: usize = 80;
 
 type Area<B> = DrawingArea<B, Shift>;
 pub(super) type Pixel = (i32, i32);
 type Plane = Cartesian2d<Scale, Scale>;
 
-/// Draws everything.
+/// Draws a chart.
 ///
 /// # Errors
-/// Nothing to draw; values that an axis has no place for; what the backend says.
+/// No points; values that an axis cannot show; an error of the backend.
 pub(super) fn draw<B: DrawingBackend>(chart: &Chart, backend: B) -> Result<(), PlotError> {
     let x = Scale::of(&chart.x, values(chart, |series| series.points.iter().map(|point| point.x).collect()))?;
     let y = Scale::of(&chart.y, values(chart, heights))?;
@@ -60,10 +61,10 @@ pub(super) fn draw<B: DrawingBackend>(chart: &Chart, backend: B) -> Result<(), P
         root.titled(&chart.title, (FontFamily::SansSerif, TITLE)).map_err(failed)?
     };
     let (width, _) = root.dim_in_pixel();
-    // One series without a name needs nothing that says which it is.
+    // A single series without a name needs no legend.
     let has_legend = chart.series.iter().any(|series| !series.name.is_empty());
-    let beside = if has_legend { legend_width(chart) } else { RIGHT };
-    let (area, beside) = root.split_horizontally(width.saturating_sub(beside));
+    let legend_pixels = if has_legend { legend_width(chart) } else { RIGHT };
+    let (area, legend_area) = root.split_horizontally(width.saturating_sub(legend_pixels));
     let mut builder = ChartBuilder::on(&area);
     builder.margin(14).x_label_area_size(66).y_label_area_size(96);
     let mut context = builder.build_cartesian_2d(x.clone(), y.clone()).map_err(failed)?;
@@ -83,7 +84,7 @@ pub(super) fn draw<B: DrawingBackend>(chart: &Chart, backend: B) -> Result<(), P
     }
     pen(0).draw_labels(&chart.series)?;
     if has_legend {
-        legend(chart, &beside)?;
+        legend(chart, &legend_area)?;
     }
     root.present().map_err(failed)
 }
@@ -108,7 +109,7 @@ fn legend_width(chart: &Chart) -> u32 {
     (LEGEND_MARK as usize + 24 + longest.min(40) * LETTER) as u32
 }
 
-/// Colour and mark of a series, by its place among them: both differ before both repeat.
+/// Colour and mark of a series, by its index. All pairs are used before one repeats.
 #[derive(Clone, Copy)]
 struct Look {
     color: RGBColor,
@@ -134,7 +135,7 @@ impl Look {
         self.color.stroke_width(2)
     }
 
-    /// Draws the mark around a pixel.
+    /// Draws the mark at a pixel.
     fn draw_mark<B: DrawingBackend>(self, area: &Area<B>, at: Pixel) -> Result<(), PlotError> {
         let around =
             |corners: &[Pixel]| corners.iter().map(|(x, y)| (at.0 + x, at.1 + y)).collect::<Vec<_>>();
@@ -212,7 +213,7 @@ impl<B: DrawingBackend> Pen<'_, B> {
         Ok(())
     }
 
-    /// The text beside points, when all else is drawn, so that it keeps clear of it.
+    /// Draws the labels of points, last, so that they avoid everything else.
     fn draw_labels(&self, all: &[Series]) -> Result<(), PlotError> {
         let area = self.plane.use_screen_coord();
         let (mut drawn, mut texts, mut wanted) = (Drawn::default(), Vec::new(), Vec::new());
@@ -251,7 +252,7 @@ fn draw_label<B: DrawingBackend>(
     if place.is_away_from(at) {
         area.draw(&PathElement::new([at, place.nearest_to(at)], LEADER.stroke_width(1))).map_err(failed)?;
     }
-    // Beside its point, text begins or ends there, however wide the letters of its font are.
+    // At the side of its point, text begins or ends at the label's edge, whatever the width of the font.
     let (x, side) = if place.right <= at.0 { (place.right, HPos::Right) } else { (place.left, HPos::Left) };
     let style = (FontFamily::SansSerif, SMALL).into_text_style(area).pos(Pos::new(side, VPos::Bottom));
     area.draw(&Text::new(text.to_owned(), (x, place.bottom), style)).map_err(failed)
@@ -271,7 +272,7 @@ fn draw_line<B: DrawingBackend>(
     drawn.map_err(failed)
 }
 
-/// The names, in a column beside the plot, where they hide nothing.
+/// Draws the names in a column at the right of the plot.
 fn legend<B: DrawingBackend>(chart: &Chart, area: &Area<B>) -> Result<(), PlotError> {
     let style = (FontFamily::SansSerif, SMALL).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
     for (index, series) in chart.series.iter().enumerate() {

@@ -1,22 +1,22 @@
-//! Where the text beside points goes, so that it hides neither points nor other text.
+//! Placement of labels, so that they hide neither points nor other labels.
 
 use super::draw::Pixel;
 
-/// With more labels than this they lie on each other anyway, and finding out takes long.
+/// More labels than this overlap anyway, and a search for places takes long.
 const MAX_PLACED: usize = 200;
-/// Pixels between a point and its text, and how far the text may move away, nearest first.
+/// Distance of a label from its point in pixels, and further distances to try, nearest first.
 const GAP: i32 = 9;
 const STEPS: [i32; 7] = [0, 12, 26, 42, 60, 80, 105];
-/// Half the side of a mark, with a little room.
+/// Half the side of a mark, with a margin.
 const MARK: i32 = 7;
-/// What a pixel of hidden text counts, against a pixel of way.
+/// Cost of a hidden pixel, in pixels of distance.
 const HIDDEN: i64 = 6;
-/// What a pixel outside the plot counts: more than anything inside.
+/// Cost of a pixel outside the plot: more than any cost inside.
 const OUTSIDE: i64 = 1_000;
-/// Between two pixels of a line that are asked for.
+/// Distance between two tested points of a line, in pixels.
 const LINE_STEP: f64 = 5.0;
 
-/// A rectangle of pixels.
+/// A rectangle in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Area {
     pub(super) left: i32,
@@ -25,7 +25,7 @@ pub(super) struct Area {
     pub(super) bottom: i32,
 }
 
-/// A text's point and its size in pixels.
+/// A label's point, and its size in pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Label {
     pub(super) at: Pixel,
@@ -33,17 +33,17 @@ pub(super) struct Label {
     pub(super) height: i32,
 }
 
-/// What is drawn already.
+/// Everything that labels avoid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drawn {
     /// Centres of marks.
     pub(super) marks: Vec<Pixel>,
-    /// Ends of straight lines.
+    /// End points of straight lines.
     pub(super) lines: Vec<[Pixel; 2]>,
 }
 
 impl Area {
-    /// Pixels that two have in common.
+    /// Common pixels of two rectangles.
     fn overlap(self, other: Self) -> i64 {
         let width = self.right.min(other.right) - self.left.max(other.left);
         let height = self.bottom.min(other.bottom) - self.top.max(other.top);
@@ -54,7 +54,7 @@ impl Area {
         self.overlap(self)
     }
 
-    /// The point of it that is nearest to a pixel.
+    /// The point of the rectangle that is nearest to a pixel.
     pub(super) fn nearest_to(self, (x, y): Pixel) -> Pixel {
         (x.clamp(self.left, self.right), y.clamp(self.top, self.bottom))
     }
@@ -66,12 +66,12 @@ impl Area {
     }
 }
 
-/// A place in `room` for each label, one after the other: where it hides least, and of those the nearest to its point, to its right and above
-/// rather than elsewhere.
+/// Places labels in `room`, greedily: each where it hides least, then nearest to its point, then at the right and
+/// above.
 pub(super) fn place(labels: &[Label], drawn: &Drawn, room: Area) -> Vec<Area> {
     let mark = |(x, y): &Pixel| Area { left: x - MARK, top: y - MARK, right: x + MARK, bottom: y + MARK };
     let mut taken: Vec<Area> = drawn.marks.iter().map(mark).collect();
-    taken.extend(drawn.lines.iter().flat_map(along));
+    taken.extend(drawn.lines.iter().flat_map(squares_along));
     let mut found = Vec::with_capacity(labels.len());
     for label in labels {
         let steps = if labels.len() > MAX_PLACED { &STEPS[..0] } else { &STEPS[..] };
@@ -80,30 +80,32 @@ pub(super) fn place(labels: &[Label], drawn: &Drawn, room: Area) -> Vec<Area> {
             rank + hidden * HIDDEN + (area.size() - area.overlap(room)) * OUTSIDE
         };
         let best = candidates(label, steps).min_by_key(cost);
-        let (_, area) = best.unwrap_or((0, beside(label, 1, -1, 0)));
+        let (_, area) = best.unwrap_or((0, side_area(label, 1, -1, 0)));
         taken.push(area);
         found.push(area);
     }
     found
 }
 
-/// Places around the point, with what their distance and side count.
+/// Places around the point, with the cost of their distance and side.
 fn candidates<'a>(label: &'a Label, steps: &'a [i32]) -> impl Iterator<Item = (i64, Area)> + 'a {
     const SIDES: [(i32, i32); 8] = [(1, -1), (-1, -1), (1, 1), (-1, 1), (1, 0), (-1, 0), (0, -1), (0, 1)];
     steps.iter().flat_map(move |step| {
-        (0..).zip(SIDES).map(move |(rank, (x, y))| (rank + i64::from(*step) * 8, beside(label, x, y, *step)))
+        (0..)
+            .zip(SIDES)
+            .map(move |(rank, (x, y))| (rank + i64::from(*step) * 8, side_area(label, x, y, *step)))
     })
 }
 
-/// The text on one side of its point: -1 is left or above, 1 right or below, 0 centred.
-fn beside(label: &Label, x: i32, y: i32, step: i32) -> Area {
+/// The label at one side of its point: -1 is left or above, 1 right or below, 0 centred.
+fn side_area(label: &Label, x: i32, y: i32, step: i32) -> Area {
     let Label { at, width, height } = *label;
     let left = match x {
         0 => at.0 - width / 2,
         1 => at.0 + GAP + step,
         _ => at.0 - GAP - step - width,
     };
-    // A text above its point ends at the point's height when it stands beside it, and clear of it when centred.
+    // Above its point, a label at its side ends at the point's height, and a centred one ends above the mark.
     let clear = if x == 0 { GAP } else { 0 };
     let top = match y {
         0 => at.1 - height / 2,
@@ -114,7 +116,7 @@ fn beside(label: &Label, x: i32, y: i32, step: i32) -> Area {
 }
 
 /// Small squares along a line.
-fn along([from, to]: &[Pixel; 2]) -> Vec<Area> {
+fn squares_along([from, to]: &[Pixel; 2]) -> Vec<Area> {
     let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
     let count = (dx.hypot(dy) / LINE_STEP).ceil().clamp(1.0, 1e4) as i32;
     let square = |i: i32| {
@@ -142,20 +144,23 @@ mod tests {
     }
 
     #[test]
-    fn a_lonely_label_is_right_above_its_point_and_left_of_it_at_the_edge() {
+    fn a_single_label_is_above_and_right_of_its_point_or_left_at_the_edge() {
         assert_eq!(placed(&[(300, 300)]), [Area { left: 309, top: 280, right: 419, bottom: 300 }]);
         assert_eq!(placed(&[(890, 300)])[0].right, 881);
     }
 
     #[test]
-    fn a_line_is_kept_free_where_there_is_room_beside_it() {
+    fn a_label_avoids_a_line_where_there_is_room() {
         let drawn = Drawn { marks: vec![(300, 300)], lines: vec![[(300, 300), (500, 250)]] };
         let area = place(&labels(&[(300, 300)]), &drawn, ROOM)[0];
-        assert!(drawn.lines.iter().flat_map(along).all(|square| square.overlap(area) == 0), "{area:?}");
+        assert!(
+            drawn.lines.iter().flat_map(squares_along).all(|square| square.overlap(area) == 0),
+            "{area:?}"
+        );
     }
 
     #[test]
-    fn more_than_can_be_told_apart_are_still_all_there() {
+    fn too_many_labels_are_still_all_placed() {
         let points: Vec<Pixel> = (0..500).map(|i| (200 + i % 7, 200)).collect();
         assert_eq!(placed(&points).len(), 500);
     }
@@ -173,7 +178,7 @@ mod tests {
     }
 
     proptest! {
-        /// Where points crowd, labels may overlap: what is nearest and hides least is taken one by one.
+        /// Where points crowd, labels may overlap: places are chosen greedily.
         #[test]
         fn every_point_has_a_label(points in prop::collection::vec((100..900_i32, 50..600_i32), 0..12)) {
             prop_assert_eq!(placed(&points).len(), points.len());

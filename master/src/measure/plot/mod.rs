@@ -1,7 +1,8 @@
-//! Plots of measurements: a table becomes series, series become a picture.
+//! Plots of tables: columns become series, series become a picture.
 //!
-//! A [`Chart`] says what to show, and nothing about pixels. [`table`] makes its series from CSV files, [`scale`] lays its axes
-//! out, [`labels`] finds room for text, [`draw`] draws it with `plotters`; an SVG keeps its text as text, a PNG gets its letters from [`canvas`].
+//! A [`Chart`] describes what to show, without pixels. [`table`] makes its series from CSV files, [`scale`] lays
+//! out its axes, [`labels`] places text, and [`draw`] draws it with `plotters`. An SVG keeps text as text; a PNG
+//! gets its letters from [`canvas`].
 
 mod canvas;
 mod draw;
@@ -19,82 +20,82 @@ use canvas::Canvas;
 
 pub(crate) use table::{Columns, read_series};
 
-/// Pixels of a plot, width and height.
+/// Width and height of a plot in pixels.
 const SIZE: (u32, u32) = (1200, 720);
 
-/// What to show.
+/// Content of a plot.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Chart {
-    /// Above everything; empty for none.
+    /// Title; empty for none.
     pub(crate) title: String,
-    /// To the right.
+    /// Horizontal axis.
     pub(crate) x: Axis,
-    /// Upwards.
+    /// Vertical axis.
     pub(crate) y: Axis,
-    /// In the order of the legend.
+    /// Series in the order of the legend.
     pub(crate) series: Vec<Series>,
 }
 
-/// One direction.
+/// Layout of one axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Axis {
-    /// What is measured, and in what unit.
+    /// Quantity and unit.
     pub(crate) label: String,
-    /// Equal distances are equal ratios. Values must be positive.
+    /// Whether the axis is logarithmic. Its values must be positive.
     pub(crate) logarithmic: bool,
-    /// A linear axis shows zero, however far the values are from it.
+    /// Whether a linear axis includes zero.
     pub(crate) from_zero: bool,
 }
 
-/// What belongs together, in one colour.
+/// Points of one colour.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Series {
-    /// For the legend.
+    /// Name in the legend.
     pub(crate) name: String,
-    /// How its points hang together.
+    /// How its points are joined.
     pub(crate) line: Line,
-    /// In the order of the line.
+    /// Points in the order of the line.
     pub(crate) points: Vec<Point>,
-    /// A value of y that belongs to no x: drawn across the whole width.
+    /// A value of y without an x, drawn across the whole width.
     pub(crate) level: Option<f64>,
 }
 
-/// How the points of a series hang together.
+/// How the points of a series are joined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Line {
-    /// One line through all of them.
+    /// A solid line with marks.
     Solid,
-    /// A dashed line, without marks: something to compare with.
+    /// A dashed line without marks, as a baseline.
     Dashed,
-    /// Not at all.
+    /// Marks without a line.
     None,
 }
 
-/// One mark.
+/// A point of a series.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Point {
-    /// Where.
+    /// Horizontal value.
     pub(crate) x: f64,
-    /// Where.
+    /// Vertical value.
     pub(crate) y: f64,
-    /// Least and greatest y of what was measured more than once.
+    /// Least and greatest y of repeated measurements.
     pub(crate) spread: Option<(f64, f64)>,
-    /// Written beside it.
+    /// Text at the point.
     pub(crate) label: Option<String>,
 }
 
-/// Why there is no plot.
+/// Error of reading, drawing or writing a plot.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PlotError {
-    /// The table does not say what was asked for.
+    /// The table lacks a requested column or number.
     #[error("{path}: {problem}", path = .path.display())]
     Table {
         /// The table.
         path: PathBuf,
-        /// With the line, where there is one.
+        /// Description, with the line where there is one.
         problem: String,
     },
-    /// What was asked for cannot be drawn.
+    /// The chart cannot be drawn.
     #[error("{0}")]
     Chart(String),
     /// The picture cannot be written.
@@ -102,16 +103,16 @@ pub(crate) enum PlotError {
     Output {
         /// The picture.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         problem: String,
     },
 }
 
 impl Chart {
-    /// Writes the chart as `.svg` or `.png`, by the file's name.
+    /// Writes the chart as `.svg` or `.png`, by the extension of `path`.
     ///
     /// # Errors
-    /// Nothing to draw, values that a logarithmic axis has no place for, another extension, a full disk.
+    /// No points; values that a logarithmic axis cannot show; another extension; a full disk.
     pub(crate) fn save(&self, path: &Path) -> Result<(), PlotError> {
         let refuse = |problem: String| PlotError::Output { path: path.to_owned(), problem };
         match path.extension().and_then(|extension| extension.to_str()) {

@@ -1,4 +1,4 @@
-//! Where the values of an axis go, and which of them are written beside it.
+//! Scale of an axis: positions of values, and ticks.
 
 use std::ops::Range;
 
@@ -6,33 +6,33 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 
 use super::{Axis, PlotError};
 
-/// About so many numbers stand along a linear axis.
+/// Approximate number of ticks of a linear axis.
 const TICKS: f64 = 7.0;
 
-/// An axis with its ends.
+/// An axis with its range and ticks.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scale {
     logarithmic: bool,
-    /// What it begins with.
+    /// Lower end.
     pub(super) low: f64,
-    /// Greater than `low`.
+    /// Upper end, greater than `low`.
     pub(super) high: f64,
-    /// The numbers along the axis, from low to high.
+    /// Ticks in ascending order.
     pub(super) ticks: Vec<f64>,
 }
 
 impl Scale {
-    /// Lays an axis out for all of its values.
+    /// Chooses the range and the ticks for the values of an axis.
     ///
     /// # Errors
-    /// No value; one that is not finite; one that is not positive on a logarithmic axis.
+    /// No value; a value that is not finite; a value that is not positive on a logarithmic axis.
     pub(super) fn of(axis: &Axis, values: impl IntoIterator<Item = f64>) -> Result<Self, PlotError> {
         let (mut low, mut high, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
         for value in values {
             if !value.is_finite() || (axis.logarithmic && value <= 0.0) {
                 let kind = if axis.logarithmic { "logarithmic axis" } else { "axis" };
                 return Err(PlotError::Chart(format!(
-                    "{value} has no place on the {kind} \"{}\"",
+                    "{value} cannot be shown on the {kind} \"{}\"",
                     axis.label
                 )));
             }
@@ -49,7 +49,7 @@ impl Scale {
         })
     }
 
-    /// Ends on the numbers just outside the values.
+    /// A range that ends on the ticks just outside the values.
     fn from_zero(low: f64, high: f64, least_step: f64) -> Self {
         let high = if low == high { 1.0 } else { high };
         let step = round_step((high - low) / TICKS).max(least_step);
@@ -58,7 +58,7 @@ impl Scale {
         Self { logarithmic: false, low: first * step, high: last * step, ticks }
     }
 
-    /// Ends a little outside the values.
+    /// A range that ends a little outside the values.
     fn linear(low: f64, high: f64, least_step: f64) -> Self {
         let around = if low == high { low.abs().max(1.0) / 2.0 } else { (high - low) * 0.03 };
         let (low, high) = (low - around, high + around);
@@ -67,7 +67,7 @@ impl Scale {
         Self { logarithmic: false, low, high, ticks }
     }
 
-    /// Ends a little outside the values.
+    /// A range that ends a little outside the values.
     fn logarithmic(low: f64, high: f64) -> Self {
         let doublings = (high / low).log2();
         let margin = (doublings * 0.04).max(0.1).exp2();
@@ -76,13 +76,13 @@ impl Scale {
         Self { logarithmic: true, low, high, ticks }
     }
 
-    /// How far along the axis a value is: 0 at `low`, 1 at `high`.
+    /// Position of a value along the axis: 0 at `low`, 1 at `high`.
     fn share(&self, value: f64) -> f64 {
         let place = |value: f64| if self.logarithmic { value.log2() } else { value };
         (place(value) - place(self.low)) / (place(self.high) - place(self.low))
     }
 
-    /// The number beside a tick.
+    /// Text of a tick.
     pub(super) fn tick_text(&self, tick: f64) -> String {
         let step = if self.logarithmic { tick } else { (self.high - self.low) / TICKS };
         let decimals = (1.0 - step.abs().log10().floor()).clamp(0.0, 9.0) as usize;
@@ -115,20 +115,20 @@ impl ValueFormatter<f64> for Scale {
     }
 }
 
-/// From `first` to `last` times `step`.
+/// Multiples of `step` from `first * step` to `last * step`.
 fn multiples(step: f64, first: f64, last: f64) -> Vec<f64> {
     let count = (last - first).max(0.0) as usize;
     (0..=count).map(|index| (first + index as f64) * step).collect()
 }
 
-/// 1, 2 or 5 times a power of ten, at least `step`.
+/// The smallest of 1, 2 and 5 times a power of ten that is at least `step`.
 fn round_step(step: f64) -> f64 {
     let power = 10_f64.powf(step.log10().floor());
     let found = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= step);
     found.unwrap_or(10.0) * power
 }
 
-/// Numbers for a logarithmic axis over so many doublings: enough, and not too many.
+/// Candidate ticks of a logarithmic axis that spans this number of doublings.
 fn round_ratios(doublings: f64) -> Vec<f64> {
     let tens = || (-12..=15).map(|exponent| 10_f64.powi(exponent));
     if doublings < 4.0 {
@@ -140,7 +140,7 @@ fn round_ratios(doublings: f64) -> Vec<f64> {
     }
 }
 
-/// `12345.5` as `12,345.5`.
+/// Groups digits: `12345.5` becomes `12,345.5`.
 fn group_thousands(text: &str) -> String {
     let (sign, digits) = text.strip_prefix('-').map_or(("", text), |digits| ("-", digits));
     let (whole, fraction) = digits.split_at(digits.find('.').unwrap_or(digits.len()));

@@ -1,4 +1,4 @@
-//! Series from CSV files with a first line of names.
+//! Series from CSV files with a header line.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -10,38 +10,38 @@ use rayfarm_tracer::files::read_within;
 
 use super::{Line, PlotError, Point, Series};
 
-/// More could not be told apart.
+/// Series of a plot at most: more cannot be distinguished.
 const MAX_SERIES: usize = 24;
-/// Far more than a picture has pixels to show.
+/// Points of a plot at most: far more than a picture can show.
 const MAX_POINTS: usize = 1_000_000;
-/// Bytes of one table.
+/// Size of a table at most.
 const MAX_BYTES: u64 = 256 << 20;
-/// Columns that a message lists, and bytes that it quotes of a field.
+/// Columns that a message lists at most, and bytes that it quotes of a field.
 const MAX_LISTED: usize = 40;
 const MAX_QUOTED_BYTES: usize = 60;
 
-/// Which columns say what.
+/// Roles of columns.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Columns {
-    /// A number; an empty one makes the row's y a level.
+    /// Numbers; where it is empty, the row's y is a level.
     pub(crate) x: String,
-    /// A number; rows where it is empty are left out.
+    /// Numbers; rows where it is empty are skipped.
     pub(crate) y: String,
-    /// Rows that agree in all of these are one series.
+    /// Rows that agree in all of these columns are one series.
     pub(crate) series: Vec<String>,
-    /// Written beside points.
+    /// Text at points.
     pub(crate) label: Option<String>,
     /// Only rows where each of these columns has that text.
     pub(crate) only: Vec<(String, String)>,
-    /// Points are not joined, and points of equal x are not put together.
+    /// Whether every row is a point of its own and points are not joined.
     pub(crate) scatter: bool,
-    /// Names of series that are dashed.
+    /// Names of dashed series.
     pub(crate) dashed: Vec<String>,
 }
 
-/// Reads all rows of all tables. The series are in the order in which the rows first name them; a column that has the same text
-/// in every row is not part of their names. Points of one series with the same x are repeats of one measurement: their median
-/// counts, and their spread is kept.
+/// Reads all rows of all tables. Series are in the order of their first rows; a column with the same text in every
+/// row is not part of their names. Points of one series with the same x are repeated measurements: the point has
+/// their median and keeps their spread.
 ///
 /// # Errors
 /// Unreadable files, missing columns, text in place of numbers, too many series or points.
@@ -63,8 +63,8 @@ pub(crate) fn read_series(tables: &[PathBuf], columns: &Columns) -> Result<Vec<S
             )));
         }
     }
-    let telling = telling_columns(&groups);
-    Ok(groups.into_iter().map(|(key, rows)| series(&key, &telling, rows, columns)).collect())
+    let differing = differing_columns(&groups);
+    Ok(groups.into_iter().map(|(key, rows)| series(&key, &differing, rows, columns)).collect())
 }
 
 struct Row {
@@ -74,8 +74,8 @@ struct Row {
     label: Option<String>,
 }
 
-/// Columns by their places in a row.
-struct Places {
+/// Indices of the columns in a row.
+struct ColumnIndices {
     x: usize,
     y: usize,
     series: Vec<usize>,
@@ -83,7 +83,7 @@ struct Places {
     only: Vec<(usize, String)>,
 }
 
-impl Places {
+impl ColumnIndices {
     fn find(columns: &Columns, header: &StringRecord) -> Result<Self, String> {
         let place = |name: &String| {
             header.iter().position(|column| column == name).ok_or_else(|| {
@@ -107,7 +107,7 @@ fn read_table(path: &Path, columns: &Columns, rows: &mut Vec<Row>) -> Result<(),
     let text = read_within(path, MAX_BYTES).map_err(|error| error.to_string())?;
     let text = text.ok_or_else(|| format!("has more than {MAX_BYTES} bytes, the limit"))?;
     let mut reader = csv::Reader::from_reader(&text[..]);
-    let places = Places::find(columns, reader.headers().map_err(|error| error.to_string())?)?;
+    let places = ColumnIndices::find(columns, reader.headers().map_err(|error| error.to_string())?)?;
     for record in reader.records() {
         let record = record.map_err(|error| error.to_string())?;
         let text = |place: usize| record.get(place).unwrap_or_default().trim();
@@ -128,12 +128,12 @@ fn read_table(path: &Path, columns: &Columns, rows: &mut Vec<Row>) -> Result<(),
     Ok(())
 }
 
-/// Text of a table as messages show it.
+/// Text of a table, escaped and shortened for messages.
 fn quoted(text: &str) -> Cow<'_, str> {
     printable_within(text, MAX_QUOTED_BYTES)
 }
 
-/// A finite number, or nothing where there is no text.
+/// A finite number; `None` where the field is empty.
 fn number(record: &StringRecord, place: usize, column: &str) -> Result<Option<f64>, String> {
     let text = record.get(place).unwrap_or_default().trim();
     if text.is_empty() {
@@ -143,20 +143,20 @@ fn number(record: &StringRecord, place: usize, column: &str) -> Result<Option<f6
         Ok(number) if number.is_finite() => Ok(Some(number)),
         _ => {
             let line = record.position().map_or(0, csv::Position::line);
-            Err(format!("line {line}: \"{}\" in column {column} is no number", quoted(text)))
+            Err(format!("line {line}: \"{}\" in column {column} is not a number", quoted(text)))
         }
     }
 }
 
-/// For each column of a series' name, whether any two series differ in it.
-fn telling_columns(groups: &[(Vec<String>, Vec<Row>)]) -> Vec<bool> {
+/// For each column of the series' names, whether series differ in it.
+fn differing_columns(groups: &[(Vec<String>, Vec<Row>)]) -> Vec<bool> {
     let Some((first, _)) = groups.first() else { return Vec::new() };
     (0..first.len()).map(|column| groups.iter().any(|(key, _)| key[column] != first[column])).collect()
 }
 
-fn series(key: &[String], telling: &[bool], rows: Vec<Row>, columns: &Columns) -> Series {
+fn series(key: &[String], differing: &[bool], rows: Vec<Row>, columns: &Columns) -> Series {
     let words: Vec<&str> =
-        key.iter().zip(telling).filter(|(_, tells)| **tells).map(|(word, _)| &**word).collect();
+        key.iter().zip(differing).filter(|(_, differs)| **differs).map(|(word, _)| &**word).collect();
     let name = if words.is_empty() { key.join(" ") } else { words.join(" ") };
     let line = match columns.scatter {
         true => Line::None,
@@ -173,7 +173,7 @@ fn each(rows: Vec<Row>) -> Vec<Point> {
     rows.into_iter().filter_map(point).collect()
 }
 
-/// A point for each x, from the least to the greatest.
+/// A point for each x, in ascending order.
 fn medians(rows: Vec<Row>) -> Vec<Point> {
     let mut by_x: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
     for row in rows {
@@ -195,7 +195,7 @@ fn median_point(rows: Vec<Row>) -> Option<Point> {
     Some(Point { x, y: median(values)?, spread, label })
 }
 
-/// The middle one, or the mean of the two in the middle.
+/// The median; of an even number of values, the mean of the middle two.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let above = *values.get(values.len() / 2)?;

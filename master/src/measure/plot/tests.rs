@@ -1,4 +1,4 @@
-//! What is in a plot, read from the SVG's text and from the picture's pixels.
+//! Contents of plots, read from the SVG's text and from the picture's pixels.
 
 use std::path::PathBuf;
 
@@ -70,7 +70,7 @@ fn a_single_series_without_a_name_has_no_legend_and_more_room() {
         columns.collect::<Vec<_>>()
     });
     let [with_legend, without] = widths.map(|columns| *columns.last().unwrap());
-    // With a legend, its mark is the last of the colour, far to the right of the last point.
+    // With a legend, its mark is the last pixel of that colour, far to the right of the last point.
     assert!(without > 1100, "the curve itself goes up to {without} of 1200 pixels");
     let svgs = [&named, &nameless].map(|chart| chart.to_svg().unwrap());
     assert!(svgs[0].contains("a series") && !svgs[1].contains("a series"));
@@ -79,7 +79,7 @@ fn a_single_series_without_a_name_has_no_legend_and_more_room() {
 }
 
 #[test]
-fn repeats_become_a_median_with_its_spread_and_rows_without_x_a_level() {
+fn repeats_become_a_median_with_spread_and_rows_without_x_a_level() {
     let series = read(TABLE, &columns()).unwrap();
     assert_eq!(
         series.iter().map(|series| &*series.name).collect::<Vec<_>>(),
@@ -111,12 +111,12 @@ fn columns_choose_rows_marks_and_names() {
     assert_eq!(
         (&*found[1].name, found[1].line),
         ("smart", Line::Dashed),
-        "what all agree in is not in the name"
+        "a column without differences is not in the name"
     );
 }
 
 #[test]
-fn wrong_tables_are_refused_with_the_place() {
+fn wrong_tables_are_refused_with_the_line() {
     let refusal = |text: &str| read(text, &columns()).unwrap_err();
     assert!(refusal("policy,rows\n").contains("no column \"fps\", but policy, rows"));
     assert!(refusal("policy,rows,fps\na,1,2\na,one,2\n").contains("line 3: \"one\" in column rows"));
@@ -129,17 +129,18 @@ fn wrong_tables_are_refused_with_the_place() {
 }
 
 #[test]
-fn what_has_no_place_is_refused() {
+fn values_outside_an_axis_are_refused() {
     let refusal = |chart: &Chart| chart.to_svg().unwrap_err().to_string();
     assert!(refusal(&chart(Vec::new())).contains("nothing to plot"));
     assert!(
-        refusal(&chart(vec![line_through(&[(0.0, 1.0)])])).contains("0 has no place on the logarithmic axis")
+        refusal(&chart(vec![line_through(&[(0.0, 1.0)])]))
+            .contains("0 cannot be shown on the logarithmic axis")
     );
-    assert!(refusal(&chart(vec![line_through(&[(1.0, f64::INFINITY)])])).contains("inf has no place"));
+    assert!(refusal(&chart(vec![line_through(&[(1.0, f64::INFINITY)])])).contains("inf cannot be shown"));
 }
 
 #[test]
-fn an_svg_says_everything_in_text() {
+fn an_svg_keeps_text_as_text() {
     let svg = chart(read(TABLE, &columns()).unwrap()).to_svg().unwrap();
     for text in ["a title", "rows", "frames per second", "static", "smart", "adaptive", "\n25\n", "\n4\n"] {
         assert!(svg.contains(text), "no {text:?} in {svg}");
@@ -148,7 +149,7 @@ fn an_svg_says_everything_in_text() {
 }
 
 #[test]
-fn both_files_are_written_and_no_others() {
+fn svg_and_png_are_written_and_no_other_format() {
     let chart = chart(vec![line_through(&[(1.0, 2.0), (8.0, 3.0)])]);
     let folder = tempfile::tempdir().unwrap();
     for name in ["a.svg", "a.png"] {
@@ -161,7 +162,7 @@ fn both_files_are_written_and_no_others() {
     assert!(chart.save(&folder.path().join("missing/a.svg")).is_err());
 }
 
-/// Whether any pixel of a picture has that colour, and the box around all that have.
+/// Bounding box of the pixels of that colour; `None` if there are none.
 fn extent(picture: &image::RgbImage, color: [u8; 3]) -> Option<[usize; 4]> {
     let width = picture.width as usize;
     let found = picture.pixels.chunks_exact(3).enumerate().filter(|(_, pixel)| **pixel == color);
@@ -172,7 +173,7 @@ fn extent(picture: &image::RgbImage, color: [u8; 3]) -> Option<[usize; 4]> {
 }
 
 #[test]
-fn a_higher_value_is_higher_and_text_is_drawn() {
+fn greater_values_are_higher_and_text_is_drawn() {
     let mut both = vec![line_through(&[(1.0, 1.0), (8.0, 1.0)]), line_through(&[(1.0, 9.0), (8.0, 9.0)])];
     for series in &mut both {
         series.name.clear(); // the legend would have the colours as well
@@ -198,7 +199,7 @@ fn a_higher_value_is_higher_and_text_is_drawn() {
 
 proptest! {
     #[test]
-    fn axes_hold_all_values_and_have_numbers(
+    fn axes_contain_all_values_and_have_ticks(
         values in prop::collection::vec(1e-6..1e9_f64, 1..20),
         logarithmic: bool,
         from_zero: bool,
@@ -221,14 +222,14 @@ proptest! {
 }
 
 #[test]
-fn numbers_along_an_axis_are_round() {
+fn ticks_are_round() {
     let texts = |logarithmic, values: &[f64]| {
         // From zero where the first value is a fraction.
         let axis = Axis { label: String::new(), logarithmic, from_zero: values[0].fract() != 0.0 };
         let scale = Scale::of(&axis, values.iter().copied()).unwrap();
         scale.ticks.iter().map(|tick| scale.tick_text(*tick)).collect::<Vec<_>>()
     };
-    assert_eq!(texts(false, &[1.0, 2.0]), ["1", "2"], "there are no fractions of a worker");
+    assert_eq!(texts(false, &[1.0, 2.0]), ["1", "2"], "whole numbers have no fractional ticks");
     assert_eq!(texts(false, &[0.0, 499.0]), ["0", "100", "200", "300", "400", "500"]);
     assert_eq!(texts(false, &[7.0]), ["4", "5", "6", "7", "8", "9", "10"]);
     assert_eq!(texts(false, &[3.5, 97.0]), ["0", "20", "40", "60", "80", "100"]);

@@ -13,46 +13,46 @@ use crate::error::CommandError;
 use crate::in_process::trace;
 use crate::report::{percentile, round_to_us};
 
-/// Where pictures are taken: a scene, what is seen of it, and who renders.
-pub(crate) struct Studio<'a> {
+/// A scene with the view and the threads that it is measured with.
+pub(crate) struct MeasureContext<'a> {
     /// The scene.
     pub(crate) scene: Arc<CompiledScene>,
     /// Camera and size of the finished pictures.
     pub(crate) view: FrameView,
     /// Render threads.
     pub(crate) threads: usize,
-    /// Asked now and then: whether to stop.
+    /// Polled while rendering: whether to stop.
     pub(crate) cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// A setting's picture beside the reference.
+/// A setting's picture compared with the reference.
 pub(crate) struct Compared {
-    /// What was rendered.
+    /// The picture.
     pub(crate) picture: RgbImage,
-    /// Where it differs from the reference to somebody's eye.
+    /// Where it differs visibly from the reference.
     pub(crate) errors: FlipMap,
     /// How much it differs, without times.
     pub(crate) row: Row,
 }
 
-impl Studio<'_> {
-    /// What the reference is rendered as: full quality, with as many samples as there can be.
+impl MeasureContext<'_> {
+    /// View of the reference: full quality with the largest number of samples.
     pub(crate) fn reference_view(&self) -> FrameView {
         FrameView { samples: MAX_SAMPLES, ..Setting::plain().applied_to(&self.view).view }
     }
 
-    /// The picture that all settings are held against. `done` is told how many rows are rendered.
+    /// Renders the reference picture. `done` receives the number of rows that were rendered since the last call.
     ///
     /// # Errors
-    /// A stop.
+    /// The measurement was cancelled.
     pub(crate) fn reference(&self, done: &(dyn Fn(u32) + Sync)) -> Result<RgbImage, CommandError> {
         self.render(&self.reference_view(), done)
     }
 
-    /// Renders a setting's picture and compares it.
+    /// Renders a setting's picture and compares it with the reference.
     ///
     /// # Errors
-    /// A stop.
+    /// The measurement was cancelled.
     pub(crate) fn compare(&self, setting: &Setting, reference: &RgbImage) -> Result<Compared, CommandError> {
         let picture = self.picture(setting)?;
         let difference = image::compare(reference, &picture).map_err(CommandError::failed)?;
@@ -61,11 +61,11 @@ impl Studio<'_> {
         Ok(Compared { picture, errors, row })
     }
 
-    /// Renders every setting once, in turn, and adds to each its time: from the scene to the finished picture. Rounds that go forward and
-    /// back by turns let no setting always have the same neighbour.
+    /// Renders every setting once, in turn, and appends its time from the scene to the finished picture.
+    /// Alternating forward and backward rounds vary the neighbours of a setting.
     ///
     /// # Errors
-    /// A stop.
+    /// The measurement was cancelled.
     pub(crate) fn time_round(
         &self,
         settings: &[Setting],

@@ -1,6 +1,6 @@
-//! Speed against accuracy, measured: which settings a scene has ([`setting`]), what each costs and how far its picture is from the
-//! reference ([`measure`]), whether the reference is right ([`oracle`]), which of them are worth having ([`pareto`]), and a table of it
-//! that can be read back ([`table`]). [`report`] shows it to people.
+//! Speed against accuracy: the settings that apply to a scene ([`setting`]), their times and their errors against a
+//! reference ([`measure`]), a check of the reference ([`oracle`]), the Pareto front ([`pareto`]), and the table of
+//! all of it, which can be read back ([`table`]). [`report`] formats it as a page and a plot.
 
 pub(crate) mod measure;
 pub(crate) mod oracle;

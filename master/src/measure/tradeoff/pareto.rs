@@ -1,14 +1,15 @@
-//! Which of many choices are worth having, when each has a cost and an error.
+//! Pareto front of choices that have a cost and an error each.
 
-/// The Pareto front: indices of those points that no other one dominates, the first coordinates rising. A point dominates another when it
-/// is nowhere greater and somewhere less, so equal points stand or fall together. Points that are not numbers are never on the front.
+/// Indices of the points that no other point dominates, by ascending first coordinate. A point dominates another if
+/// it is nowhere greater and somewhere less, so equal points are on the front together. Points with NaN are never
+/// on the front.
 pub(crate) fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).filter(|i| is_number(points[*i])).collect();
     order.sort_by(|a, b| compare(points[*a], points[*b]).then(a.cmp(b)));
     let mut found: Vec<usize> = Vec::new();
     for index in order {
         let last = found.last().map(|last| points[*last]);
-        // Whoever comes earlier is not greater in the first coordinate, so the second one decides.
+        // Earlier points are not greater in the first coordinate, so the second one decides.
         if last.is_none_or(|last| points[index].1 < last.1 || points[index] == last) {
             found.push(index);
         }
@@ -21,7 +22,7 @@ fn is_number((a, b): (f64, f64)) -> bool {
 }
 
 fn compare(a: (f64, f64), b: (f64, f64)) -> std::cmp::Ordering {
-    // Numbers only: two zeroes of different sign are equal here as well.
+    // NaN is excluded; zeroes of different sign are equal.
     a.partial_cmp(&b).unwrap_or(std::cmp::Ordering::Equal)
 }
 
@@ -36,14 +37,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_front_and_one_is_its_own() {
+    fn a_single_point_is_the_front() {
         assert!(front(&[]).is_empty());
         assert_eq!(front(&[(3.0, 4.0)]), [0]);
         assert_eq!(front(&[(f64::NAN, 0.0), (1.0, f64::NAN), (2.0, 2.0)]), [2]);
     }
 
     #[test]
-    fn equal_points_are_on_it_together() {
+    fn equal_points_are_on_the_front_together() {
         assert_eq!(front(&[(1.0, 2.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0), (3.0, 1.0)]), [0, 2, 1, 4]);
         assert_eq!(front(&[(0.0, 1.0), (-0.0, 0.5)]), [1]);
     }
@@ -51,7 +52,7 @@ mod tests {
     proptest! {
         /// Few different values, so that there are ties.
         #[test]
-        fn none_on_it_is_dominated_and_every_other_is(
+        fn exactly_the_undominated_points_are_on_the_front(
             points in prop::collection::vec((0..7_i8, 0..7_i8).prop_map(|(a, b)| (f64::from(a), f64::from(b))), 0..30),
         ) {
             let found = front(&points);

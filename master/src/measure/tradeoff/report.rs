@@ -1,39 +1,39 @@
-//! A measurement for people: the table as Markdown, the front as a plot.
+//! Reports of a measurement: the table as Markdown, the front as a plot.
 
 use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::oracle::Verdict;
+use super::oracle::ReferenceCheck;
 use super::table::{Row, Table};
 use crate::measure::plot::{Axis, Chart, Line, Point, Series};
 
-/// All that came of a measurement; `--json` prints it as one line.
+/// Everything that a measurement found; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Report {
     /// Times and errors.
     #[serde(flatten)]
     pub(crate) table: Table,
-    /// How often each setting was timed.
+    /// Number of times that each setting was timed.
     pub(crate) repeats: u32,
-    /// Samples of the reference.
+    /// Samples per pixel of the reference.
     pub(crate) reference_samples: u32,
-    /// Whether the reference is right.
-    pub(crate) reference_check: Verdict,
+    /// Check of the reference.
+    pub(crate) reference_check: ReferenceCheck,
     /// Settings on the front, from the fastest to the best.
     pub(crate) front: Vec<String>,
 }
 
-/// The page: what was measured and how, then a line for each setting, the fastest first. Settings on the front are bold.
+/// The page in Markdown: method, then a line for each setting, the fastest first. Settings on the front are bold.
 pub(crate) fn markdown(report: &Report) -> String {
     let Table { scene, width, height, threads, simd_level, rows } = &report.table;
-    let Verdict { pixels, max_error, above_one_step } = report.reference_check;
+    let ReferenceCheck { pixels, max_error, above_one_step } = report.reference_check;
     let mut text = format!(
         "# Speed against accuracy: {scene}\n\n\
-         {width} x {height} pixels, {threads} render thread{}, {simd_level}, rayfarm {}. Times are milliseconds of a frame in one process, {} each, \
+         {width} x {height} pixels, {threads} render thread{}, {simd_level}, rayfarm {}. Times are milliseconds per frame in one process, {} each, \
          settings in turn.\n\n\
-         Errors are against full quality with {} samples a pixel. Of {pixels} pixels of that reference, asked of the oracle in double precision, \
-         {above_one_step} differ by more than a step of 1/255; the greatest difference is {max_error}.\n\n\
+         Errors are against full quality with {} samples a pixel. {pixels} pixels of that reference were checked against the oracle in double precision: \
+         {above_one_step} differ by more than a step of 1/255; the largest difference is {max_error}.\n\n\
          ![time against error](front.png)\n\n\
          | setting | ms, median | ms, least | largest error | RMSE | PSNR, dB | SSIM | FLIP, mean |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
@@ -45,8 +45,8 @@ pub(crate) fn markdown(report: &Report) -> String {
     for row in by_time(rows) {
         text += &line(row, report.front.contains(&row.setting));
     }
-    text += "\nBold: no other setting is both faster and nearer to the reference (by FLIP). A name leads to the picture, its FLIP to where \
-             it differs: black is no error, pale yellow the greatest there is.\n";
+    text += "\nBold: no other setting is both faster and nearer to the reference (by FLIP). A name links to the picture, its FLIP to the \
+             error map: black is no error, pale yellow the largest possible one.\n";
     text
 }
 
@@ -70,17 +70,17 @@ fn line(row: &Row, on_front: bool) -> String {
     text
 }
 
-/// The file with a setting's picture.
+/// Name of the file with a setting's picture.
 pub(crate) fn picture_name(setting: &str) -> String {
     format!("{setting}.png")
 }
 
-/// The file with its errors.
+/// Name of the file with a setting's FLIP error map.
 pub(crate) fn difference_name(setting: &str) -> String {
     format!("{setting}-flip.png")
 }
 
-/// Time to the right, FLIP upwards: the front as a line, the other settings as points.
+/// The plot of time (horizontal) against FLIP (vertical): the front as a line, the other settings as points.
 pub(crate) fn chart(report: &Report) -> Chart {
     let Table { scene, width, height, threads, rows, .. } = &report.table;
     let point =
@@ -100,7 +100,8 @@ pub(crate) fn chart(report: &Report) -> Chart {
             if *threads == 1 { "" } else { "s" }
         ),
         x: Axis { label: "milliseconds per frame".to_owned(), logarithmic: true, from_zero: false },
-        // Good settings lie close to zero, where only ratios tell them apart; zero itself has no place there.
+        // Good settings are close to zero, where only ratios distinguish them; a logarithmic axis cannot show zero
+        // itself.
         y: Axis {
             label: "mean FLIP against the reference".to_owned(),
             logarithmic: rows.iter().all(|row| row.flip > 0.0),
@@ -135,7 +136,7 @@ mod tests {
             rows,
         };
         let front = table.front().into_iter().map(|index| table.rows[index].setting.clone()).collect();
-        let reference_check = Verdict { pixels: 12, max_error: 1, above_one_step: 0 };
+        let reference_check = ReferenceCheck { pixels: 12, max_error: 1, above_one_step: 0 };
         Report { table, repeats: 7, reference_samples: 256, reference_check, front }
     }
 
@@ -149,21 +150,15 @@ mod tests {
         ];
         let places: Vec<usize> = order.iter().map(|part| text.find(part).unwrap()).collect();
         assert!(places.is_sorted(), "{text}");
-        for part in [
-            "64 x 48",
-            "2 render threads",
-            "avx2",
-            "7 times",
-            "256 samples",
-            "Of 12 pixels",
-            "(worse-flip.png)",
-        ] {
+        for part in
+            ["64 x 48", "2 render threads", "avx2", "7 times", "256 samples", "12 pixels", "(worse-flip.png)"]
+        {
             assert!(text.contains(part), "{part}: {text}");
         }
     }
 
     #[test]
-    fn the_plot_joins_the_front_and_names_all() {
+    fn the_plot_joins_the_front_and_labels_all_points() {
         let chart = chart(&report());
         let names = |index: usize| {
             chart.series[index].points.iter().map(|point| point.label.clone().unwrap()).collect::<Vec<_>>()

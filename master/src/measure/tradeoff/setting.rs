@@ -1,6 +1,6 @@
-//! The settings: positions of the tracer's knobs, alone and together, by name.
+//! Settings: named combinations of quality knobs.
 //!
-//! A new knob is a line among the knobs, and a line for each setting that turns it.
+//! A new knob is a constant, and a line for each setting that changes it.
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::scene::{
@@ -9,21 +9,21 @@ use rayfarm_tracer::scene::{
 
 use crate::wanted::WantedPicture;
 
-/// What a scene asks for: whatever it does not, no knob needs to leave out.
+/// Features of a scene that knobs depend on: a knob for an absent feature does not apply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Asked {
-    /// Something has a highlight.
+pub(crate) struct SceneFeatures {
+    /// A material has a highlight.
     pub(crate) specular: bool,
-    /// The precision of an exponent makes a difference.
+    /// The precision of an exponent changes the picture.
     pub(crate) powers: bool,
-    /// Something has a texture that is not looked up at the nearest texel.
+    /// A texture is filtered.
     pub(crate) filtered: bool,
     /// A light casts shadows.
     pub(crate) shadows: bool,
 }
 
-impl Asked {
-    /// What this scene asks for.
+impl SceneFeatures {
+    /// Features of this scene.
     pub(crate) fn of(scene: &CompiledScene) -> Self {
         let (features, data) = (scene.features(), scene.scene());
         Self {
@@ -35,56 +35,59 @@ impl Asked {
     }
 }
 
-/// A position of a knob other than the one for full quality at one sample a pixel.
+/// A position of a knob other than full quality at one sample per pixel.
 #[derive(Clone, Copy, Debug)]
 struct Knob {
     name: &'static str,
-    /// Whether the picture can change by it.
-    matters: fn(Asked) -> bool,
-    turn: fn(&mut WantedPicture),
+    /// Whether it can change the picture of a scene with these features.
+    matters: fn(SceneFeatures) -> bool,
+    apply: fn(&mut WantedPicture),
 }
 
-/// A way to render: some knobs turned, the others left.
+/// A setting: some knobs changed, the others at full quality.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Setting {
     knobs: &'static [Knob],
 }
 
-/// A knob that every picture can differ by.
-const fn always(_: Asked) -> bool {
+/// For knobs that apply to every scene.
+const fn always(_: SceneFeatures) -> bool {
     true
 }
 
-const SAMPLES_4: Knob = Knob { name: "samples-4", matters: always, turn: |p| p.view.samples = 4 };
-const SAMPLES_9: Knob = Knob { name: "samples-9", matters: always, turn: |p| p.view.samples = 9 };
-const SAMPLES_16: Knob = Knob { name: "samples-16", matters: always, turn: |p| p.view.samples = 16 };
-const ADAPTIVE: Knob = Knob { name: "adaptive", matters: always, turn: |p| p.view.quality.adaptive = true };
-const HALF: Knob = Knob { name: "scale-1-2", matters: always, turn: |p| p.scale = RenderScale::Half };
+const SAMPLES_4: Knob = Knob { name: "samples-4", matters: always, apply: |p| p.view.samples = 4 };
+const SAMPLES_9: Knob = Knob { name: "samples-9", matters: always, apply: |p| p.view.samples = 9 };
+const SAMPLES_16: Knob = Knob { name: "samples-16", matters: always, apply: |p| p.view.samples = 16 };
+const ADAPTIVE: Knob = Knob { name: "adaptive", matters: always, apply: |p| p.view.quality.adaptive = true };
+const HALF: Knob = Knob { name: "scale-1-2", matters: always, apply: |p| p.scale = RenderScale::Half };
 const THREE_QUARTERS: Knob =
-    Knob { name: "scale-3-4", matters: always, turn: |p| p.scale = RenderScale::ThreeQuarters };
-const THIRD: Knob = Knob { name: "scale-1-3", matters: always, turn: |p| p.scale = RenderScale::Third };
-const QUARTER: Knob = Knob { name: "scale-1-4", matters: always, turn: |p| p.scale = RenderScale::Quarter };
-const NO_SHADOWS: Knob =
-    Knob { name: "no-shadows", matters: |asked| asked.shadows, turn: |p| p.view.quality.shadows = false };
+    Knob { name: "scale-3-4", matters: always, apply: |p| p.scale = RenderScale::ThreeQuarters };
+const THIRD: Knob = Knob { name: "scale-1-3", matters: always, apply: |p| p.scale = RenderScale::Third };
+const QUARTER: Knob = Knob { name: "scale-1-4", matters: always, apply: |p| p.scale = RenderScale::Quarter };
+const NO_SHADOWS: Knob = Knob {
+    name: "no-shadows",
+    matters: |features| features.shadows,
+    apply: |p| p.view.quality.shadows = false,
+};
 const DIFFUSE: Knob = Knob {
     name: "diffuse",
-    matters: |asked| asked.specular,
-    turn: |p| p.view.quality.shading = Shading::Diffuse,
+    matters: |features| features.specular,
+    apply: |p| p.view.quality.shading = Shading::Diffuse,
 };
 const FAST: Knob = Knob {
     name: "fast-exponent",
-    matters: |asked| asked.powers,
-    turn: |p| p.view.quality.exponent = ExponentPrecision::Fast,
+    matters: |features| features.powers,
+    apply: |p| p.view.quality.exponent = ExponentPrecision::Fast,
 };
 const NEAREST: Knob = Knob {
     name: "nearest",
-    matters: |asked| asked.filtered,
-    turn: |p| p.view.quality.filter = Some(Filter::Nearest),
+    matters: |features| features.filtered,
+    apply: |p| p.view.quality.filter = Some(Filter::Nearest),
 };
 const REDUCED: Knob =
-    Knob { name: "reduced-colors", matters: always, turn: |p| p.view.quality.colors = ColorDepth::Reduced };
+    Knob { name: "reduced-colors", matters: always, apply: |p| p.view.quality.colors = ColorDepth::Reduced };
 
-/// All settings worth having of some scene: each knob alone, towards cheap, towards good.
+/// All settings: each knob alone, then combinations towards speed, then towards quality.
 const SETTINGS: &[Setting] = &[
     Setting::plain(),
     Setting { knobs: &[FAST] },
@@ -121,27 +124,27 @@ const SETTINGS: &[Setting] = &[
     Setting { knobs: &[SAMPLES_16, ADAPTIVE] },
 ];
 
-/// The name of the setting that turns nothing: one sample, full quality.
+/// Name of the setting without changed knobs: one sample per pixel, full quality.
 const PLAIN: &str = "samples-1";
 
 impl Setting {
-    /// Those whose pictures can differ where a scene asks for so much.
-    pub(crate) fn worth_having(asked: Asked) -> Vec<Self> {
-        let worth = |setting: &&Self| setting.knobs.iter().all(|knob| (knob.matters)(asked));
-        SETTINGS.iter().filter(worth).copied().collect()
+    /// Settings that can change the picture of a scene with these features.
+    pub(crate) fn applicable(features: SceneFeatures) -> Vec<Self> {
+        let applies = |setting: &&Self| setting.knobs.iter().all(|knob| (knob.matters)(features));
+        SETTINGS.iter().filter(applies).copied().collect()
     }
 
-    /// The one that turns nothing.
+    /// The setting without changed knobs.
     pub(crate) const fn plain() -> Self {
         Self { knobs: &[] }
     }
 
-    /// The setting of that name, as tables have it.
+    /// The setting of a name, as in tables.
     pub(crate) fn named(name: &str) -> Option<Self> {
         SETTINGS.iter().find(|setting| setting.name() == name).copied()
     }
 
-    /// Its name: small letters, digits, `-` and `+`, so that it can be a file's name.
+    /// Name of lower-case letters, digits, `-` and `+`, so that it can be a file name.
     pub(crate) fn name(&self) -> String {
         if self.knobs.is_empty() {
             return PLAIN.to_owned();
@@ -150,13 +153,14 @@ impl Setting {
         names.join("+")
     }
 
-    /// The picture of that view under this setting. Whatever knobs were turned before are not; dither takes nothing away.
+    /// The request for a picture of `view` under this setting. Knobs of `view` are reset, except dither, which
+    /// loses nothing.
     pub(crate) fn applied_to(&self, view: &FrameView) -> WantedPicture {
         let quality = Quality { dither: view.quality.dither, ..Quality::default() };
         let view = FrameView { samples: 1, quality, ..*view };
         let mut picture = WantedPicture { view, scale: RenderScale::Full };
         for knob in self.knobs {
-            (knob.turn)(&mut picture);
+            (knob.apply)(&mut picture);
         }
         picture
     }
@@ -168,11 +172,13 @@ mod tests {
 
     use super::*;
 
-    const NOTHING: Asked = Asked { specular: false, powers: false, filtered: false, shadows: false };
-    const EVERYTHING: Asked = Asked { specular: true, powers: true, filtered: true, shadows: true };
+    const NOTHING: SceneFeatures =
+        SceneFeatures { specular: false, powers: false, filtered: false, shadows: false };
+    const EVERYTHING: SceneFeatures =
+        SceneFeatures { specular: true, powers: true, filtered: true, shadows: true };
 
     #[test]
-    fn names_are_unique_fit_for_files_and_lead_back() {
+    fn names_are_unique_file_names_and_parse_back() {
         let names: BTreeSet<String> = SETTINGS.iter().map(Setting::name).collect();
         assert_eq!(names.len(), SETTINGS.len());
         for name in names {
@@ -186,26 +192,26 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_asks_for_everything_has_all_settings() {
-        assert_eq!(Setting::worth_having(EVERYTHING).len(), SETTINGS.len());
-        assert!(Setting::worth_having(NOTHING).iter().any(|setting| setting.name() == PLAIN));
+    fn a_scene_with_all_features_has_all_settings() {
+        assert_eq!(Setting::applicable(EVERYTHING).len(), SETTINGS.len());
+        assert!(Setting::applicable(NOTHING).iter().any(|setting| setting.name() == PLAIN));
     }
 
     #[test]
     fn a_scene_without_highlights_shadows_or_textures_has_no_knobs_for_them() {
-        let names: Vec<String> = Setting::worth_having(NOTHING).iter().map(Setting::name).collect();
+        let names: Vec<String> = Setting::applicable(NOTHING).iter().map(Setting::name).collect();
         for word in ["diffuse", "exponent", "shadows", "nearest"] {
             assert!(!names.iter().any(|name| name.contains(word)), "{names:?}");
         }
         for name in [PLAIN, "scale-1-2", "samples-16", "reduced-colors"] {
             assert!(names.iter().any(|known| known == name), "{names:?}");
         }
-        let shadows = Setting::worth_having(Asked { shadows: true, ..NOTHING });
+        let shadows = Setting::applicable(SceneFeatures { shadows: true, ..NOTHING });
         assert!(shadows.iter().any(|setting| setting.name() == "scale-1-2+no-shadows"));
     }
 
     #[test]
-    fn every_setting_is_another_picture_from_the_same_camera() {
+    fn every_setting_gives_a_different_request_for_the_same_camera() {
         let view = crate::test_scene::view();
         let turned =
             FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
@@ -215,6 +221,6 @@ mod tests {
             assert!(picture.rendered().validate().is_ok() && picture.view.camera == view.camera);
             assert!(!pictures[..index].contains(picture), "{}", SETTINGS[index].name());
         }
-        assert_eq!(pictures[0].view, FrameView { samples: 1, ..view }, "no knob stays turned");
+        assert_eq!(pictures[0].view, FrameView { samples: 1, ..view }, "knobs of the view are reset");
     }
 }

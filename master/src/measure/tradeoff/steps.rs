@@ -1,4 +1,4 @@
-//! How far a measurement is, on standard error: a bar where that is a terminal, lines where it is not.
+//! Progress of a measurement on standard error: a bar on a terminal, lines otherwise.
 
 use std::io::{self, IsTerminal};
 use std::sync::{Mutex, PoisonError};
@@ -8,10 +8,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::progress;
 
-/// Between two lines where there is no terminal.
+/// Time between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// The parts of a measurement, one after the other, each of so many steps.
+/// Progress over consecutive parts of a measurement.
 pub(crate) struct Steps {
     bar: ProgressBar,
     quiet: bool,
@@ -19,7 +19,7 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// Nothing is done yet.
+    /// Creates a progress without parts.
     pub(crate) fn new() -> Self {
         let quiet = !tracing::enabled!(tracing::Level::INFO);
         let target = match io::stderr().is_terminal() && !quiet {
@@ -31,7 +31,7 @@ impl Steps {
         Self { bar, quiet, last_line: Mutex::new(Instant::now()) }
     }
 
-    /// The next part begins.
+    /// Begins a part of `steps` steps.
     pub(crate) fn part(&self, name: &str, steps: u64) {
         self.bar.set_length(steps);
         self.bar.reset();
@@ -39,7 +39,7 @@ impl Steps {
         self.line();
     }
 
-    /// So many steps more are done. Any thread may tell.
+    /// Adds finished steps. Any thread may call it.
     pub(crate) fn done(&self, steps: u64) {
         self.bar.inc(steps);
         let late = {

@@ -1,4 +1,4 @@
-//! Tables come back as they were written, and what is no table is refused with its line.
+//! Round trips of tables, and errors with their lines.
 
 use proptest::prelude::*;
 
@@ -42,7 +42,7 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn the_front_is_by_time_and_flip_and_is_marked() {
+fn the_front_is_marked_in_the_csv() {
     assert_eq!(table().front(), [0, 1]);
     let ends: Vec<char> = csv_text().lines().skip(1).filter_map(|line| line.chars().last()).collect();
     assert_eq!(ends, ['1', '1', '0']);
@@ -57,7 +57,7 @@ fn columns_may_be_moved_and_added() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     let text = csv_text();
     for (from, to, expected) in [
         ("median_ms", "ms", "no column \"median_ms\""),
@@ -67,7 +67,7 @@ fn what_is_wrong_is_named_with_its_line() {
         (",0.05,", ",1.5,", "line 2: column flip: expected a number from 0 to 1, but found \"1.5\""),
         (",17,", ",1.5,", "line 2: column max_error: expected a whole number"),
         (",640,", ",0,", "line 2: column width"),
-        ("samples-4", "samples-1", "line 3: setting \"samples-1\" is there twice"),
+        ("samples-4", "samples-1", "line 3: setting \"samples-1\" is a duplicate"),
         ("samples-4", "", "line 3: column setting: expected a name"),
     ] {
         let message = refused(&text.replacen(from, to, 1));
@@ -113,7 +113,7 @@ fn some_row() -> impl Strategy<Value = Row> {
 
 proptest! {
     #[test]
-    fn a_table_comes_back_as_it_was(
+    fn a_table_round_trips(
         mut rows in prop::collection::vec(some_row(), 1..20),
         scene in "[a-z,\" é]{1,20}[a-z]",
         equal: bool,
@@ -130,7 +130,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_is_worse_than_refused(text in prop::collection::vec(any::<u8>(), 0..200)) {
+    fn random_bytes_are_refused(text in prop::collection::vec(any::<u8>(), 0..200)) {
         prop_assert!(Table::parse(&text).is_err());
         let after_header = [COLUMNS.join(",").as_bytes(), b"\n", &text].concat();
         let _ = Table::parse(&after_header);

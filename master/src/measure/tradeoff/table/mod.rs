@@ -1,7 +1,8 @@
-//! The table of a measurement: written as CSV, read back by whoever goes by it.
+//! Table of a measurement, written and read as CSV.
 //!
-//! A row for each setting; what is the same for all of them is repeated in each, so that tables can be put together. Columns may stand in
-//! any order, and columns that are not known are left alone; those of [`COLUMNS`] keep their names and their meaning.
+//! One row per setting. Values that are the same for all rows are repeated in each, so that tables can be
+//! concatenated. Columns may be in any order, and unknown ones are ignored; those of [`COLUMNS`] keep their names
+//! and their meaning.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -14,12 +15,12 @@ use serde::Serialize;
 
 use super::pareto;
 
-/// Far more than there are settings, and their bytes.
+/// Bounds of a table that is read: rows, bytes, and bytes of a name.
 const MAX_ROWS: usize = 1_000;
 const MAX_BYTES: u64 = 1 << 20;
 const MAX_NAME: usize = 200;
 
-/// The columns, in the order in which they are written.
+/// Columns in the order in which they are written.
 const COLUMNS: [&str; 14] = [
     "scene",
     "width",
@@ -37,10 +38,10 @@ const COLUMNS: [&str; 14] = [
     "front",
 ];
 
-/// What was measured, and on what.
+/// The measured scene and machine, with a row for each setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Table {
-    /// The scene's name.
+    /// Name of the scene.
     pub(crate) scene: String,
     /// Pixels per row.
     pub(crate) width: u32,
@@ -48,44 +49,44 @@ pub(crate) struct Table {
     pub(crate) height: u32,
     /// Render threads.
     pub(crate) threads: usize,
-    /// The vectors that were used.
+    /// SIMD level.
     pub(crate) simd_level: String,
-    /// In the order in which settings are listed. Never empty after reading.
+    /// Rows in the order of the settings; never empty after reading.
     pub(crate) rows: Vec<Row>,
 }
 
-/// One setting.
+/// Measurement of one setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Row {
-    /// Its name.
+    /// Name of the setting.
     pub(crate) setting: String,
-    /// Median and least time of a frame, in milliseconds.
+    /// Median time of a frame, in milliseconds.
     pub(crate) median_ms: f64,
-    /// See `median_ms`.
+    /// Least time of a frame, in milliseconds.
     pub(crate) min_ms: f64,
-    /// Against the reference, as in [`Difference`]: the largest of a channel,
+    /// Largest difference of a channel against the reference, in steps of 1/255, as in [`Difference`].
     pub(crate) max_error: u8,
-    /// root of the mean square,
+    /// Root mean square error, in steps of 1/255.
     pub(crate) rmse: f64,
-    /// in decibels (infinite for equal pictures; JSON has null there),
+    /// Peak signal-to-noise ratio in decibels: infinite for equal pictures, which JSON shows as null.
     pub(crate) psnr_db: f64,
-    /// structural similarity,
+    /// Structural similarity.
     pub(crate) ssim: f64,
-    /// and the mean of FLIP.
+    /// Mean of FLIP.
     pub(crate) flip: f64,
 }
 
-/// Why a table cannot be used.
+/// Error of reading a table.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {problem}", path = .path.display())]
 pub(crate) struct TableError {
     path: PathBuf,
-    /// With the line, where there is one.
+    /// Description, with the line where there is one.
     problem: String,
 }
 
 impl Row {
-    /// A setting that is not timed yet.
+    /// A row without times.
     pub(crate) fn new(setting: String, difference: &Difference, flip: f64) -> Self {
         Self {
             setting,
@@ -101,16 +102,17 @@ impl Row {
 }
 
 impl Table {
-    /// Rows worth having, from the fastest to the best: see [`pareto::front`] of the median time and FLIP.
+    /// Indices of the rows on the front, from the fastest to the best: [`pareto::front`] of the median time and
+    /// FLIP.
     pub(crate) fn front(&self) -> Vec<usize> {
         let points: Vec<(f64, f64)> = self.rows.iter().map(|row| (row.median_ms, row.flip)).collect();
         pareto::front(&points)
     }
 
-    /// As CSV.
+    /// Encodes the table as CSV.
     ///
     /// # Errors
-    /// What the encoder says.
+    /// An error of the encoder.
     pub(crate) fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(COLUMNS)?;
@@ -136,18 +138,18 @@ impl Table {
         writer.into_inner().map_err(|error| error.into_error().into())
     }
 
-    /// Reads a table that was written before.
+    /// Reads a table that [`Self::to_csv`] has written.
     ///
     /// # Errors
-    /// A missing or oversized file; missing columns; a number out of its range, with the line; settings twice; rows of different scenes, sizes
-    /// or machines.
+    /// A missing or oversized file; missing columns; a number out of its range, with the line; duplicate settings;
+    /// rows of different scenes, sizes or machines.
     pub(crate) fn read(path: &Path) -> Result<Self, TableError> {
-        let refuse = |problem: String| TableError { path: path.to_owned(), problem };
+        let error = |problem: String| TableError { path: path.to_owned(), problem };
         let text =
-            read_within(path, MAX_BYTES).map_err(|error| refuse(error.to_string()))?.ok_or_else(|| {
-                refuse(format!("has more than {MAX_BYTES} bytes: no table of tradeoff is that long"))
+            read_within(path, MAX_BYTES).map_err(|cause| error(cause.to_string()))?.ok_or_else(|| {
+                error(format!("has more than {MAX_BYTES} bytes: a table of tradeoff is never that long"))
             })?;
-        Self::parse(&text).map_err(refuse)
+        Self::parse(&text).map_err(error)
     }
 
     pub(crate) fn parse(text: &[u8]) -> Result<Self, String> {
@@ -163,7 +165,7 @@ impl Table {
             let row = &one.rows[0];
             if !names.insert(row.setting.clone()) {
                 return Err(format!(
-                    "line {line}: setting \"{}\" is there twice",
+                    "line {line}: setting \"{}\" is a duplicate",
                     printable_within(&row.setting, MAX_NAME)
                 ));
             }
@@ -174,13 +176,13 @@ impl Table {
                 }
                 Some(table) if !table.is_measured_like(&one) => {
                     return Err(format!(
-                        "line {line}: is of another scene, size or machine than the lines before; keep one of them"
+                        "line {line}: is of another scene, size or machine than the first row; keep the rows of one of them"
                     ));
                 }
                 Some(table) => table.rows.extend(one.rows),
             }
         }
-        table.ok_or_else(|| "has no rows; write it anew with rayfarm-master tradeoff".to_owned())
+        table.ok_or_else(|| "has no rows; write a new one with rayfarm-master tradeoff".to_owned())
     }
 
     fn is_measured_like(&self, other: &Self) -> bool {
@@ -189,7 +191,7 @@ impl Table {
     }
 }
 
-/// Where each of [`COLUMNS`] stands.
+/// Indices of [`COLUMNS`] in the header.
 fn places(header: &StringRecord) -> Result<[usize; COLUMNS.len()], String> {
     let mut places = [0; COLUMNS.len()];
     for (place, name) in places.iter_mut().zip(COLUMNS) {
@@ -200,14 +202,14 @@ fn places(header: &StringRecord) -> Result<[usize; COLUMNS.len()], String> {
     Ok(places)
 }
 
-/// A line, by the names of its columns.
+/// A record with access by column name.
 struct Fields<'a> {
     record: &'a StringRecord,
     places: &'a [usize; COLUMNS.len()],
 }
 
 impl Fields<'_> {
-    /// A table of this line alone.
+    /// A table of this record alone.
     fn table(&self) -> Result<Table, String> {
         let side = 1.0..=f64::from(MAX_SIDE);
         let error = 0.0..=255.0;
@@ -271,7 +273,7 @@ impl Fields<'_> {
     }
 }
 
-/// With so many digits behind the point: more would be noise.
+/// Rounds to a number of decimal places; more would be noise.
 fn rounded(value: f64, digits: i32) -> f64 {
     let scale = 10_f64.powi(digits);
     (value * scale).round() / scale
