@@ -1,4 +1,4 @@
-//! Draws who renders a segment the second time, with the secret key of the run, when its pixels arrive.
+//! Draws the second renderer of a segment with the secret key of the run, when its pixels arrive.
 //!
 //! Colluding workers confirm each other's wrong pixels. So the second rendering goes to another host, where one is
 //! ready; the host is drawn, and no worker can request it; and a share of the segments goes to the master, which detects

@@ -92,7 +92,7 @@ pub(super) enum Stage {
     Arbitrating(Option<WorkerId>),
 }
 
-/// Who renders a segment the second time.
+/// Renderer of a second rendering.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SecondRenderer {
     /// A worker.

@@ -5,6 +5,9 @@ use std::time::Duration;
 
 use crate::scheduler::{ArbiterResult, Cost, FrameId, Lease, WorkerId};
 
+/// Nanoseconds per second.
+pub(crate) const SECOND: u64 = 1_000_000_000;
+
 /// An event of the simulation.
 #[derive(Clone, Debug)]
 pub(crate) enum SimEvent {

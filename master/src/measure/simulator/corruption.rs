@@ -1,21 +1,8 @@
 //! Simulated workers that send wrong pixels.
 
+use super::setup::Corruption;
 use super::world::World;
 use crate::scheduler::{Lease, WorkerId};
-
-/// When a corrupt worker sends wrong pixels, and how it evades verification.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Corruption {
-    /// Half of its segments are wrong, at random.
-    #[default]
-    Random,
-    /// It knows the sampling algorithm but not the key: its segments are wrong where another key would not sample
-    /// them, and its second renderings are right.
-    Predicting,
-    /// Half of its first renderings are wrong, and its second renderings confirm the wrong pixels of other
-    /// colluding workers.
-    Colluding,
-}
 
 impl World {
     /// The error value of the pixels that a worker sends for a lease: 0 where they are right.

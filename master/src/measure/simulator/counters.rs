@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::SECOND;
+use super::clock::SECOND;
 
 /// Frame times, and the use of the power of all workers together. The shares `useful`, `cutting`, `wasted`,
 /// `leases` and `idle` sum to 1.

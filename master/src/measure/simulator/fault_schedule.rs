@@ -1,11 +1,12 @@
 //! Fault schedules: a safety phase with faults, then a liveness phase without.
 
-use super::clock::SimEvent;
+use super::clock::{SECOND, SimEvent};
+use super::costs::CostProfile;
 #[cfg(test)]
 use super::machine::Condition;
 use super::rng::Rng;
+use super::setup::{Corruption, Setup};
 use super::world::World;
-use super::{Corruption, CostProfile, SECOND, Setup};
 use crate::scheduler::{Event, FrameId, SegmentPolicy, WorkerId};
 
 /// Longest safety phase.

@@ -1,7 +1,6 @@
 //! Random faults.
 
-use super::SECOND;
-use super::clock::{SimEvent, WorkerMessage};
+use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::Condition;
 use super::world::World;
 use crate::scheduler::{Event, FrameId, WorkerId};

@@ -1,6 +1,6 @@
 //! Links with bandwidth, and connections that keep messages in order.
 
-use super::SECOND;
+use super::clock::SECOND;
 
 /// One direction of a link; it carries one message at a time.
 #[derive(Clone, Copy, Debug, Default)]

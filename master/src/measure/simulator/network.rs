@@ -1,7 +1,6 @@
 //! Messages over the links, into workers and into the master.
 
-use super::SECOND;
-use super::clock::{MasterMessage, SimEvent, WorkerMessage};
+use super::clock::{MasterMessage, SECOND, SimEvent, WorkerMessage};
 use super::link::bytes;
 use super::machine::Condition;
 use super::shell::ReplyOutcome;

@@ -1,7 +1,6 @@
 //! Rendering of simulated workers: rows of each thread, and their duration.
 
-use super::SECOND;
-use super::clock::{SimEvent, WorkerMessage};
+use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::{Band, Condition};
 use super::world::World;
 use crate::scheduler::{Cost, FrameId, Lease, WorkerId};

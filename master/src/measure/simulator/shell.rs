@@ -3,8 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::corruption::Corruption;
 use super::pictures::Picture;
+use super::setup::Corruption;
 use crate::lease_book::{LeaseBook, Standing};
 use crate::scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
 

@@ -2,9 +2,10 @@
 
 use proptest::prelude::*;
 
+use super::clock::SECOND;
 use super::machine::Condition;
 use super::world::World;
-use super::{Corruption, CostProfile, SECOND, Schedule, Setup, measure, run_schedule};
+use super::{Corruption, CostProfile, Schedule, Setup, measure, run_schedule};
 use crate::scheduler::SegmentPolicy;
 
 #[test]

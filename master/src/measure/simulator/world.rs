@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::clock::{Clock, MasterMessage, SimEvent};
+use super::clock::{Clock, MasterMessage, SECOND, SimEvent};
 use super::counters::{Counters, Measured};
 use super::link::Lane;
 use super::machine::Machine;
 use super::rng::Rng;
+use super::setup::Setup;
 use super::shell::Shell;
-use super::{SECOND, Setup};
 use crate::scheduler::{Action, Event, FrameId, HostId, Lease, Scheduler, WorkerId, check};
 
 /// Longest virtual time of a measurement.

@@ -8,7 +8,7 @@ use rayfarm_protocol::AssetId;
 use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, PEER_PATIENCE};
 use serde::Serialize;
 
-use super::SECOND;
+use super::clock::SECOND;
 use super::link::{Lane, bytes};
 use super::rng::Rng;
 use crate::chains::{Chains, Source};
