@@ -13,14 +13,12 @@ mod display;
 mod error;
 mod in_process;
 mod logging;
+mod measure;
 mod orbit;
 mod output;
 mod plan;
-mod plot;
 mod progress;
 mod report;
-pub mod simulator;
-mod tradeoff;
 mod wanted;
 
 pub use rayfarm_farm as farm;
@@ -30,6 +28,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use cli::Invocation;
+pub use measure::simulator;
 use rayfarm_farm::accounting;
 #[cfg(test)]
 use rayfarm_farm::testing::{fake_worker, test_scene};

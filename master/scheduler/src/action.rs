@@ -1,126 +1,114 @@
-//! What the scheduler wants done.
+//! Output of the scheduler: actions.
 
 use std::time::Duration;
 
-use super::{Cost, FrameId, Lease, WorkerId};
+use super::{Cost, FrameId, Lease, Reconnect, WorkerId};
 
-/// What the shell is to do, in the order given.
+/// What the shell performs, in the order given.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// A requested frame begins: make room for its pixels. Comes before its first lease.
+    /// Begin a requested frame: allocate its framebuffer. Comes before the frame's first lease.
     BeginFrame {
-        /// Which.
+        /// The frame.
         frame: FrameId,
     },
-    /// A frame is complete: show it. Frames complete in the order of their numbers.
+    /// Deliver a complete frame. Frames complete in the order of their numbers.
     FrameDone {
-        /// Which.
+        /// The frame.
         frame: FrameId,
-        /// What its segments took, summed; every row counts once.
+        /// Sum of its segments' costs; every row counts once.
         cost: Cost,
-        /// From its first lease to its last row.
+        /// Time from its first lease to its last row.
         elapsed: Duration,
     },
-    /// A frame, begun or not, has been superseded: forget it.
+    /// Discard a frame, begun or not: a newer request supersedes it.
     FrameDropped {
-        /// Which.
+        /// The frame.
         frame: FrameId,
     },
-    /// A frame is given up: every worker has refused it again and again.
+    /// Discard a frame and report an error: every worker has refused it repeatedly.
     FrameFailed {
-        /// Which.
+        /// The frame.
         frame: FrameId,
     },
-    /// Tell a worker what a frame shows. Comes before the worker's first lease of it.
+    /// Send a worker the view of a frame. Comes before the worker's first lease of that frame.
     Announce {
-        /// Whom.
+        /// The worker.
         worker: WorkerId,
-        /// Which frame.
+        /// The frame.
         frame: FrameId,
     },
-    /// Give a worker a segment to render.
+    /// Send a worker a segment to render.
     Grant {
-        /// Whom.
+        /// The worker.
         worker: WorkerId,
-        /// Which rows.
+        /// The rows.
         lease: Lease,
     },
-    /// Remember what these rows of a picture look like, if all of them are this worker's: they are to be verified. Their
-    /// number is no other segment's.
-    Seal {
-        /// Who rendered them.
+    /// Record the digest of rows of a picture, if all of them are this worker's: they are going to be verified.
+    RecordDigest {
+        /// The worker that rendered them first.
         worker: WorkerId,
-        /// The rows, and the number under which they are verified.
+        /// The rows. The segment number is that of the verification and of no other segment.
         lease: Lease,
     },
-    /// Give a worker sealed rows to render again. They go into no picture: what they are worth is told by
-    /// [`Event::SegmentVerified`](super::Event::SegmentVerified).
+    /// Send a worker rows with a recorded digest to render a second time. The pixels go into no picture;
+    /// [`Event::SegmentVerified`](super::Event::SegmentVerified) reports the comparison.
     Verify {
-        /// Whom.
+        /// The worker.
         worker: WorkerId,
-        /// Which rows.
+        /// The rows.
         lease: Lease,
     },
-    /// Trace sealed rows here, compare them with whatever was sent, and tell of it by
-    /// [`Event::SegmentJudged`](super::Event::SegmentJudged).
-    Judge {
+    /// Render rows with a recorded digest on the master and compare both renderings with it;
+    /// [`Event::SegmentArbitrated`](super::Event::SegmentArbitrated) reports the result.
+    Arbitrate {
         /// The frame.
         frame: FrameId,
-        /// The number under which the rows are verified.
+        /// The number of the verification in that frame.
         segment: u32,
     },
-    /// Forget what sealed rows look like. Every seal ends so.
-    Unseal {
+    /// Drop a recorded digest. Every digest ends so.
+    DropDigest {
         /// The frame.
         frame: FrameId,
-        /// The number under which the rows were verified.
+        /// The number of the verification in that frame.
         segment: u32,
     },
-    /// End a worker's session, if it has not ended yet, and keep it out; the scheduler has forgotten it already. Its rows
-    /// leave all pictures in flight, which [`Event::RowsRejected`](super::Event::RowsRejected) tells of.
-    Expel {
-        /// Whom.
+    /// Ban a worker and end its session, if it is still connected; the scheduler has removed it already. Its rows
+    /// leave all pictures in flight, which [`Event::RowsRejected`](super::Event::RowsRejected) reports.
+    Ban {
+        /// The worker.
         worker: WorkerId,
-        /// Why, for the log and for the worker.
+        /// For the log and for the worker.
         reason: String,
     },
-    /// Tell a worker that leases of frames before this one are of no use any more.
+    /// Cancel a worker's leases of all frames before `before`.
     Cancel {
-        /// Whom.
+        /// The worker.
         worker: WorkerId,
-        /// The first frame that is still wanted.
+        /// The first frame that is still requested.
         before: FrameId,
     },
-    /// Ask a worker for a sign of life.
+    /// Send a keepalive ping.
     Ping {
-        /// Whom.
+        /// The worker.
         worker: WorkerId,
-        /// Comes back in the answer.
+        /// Returned by the pong.
         nonce: u64,
     },
-    /// End a worker's session; the scheduler has forgotten it already.
-    Dismiss {
-        /// Whom.
+    /// End a worker's session; the scheduler has removed the worker already.
+    Disconnect {
+        /// The worker.
         worker: WorkerId,
-        /// Why, for the log and for the worker.
+        /// For the log and for the worker.
         reason: String,
-        /// Whether it may connect again.
-        again: Return,
+        /// When the worker may connect again.
+        reconnect: Reconnect,
     },
-    /// Tell a worker that it gets no more leases; it finishes those it holds.
+    /// Notify a worker that it drains: it finishes its leases and gets no more.
     Drain {
-        /// Whom.
+        /// The worker.
         worker: WorkerId,
     },
-}
-
-/// Whether a worker that is sent away may come back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Return {
-    /// It is this session that has failed: a worker that was suspended is welcome when it wakes.
-    Welcome,
-    /// It was meant to leave: it need not try again.
-    Unwanted,
-    /// The farm itself ends: it may wait for the next one.
-    NextMaster,
 }

@@ -1,146 +1,152 @@
-//! The policy `adaptive`: how many rows a worker is given, from what rows cost and how fast workers are.
+//! The policy `adaptive`: the number of rows of a lease, from predicted costs and measured speeds.
 //!
-//! All who are ready and all rows that wait give a time at which the frame could be complete: `(R + A) / S`, with R
-//! the work that waits, A the work under way and S the sum of speeds. Each lease fills a share of the time that its
-//! worker has until then. So leases take equal time wherever they begin together, the first ones are large, those
-//! after them ever smaller, and what was predicted wrongly is evened out by the last ones.
+//! The ready workers and the queued rows give the time until the frame could be complete, `(R + A) / S`, with R the
+//! queued work, A the work under way and S the sum of speeds. Each lease fills a share of the time that its worker has
+//! until then. So leases that begin together take equal time, the first ones are large and later ones ever smaller, and
+//! the last ones even out wrong predictions.
 
 use std::time::Duration;
 
 use super::forecast::Tiles;
 use super::frame::Frame;
-use super::policy::MAX_WINDOW;
+use super::limits::MAX_WINDOW;
 use super::worker::Worker;
 use super::{Scheduler, WorkerId};
 
 /// The share of a worker's time until the frame's end that its next lease fills.
-const SHARE: f64 = 0.5;
-/// A segment that takes less is not worth its messages, in seconds.
-const SHORTEST_SEGMENT: f64 = 0.0005;
-/// Messages of all workers together take at most this share of the time...
+const LEASE_SHARE: f64 = 0.5;
+/// Shortest predicted time of a segment, in seconds: a shorter one is not worth its messages.
+const MIN_SEGMENT_SECONDS: f64 = 0.0005;
+/// Largest share of the time that messages of all workers together take...
 const MESSAGES_SHARE: f64 = 0.5;
-/// ...where each takes the master so long, in seconds. Measured with some margin: 5 to 10 us on the machine of the
-/// README.
+/// ...where each takes the master this long, in seconds. Measured 5 to 10 us on the machine of the README.
 const MESSAGE_SECONDS: f64 = 10e-6;
-/// A segment that takes longer loses too much when its worker is lost, in seconds.
-const LONGEST_SEGMENT: f64 = 0.5;
-/// What a second of waiting for a frame's last rows costs, in seconds, where workers begin the next frame meanwhile.
-const OVERLAPPED: f64 = 0.25;
-/// Into how many segments a worker's part of the frame is cut while no speed is known.
+/// Longest predicted time of a segment, in seconds: a longer one loses too much when its worker is lost.
+const MAX_SEGMENT_SECONDS: f64 = 0.5;
+/// Cost of a second of waiting for a frame's last rows, in seconds, where workers render the next frame meanwhile.
+const OVERLAP_WEIGHT: f64 = 0.25;
+/// Segments per worker and frame while no speed is measured.
 const FIRST_SEGMENTS: u32 = 8;
 
-/// A worker that may be given leases.
+/// A worker that may get leases.
 #[derive(Clone, Copy, Debug)]
-struct Hand {
+struct Candidate {
     id: WorkerId,
     threads: f64,
-    /// Work a second; `None` while nothing was measured of anybody.
+    /// Work per second; `None` while no worker's speed is measured.
     speed: Option<f64>,
-    /// Whether that is its own measured speed: only then are its leases predicted.
-    known: bool,
+    /// Whether `speed` is this worker's own measured one: only then are its leases predicted.
+    measured: bool,
     leases: usize,
-    /// Bands of tiles that it holds.
+    /// Tile bands of its leases.
     bands: u32,
+    /// Round trip time in seconds.
     round_trip: f64,
-    /// Seconds until it has done what it holds, or until a message reaches it.
+    /// Seconds until its leases are done, or until a message can reach it.
     free_in: f64,
 }
 
-/// Who is there to work, at one moment.
+/// The workers that are ready at one moment.
 #[derive(Debug)]
-pub(super) struct Crew {
+pub(super) struct Fleet {
     now: Duration,
-    hands: Vec<Hand>,
-    /// Work a second of all; 0 while nothing was measured.
+    candidates: Vec<Candidate>,
+    /// Sum of speeds, in work per second; 0 while none is measured.
     total: f64,
     /// Work under way.
     under_way: f64,
 }
 
-impl Crew {
+impl Fleet {
     pub(super) fn of(scheduler: &Scheduler, now: Duration) -> Self {
         let ready = scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(now));
-        let mut hands: Vec<Hand> = ready.map(|(&id, w)| Hand::of(id, w, now)).collect();
-        let measured = hands.iter().filter_map(|hand| Some((hand.speed?, hand.threads)));
+        let mut candidates: Vec<Candidate> = ready.map(|(&id, w)| Candidate::of(id, w, now)).collect();
+        let measured = candidates.iter().filter_map(|candidate| Some((candidate.speed?, candidate.threads)));
         let (speed, threads) = measured.fold((0.0, 0.0), |(s, t), (speed, threads)| (s + speed, t + threads));
         if threads > 0.0 {
-            // Of whom nothing is known, its threads promise what the others' do.
-            hands.iter_mut().for_each(|hand| {
-                hand.speed.get_or_insert(speed / threads * hand.threads);
+            // An unmeasured worker is assumed to have the average speed per thread.
+            candidates.iter_mut().for_each(|candidate| {
+                candidate.speed.get_or_insert(speed / threads * candidate.threads);
             });
         }
-        let total = hands.iter().filter_map(|hand| hand.speed).sum();
-        let under_way = hands.iter().filter_map(|hand| Some(hand.speed? * hand.free_in)).sum();
-        Self { now, hands, total, under_way }
+        let total = candidates.iter().filter_map(|candidate| candidate.speed).sum();
+        let under_way =
+            candidates.iter().filter_map(|candidate| Some(candidate.speed? * candidate.free_in)).sum();
+        Self { now, candidates, total, under_way }
     }
 
+    /// Indices of the candidates with room for a lease, the soonest idle first, then the fastest.
     pub(super) fn soonest_idle_first(&self) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.hands.len()).filter(|&index| self.wants(index)).collect();
-        let free_in = |index: &usize| self.hands.get(*index).map_or(0.0, |hand| hand.free_in);
-        let speed = |index: &usize| self.hands.get(*index).and_then(|hand| hand.speed).unwrap_or(0.0);
+        let mut order: Vec<usize> =
+            (0..self.candidates.len()).filter(|&index| self.has_room(index)).collect();
+        let free_in = |index: &usize| self.candidates.get(*index).map_or(0.0, |candidate| candidate.free_in);
+        let speed =
+            |index: &usize| self.candidates.get(*index).and_then(|candidate| candidate.speed).unwrap_or(0.0);
         order.sort_by(|a, b| free_in(a).total_cmp(&free_in(b)).then(speed(b).total_cmp(&speed(a))));
         order
     }
 
     pub(super) fn id(&self, index: usize) -> Option<WorkerId> {
-        self.hands.get(index).map(|hand| hand.id)
+        self.candidates.get(index).map(|candidate| candidate.id)
     }
 
-    /// Whether a worker has room for a lease: it holds one to render and one to go on with, and more where it has more
-    /// threads than that occupies, or would be done with them before an answer to its last pixels could reach it.
-    fn wants(&self, index: usize) -> bool {
-        let Some(hand) = self.hands.get(index) else { return false };
-        let occupied = f64::from(hand.bands) >= 2.0 * hand.threads && hand.free_in > 2.0 * hand.round_trip;
-        hand.leases < 2 || (hand.known && hand.leases < MAX_WINDOW && !occupied)
+    /// Whether a candidate has room for a lease. It holds one to render and one to continue with, and more where its
+    /// threads need more to be busy, or where it would finish them before a reply to its last pixels could reach it.
+    fn has_room(&self, index: usize) -> bool {
+        let Some(candidate) = self.candidates.get(index) else { return false };
+        let occupied = f64::from(candidate.bands) >= 2.0 * candidate.threads
+            && candidate.free_in > 2.0 * candidate.round_trip;
+        candidate.leases < 2 || (candidate.measured && candidate.leases < MAX_WINDOW && !occupied)
     }
 
-    /// When a worker will have done a further lease, and how long that takes it; writes down that it has it.
-    pub(super) fn expect(
+    /// Adds a lease to a candidate. Returns its predicted arrival and the time it takes; `None` for an unmeasured worker.
+    pub(super) fn predict(
         &mut self,
         id: WorkerId,
         work: f64,
         longest_band: f64,
     ) -> Option<(Duration, Duration)> {
-        let index = self.hands.binary_search_by_key(&id, |hand| hand.id).ok()?;
-        let hand = self.hands.get_mut(index)?;
-        hand.leases += 1;
-        hand.bands += 1;
-        let speed = hand.speed?;
-        // A band is one thread's.
-        let takes = (work / speed).max(longest_band / speed * hand.threads);
-        hand.free_in += work / speed;
+        let index = self.candidates.binary_search_by_key(&id, |candidate| candidate.id).ok()?;
+        let candidate = self.candidates.get_mut(index)?;
+        candidate.leases += 1;
+        candidate.bands += 1;
+        let speed = candidate.speed?;
+        // One thread traces a band.
+        let takes = (work / speed).max(longest_band / speed * candidate.threads);
+        candidate.free_in += work / speed;
         self.under_way += work;
-        let at = self.now.saturating_add(seconds(hand.free_in.max(takes)));
-        hand.known.then_some((at, seconds(takes)))
+        let at = self.now.saturating_add(seconds(candidate.free_in.max(takes)));
+        candidate.measured.then_some((at, seconds(takes)))
     }
 
-    /// The fastest worker without anything to do, its speed and its round trip.
+    /// The fastest worker without leases, its speed and its round trip time in seconds.
     pub(super) fn fastest_idle(&self) -> Option<(WorkerId, Option<f64>, f64)> {
-        let idle = self.hands.iter().filter(|hand| hand.leases == 0);
+        let idle = self.candidates.iter().filter(|candidate| candidate.leases == 0);
         let best = idle.max_by(|a, b| a.speed.unwrap_or(0.0).total_cmp(&b.speed.unwrap_or(0.0)))?;
         Some((best.id, best.speed, best.round_trip))
     }
 
-    /// The soonest that anybody could have done this work.
-    fn soonest(&self, work: f64) -> f64 {
-        // Of somebody who has never answered, nobody knows when it will.
-        let hands = self.hands.iter().filter(|hand| hand.known || hand.leases == 0);
-        let done_in = hands.filter_map(|hand| Some(hand.free_in + work / hand.speed?));
+    /// Seconds until the first candidate could have done this work.
+    fn soonest_done(&self, work: f64) -> f64 {
+        // An unmeasured worker that holds a lease is not predictable.
+        let predictable = |candidate: &&Candidate| candidate.measured || candidate.leases == 0;
+        let candidates = self.candidates.iter().filter(predictable);
+        let done_in = candidates.filter_map(|candidate| Some(candidate.free_in + work / candidate.speed?));
         done_in.fold(f64::INFINITY, f64::min)
     }
 }
 
-impl Hand {
+impl Candidate {
     fn of(id: WorkerId, worker: &Worker, now: Duration) -> Self {
         let round_trip = worker.round_trip.unwrap_or(0.0);
-        let last = worker.leases.values().filter_map(|held| held.expected_at).max();
+        let last = worker.leases.values().filter_map(|active| active.expected_at).max();
         let left = last.map_or(0.0, |at| at.saturating_sub(now).as_secs_f64());
-        let bands = worker.leases.values().map(|held| held.bands).sum();
+        let bands = worker.leases.values().map(|active| active.bands).sum();
         Self {
             id,
             threads: f64::from(worker.threads),
             speed: worker.speed.value(),
-            known: worker.speed.value().is_some(),
+            measured: worker.speed.value().is_some(),
             leases: worker.leases.len(),
             bands,
             round_trip,
@@ -150,60 +156,63 @@ impl Hand {
 }
 
 impl Scheduler {
-    /// How many rows of a frame's queue a worker is given; `None`: it had better not take any.
-    pub(super) fn forecast_rows(&mut self, index: usize, crew: &Crew, hand: usize) -> Option<u32> {
+    /// Number of rows of a frame's queue that a candidate gets; `None` if another worker will have done them sooner.
+    pub(super) fn adaptive_rows(&mut self, index: usize, fleet: &Fleet, candidate: usize) -> Option<u32> {
         let frame = self.frames.get(index)?;
-        let run = frame.queue.front()?;
+        let range = frame.queue.front()?;
         let limit = self.max_rows(frame.width);
-        let hand = crew.hands.get(hand)?;
-        let Some(speed) = hand.speed else {
-            let rows = frame.height / (FIRST_SEGMENTS * crew.hands.len().max(1) as u32);
+        let candidate = fleet.candidates.get(candidate)?;
+        let Some(speed) = candidate.speed else {
+            let rows = frame.height / (FIRST_SEGMENTS * fleet.candidates.len().max(1) as u32);
             let step = frame.forecast.tiles.rows.min(rows.max(1));
-            return Some(to_boundary(run.first, rows.max(1), step).min(limit));
+            return Some(to_boundary(range.first, rows.max(1), step).min(limit));
         };
-        let waits: f64 = self.frames.iter().take(index + 1).map(Frame::waiting_work).sum();
-        let until_done = (waits + crew.under_way) / crew.total;
-        let shortest = SHORTEST_SEGMENT.max(crew.hands.len() as f64 * MESSAGE_SECONDS / MESSAGES_SHARE);
-        let takes = (SHARE * (until_done - hand.free_in)).clamp(shortest, LONGEST_SEGMENT);
-        let rows = frame.forecast.rows_for(run.first, run.count, takes * speed);
-        let step = self.step(frame, crew, hand.free_in, speed, until_done);
-        let rows = to_boundary(run.first, rows, step).min(limit).min(run.count);
-        let work = frame.forecast.work(run.first..run.first + rows);
-        // Towards the end, somebody else may be free and done before this one is; but where all are idle, they might each
-        // leave it to another.
-        let done_in = hand.free_in + work / speed;
-        let all_idle = crew.hands.iter().all(|hand| hand.leases == 0);
-        let has_time = all_idle || done_in <= until_done || done_in <= crew.soonest(work) * 1.0001;
+        let queued: f64 = self.frames.iter().take(index + 1).map(Frame::queued_work).sum();
+        let until_done = (queued + fleet.under_way) / fleet.total;
+        let messages = fleet.candidates.len() as f64 * MESSAGE_SECONDS / MESSAGES_SHARE;
+        let shortest = MIN_SEGMENT_SECONDS.max(messages);
+        let takes = (LEASE_SHARE * (until_done - candidate.free_in)).clamp(shortest, MAX_SEGMENT_SECONDS);
+        let rows = frame.forecast.rows_for(range.first, range.count, takes * speed);
+        let step = self.cut_step(frame, fleet, candidate.free_in, speed, until_done);
+        let rows = to_boundary(range.first, rows, step).min(limit).min(range.count);
+        let work = frame.forecast.work(range.first..range.first + rows);
+        // Near the end, another worker may be free and done sooner. Where all are idle, each might leave the rows to
+        // another one, so then the candidate takes them.
+        let done_in = candidate.free_in + work / speed;
+        let all_idle = fleet.candidates.iter().all(|candidate| candidate.leases == 0);
+        let has_time = all_idle || done_in <= until_done || done_in <= fleet.soonest_done(work) * 1.0001;
         has_time.then_some(rows)
     }
 
-    /// Rows of which cuts are multiples: a tile's height, or a half, a quarter, ... of it where that makes the frame
-    /// complete earlier. Cutting the next band of tiles, and all that are as expensive, costs everybody (see `CostMap`);
-    /// a band that is not cut may keep everybody waiting for this one worker.
-    fn step(&self, frame: &Frame, crew: &Crew, free_in: f64, speed: f64, until_done: f64) -> u32 {
+    /// Rows of which cuts are multiples: the height of a tile, or a half, a quarter, ... of it where that completes the
+    /// frame earlier. Cutting the next band, and all that are as expensive, adds cost for all workers (see `Tiles`); an
+    /// uncut band may make all workers wait for this one.
+    fn cut_step(&self, frame: &Frame, fleet: &Fleet, free_in: f64, speed: f64, until_done: f64) -> u32 {
         let Tiles { rows: tile, share } = frame.forecast.tiles;
         let band = |row: u32| {
             let first = row - row % tile;
             frame.forecast.work(first..(first + tile).min(frame.height))
         };
-        let Some(next) = frame.queue.front().map(|run| band(run.first)) else { return tile };
-        let rows =
-            frame.queue.iter().flat_map(|run| (run.first..run.first + run.count).step_by(tile as usize));
+        let Some(next) = frame.queue.front().map(|range| band(range.first)) else { return tile };
+        let rows = frame
+            .queue
+            .iter()
+            .flat_map(|range| (range.first..range.first + range.count).step_by(tile as usize));
         let alike: f64 = rows.map(band).filter(|&work| work > next / 2.0).sum();
-        // Where the next frame follows, only the picture waits, and nobody who renders.
-        let weight = if self.max_frames() > 1 { OVERLAPPED } else { 1.0 };
+        // Where the next frame follows, only the picture waits, not the workers.
+        let weight = if self.max_frames() > 1 { OVERLAP_WEIGHT } else { 1.0 };
         let seconds = |step: u32| {
             let part = f64::from(step) / f64::from(tile);
             let added = share * (1.0 / part - 1.0);
             let piece = next * (share + (1.0 - share) * part) / speed;
-            alike * added / crew.total + weight * (free_in + piece - until_done).max(0.0)
+            alike * added / fleet.total + weight * (free_in + piece - until_done).max(0.0)
         };
         let halves = std::iter::successors(Some(tile), |&step| (step > 1).then_some(step / 2));
         halves.min_by(|&a, &b| seconds(a).total_cmp(&seconds(b))).unwrap_or(tile)
     }
 }
 
-/// Rows from `first` on that end on the multiple of `step` nearest to `rows`, at least one of them.
+/// Number of rows, at least 1, from `first` to the multiple of `step` that is nearest to `first + rows`.
 fn to_boundary(first: u32, rows: u32, step: u32) -> u32 {
     let end = first.saturating_add(rows);
     let below = end - end % step;
@@ -211,7 +220,7 @@ fn to_boundary(first: u32, rows: u32, step: u32) -> u32 {
     if nearest > first { nearest - first } else { (first + 1).next_multiple_of(step) - first }
 }
 
-/// A predicted time; whatever cannot be one is a very long time.
+/// A predicted time; `Duration::MAX` for a value that is not a time.
 pub(super) fn seconds(value: f64) -> Duration {
     Duration::try_from_secs_f64(value).unwrap_or(Duration::MAX)
 }
@@ -228,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_time_is_a_very_long_one() {
+    fn an_invalid_time_is_the_longest_one() {
         assert_eq!([f64::NAN, f64::INFINITY, -1.0].map(seconds), [Duration::MAX; 3]);
     }
 }

@@ -1,30 +1,29 @@
-//! What holds after every event. Debug builds and tests check it each time.
+//! Invariants that hold after every event. Debug builds and tests check them each time.
 
 use std::collections::BTreeSet;
 
-use super::audits::{MAX_AUDITS, Stage, TRAILING_FRAMES};
 use super::frame::Frame;
-use super::policy::{MAX_WINDOW, SEED_WINDOW};
-use super::second::{MAX_FOR_MASTER, Second};
+use super::limits::{FIXED_POLICY_WINDOW, MAX_WINDOW, TRAILING_FRAMES};
+use super::verification::{MAX_FOR_MASTER, MAX_PENDING, SecondRenderer, Stage};
 use super::{Scheduler, SegmentPolicy};
 
-/// The first invariant that does not hold, in words:
+/// Describes the first violated invariant; `None` if all of these hold:
 ///
-/// - every row of a frame in flight is queued, leased to a live worker, or done, and exactly one of these;
-/// - every lease of a worker is known to its frame, and the other way round;
-/// - leases never exceed the window;
-/// - rows do not wait for anybody while all who could render them are idle;
-/// - under the seed's policies, nobody is idle while rows wait;
+/// - every row of a frame in flight is in exactly one of the states queued, leased to a live worker, done;
+/// - frames and workers agree on every lease;
+/// - leases of a worker never exceed the window;
+/// - rows are not queued while all ready workers are idle;
+/// - under the fixed policies, no ready worker is idle while rows are queued;
 /// - at most two frames are in flight, in order, and none of them is complete;
-/// - audits are few, of frames in flight or lately complete, and nobody verifies what it has rendered itself;
+/// - pending verifications are bounded, of frames in flight or recently complete, and no worker verifies its own rows;
 /// - without workers nothing is leased.
 pub fn violated(scheduler: &Scheduler) -> Option<String> {
     frames_are_in_order(scheduler)
         .or_else(|| scheduler.frames.iter().find_map(rows_are_somewhere))
         .or_else(|| scheduler.frames.iter().find_map(|frame| holders_hold(scheduler, frame)))
         .or_else(|| leases_are_known(scheduler))
-        .or_else(|| audits_are_in_order(scheduler))
-        .or_else(|| nobody_is_idle(scheduler))
+        .or_else(|| verifications_are_valid(scheduler))
+        .or_else(|| no_worker_is_idle(scheduler))
 }
 
 fn frames_are_in_order(scheduler: &Scheduler) -> Option<String> {
@@ -38,13 +37,13 @@ fn frames_are_in_order(scheduler: &Scheduler) -> Option<String> {
         return Some(format!("{:?} is complete and still in flight", numbers[0]));
     }
     if frames.is_empty() && scheduler.waiting.is_some() {
-        return Some("a frame waits although none is in flight".to_owned());
+        return Some("a request waits although no frame is in flight".to_owned());
     }
     (!numbers.is_sorted_by(|a, b| a < b)).then(|| format!("frames out of order: {numbers:?}"))
 }
 
 fn rows_are_somewhere(frame: &Frame) -> Option<String> {
-    let queued = frame.queue.iter().map(|run| (run.first, run.count));
+    let queued = frame.queue.iter().map(|range| (range.first, range.count));
     let leased = frame.segments.values().map(|segment| (segment.first, segment.count));
     let mut parts: Vec<_> = queued.chain(leased).collect();
     parts.sort_unstable();
@@ -80,61 +79,62 @@ fn holders_hold(scheduler: &Scheduler, frame: &Frame) -> Option<String> {
 }
 
 fn leases_are_known(scheduler: &Scheduler) -> Option<String> {
-    let window = if scheduler.policy == SegmentPolicy::Adaptive { MAX_WINDOW } else { SEED_WINDOW };
+    let window = if scheduler.policy == SegmentPolicy::Adaptive { MAX_WINDOW } else { FIXED_POLICY_WINDOW };
     scheduler.workers.iter().find_map(|(id, worker)| {
         if worker.leases.len() > window {
             return Some(format!("{id} holds {} leases, at most {window} expected", worker.leases.len()));
         }
-        worker.leases.iter().find_map(|(&(frame, number), held)| {
-            if held.audit {
-                let audit = scheduler.audits.open.get(&(frame, number));
-                let known = audit.is_some_and(|audit| audit.stage == Stage::Leased(*id));
+        worker.leases.iter().find_map(|(&(frame, number), active)| {
+            if active.verifies {
+                let pending = scheduler.verifications.pending.get(&(frame, number));
+                let known = pending.is_some_and(|pending| pending.stage == Stage::Leased(*id));
                 return (!known)
-                    .then(|| format!("{id} verifies {:?}, which nobody asked it for", held.lease));
+                    .then(|| format!("{id} verifies {:?}, which is not leased to it", active.lease));
             }
             let known = scheduler.frames.iter().find(|known| known.id == frame);
             let segment = known.and_then(|frame| frame.segments.get(&number));
-            let rows = (held.lease.first_row, held.lease.row_count);
+            let rows = (active.lease.first_row, active.lease.row_count);
             let fits = segment.is_some_and(|segment| {
                 rows == (segment.first, segment.count) && (segment.done || segment.holders.contains(id))
             });
-            (!fits).then(|| format!("{id} holds {:?}, which its frame does not know", held.lease))
+            (!fits).then(|| format!("{id} holds {:?}, which its frame does not know", active.lease))
         })
     })
 }
 
-fn audits_are_in_order(scheduler: &Scheduler) -> Option<String> {
-    let audits = &scheduler.audits;
-    // The master may take its time.
-    let trailing = audits.open.iter().filter(|(_, audit)| !audit.stage.is_masters());
+fn verifications_are_valid(scheduler: &Scheduler) -> Option<String> {
+    let queue = &scheduler.verifications;
+    // Those for the master may be of any age.
+    let trailing = queue.pending.iter().filter(|(_, pending)| !pending.stage.is_for_master());
     let frames: BTreeSet<_> = trailing.map(|((frame, _), _)| frame).collect();
-    if audits.open.len() > MAX_AUDITS || frames.len() > scheduler.max_frames() + TRAILING_FRAMES {
-        return Some(format!("{} audits of {} frames are open", audits.open.len(), frames.len()));
+    if queue.pending.len() > MAX_PENDING || frames.len() > scheduler.max_frames() + TRAILING_FRAMES {
+        return Some(format!("{} verifications of {} frames are pending", queue.pending.len(), frames.len()));
     }
-    if audits.waiting_for_master() > MAX_FOR_MASTER {
-        return Some(format!("{} audits wait for the master", audits.waiting_for_master()));
+    if queue.waiting_for_master() > MAX_FOR_MASTER {
+        return Some(format!("{} verifications wait for the master", queue.waiting_for_master()));
     }
-    audits.open.iter().find_map(|(&(frame, number), audit)| {
-        if let Stage::Waiting(Second::Worker(second)) = audit.stage {
-            let able = second != audit.painter && scheduler.workers.contains_key(&second);
-            return (!able).then(|| format!("{frame:?} audit {number} waits for {second}, which cannot"));
+    queue.pending.iter().find_map(|(&(frame, number), pending)| {
+        let place = format!("{frame:?} verification {number}");
+        if let Stage::Waiting(SecondRenderer::Worker(second)) = pending.stage {
+            let able = second != pending.first && scheduler.workers.contains_key(&second);
+            return (!able).then(|| format!("{place} waits for {second}, which cannot render it"));
         }
-        let Stage::Leased(holder) = audit.stage else { return None };
+        let Stage::Leased(holder) = pending.stage else { return None };
         let worker = scheduler.workers.get(&holder);
         let holds = worker.is_some_and(|worker| worker.leases.contains_key(&(frame, number)));
         if !holds {
-            return Some(format!("{frame:?} audit {number} is held by {holder}, which does not hold it"));
+            return Some(format!("{place} is held by {holder}, which does not hold it"));
         }
-        (holder == audit.painter).then(|| format!("{holder} verifies what it has rendered itself"))
+        (holder == pending.first).then(|| format!("{holder} verifies its own rows"))
     })
 }
 
-/// Under `adaptive` rows may wait for somebody who will have done them sooner than those who are idle.
-fn nobody_is_idle(scheduler: &Scheduler) -> Option<String> {
-    let rows_wait = scheduler.frames.iter().any(|frame| !frame.queue.is_empty());
+/// Under `adaptive`, rows may wait for a busy worker that will have done them sooner than an idle one.
+fn no_worker_is_idle(scheduler: &Scheduler) -> Option<String> {
+    let rows_are_queued = scheduler.frames.iter().any(|frame| !frame.queue.is_empty());
     let ready = || scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(scheduler.handled_at));
-    let idle = ready().find(|(_, worker)| worker.leases.is_empty()).filter(|_| rows_wait);
+    let idle = ready().find(|(_, worker)| worker.leases.is_empty()).filter(|_| rows_are_queued);
     let busy = ready().any(|(_, worker)| !worker.leases.is_empty());
     let forbidden = !busy || scheduler.policy != SegmentPolicy::Adaptive;
-    idle.filter(|_| forbidden).map(|(id, _)| format!("{id} is idle while rows wait"))
+    idle.filter(|_| forbidden).map(|(id, _)| format!("{id} is idle while rows are queued"))
 }

@@ -1,10 +1,10 @@
-//! What happens to the scheduler.
+//! Input of the scheduler: events.
 
 use std::fmt;
 
-use super::{Cost, Finding, FrameId, Lease, Verdict};
+use super::{ArbiterResult, Cost, Finding, FrameId, Lease};
 
-/// A connected worker. Numbers are given by the shell and never reused.
+/// Number of a connected worker. The shell assigns it and never reuses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerId(pub u64);
 
@@ -14,16 +14,16 @@ impl fmt::Display for WorkerId {
     }
 }
 
-/// The machine on which a worker runs, as far as the shell can tell. Workers of one machine do not vouch for each other
-/// where a worker of another one can.
+/// Machine that a worker runs on, as far as the shell can tell. Where a worker of another host is ready, workers of one
+/// host do not verify each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct HostId(pub u128);
 
-/// What the shell reports. Events of unknown workers and of frames that are over are ignored, so the shell need
-/// not know what has become of either.
+/// What the shell reports. The scheduler ignores events of unknown workers and of frames that are over, so the shell
+/// need not track either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A frame is wanted. Its number is greater than that of every frame before it.
+    /// A frame is requested. Frame numbers increase from request to request.
     FrameRequested {
         /// Its number.
         frame: FrameId,
@@ -31,105 +31,104 @@ pub enum Event {
         width: u32,
         /// Rows.
         height: u32,
-        /// Rows that workers trace together, from multiples of it on: cuts elsewhere cost them.
+        /// Rows of a tile band; bands begin at multiples of it. Cutting a band adds cost.
         tile_rows: u32,
     },
-    /// Nothing that was requested before a frame is wanted any more.
-    RequestsGivenUp {
-        /// That frame's number; it need not be requested yet.
+    /// All frames before `next` are dropped: they are no longer requested.
+    RequestsDropped {
+        /// The first frame number that is not dropped; that frame need not be requested yet.
         next: FrameId,
     },
     /// A session is ready for leases.
     WorkerJoined {
         /// The new worker.
         worker: WorkerId,
-        /// Its render threads: a first guess at its speed.
+        /// Its render threads: the first estimate of its speed.
         threads: u32,
-        /// Where it runs.
+        /// The machine that it runs on.
         host: HostId,
     },
-    /// A session is over, for whatever reason.
+    /// A session has ended, for whatever reason.
     WorkerLeft {
-        /// The lost worker.
+        /// The worker of that session.
         worker: WorkerId,
     },
-    /// A worker asks for no more leases; it finishes those it has.
+    /// A worker drains: it finishes its leases and takes no more.
     WorkerDrains {
-        /// The leaving worker.
+        /// The draining worker.
         worker: WorkerId,
     },
-    /// The master's user wants a worker to leave once it has finished what it holds. It is told; it is dismissed when
-    /// it holds nothing any more.
+    /// The master's user drains a worker. The worker is notified, and disconnected once it holds no lease.
     DrainRequested {
-        /// Which worker.
+        /// The worker to drain.
         worker: WorkerId,
     },
-    /// The master's user wants a worker to get no more leases until further notice. It stays connected and finishes
-    /// what it holds; whoever is idle may render that as well.
+    /// The master's user pauses a worker: it stays connected, finishes its leases and gets no more. Idle workers may
+    /// render the rows of those leases as well.
     PauseRequested {
-        /// Which worker.
+        /// The worker to pause.
         worker: WorkerId,
     },
-    /// A paused worker gets leases again. A draining one does not.
+    /// The master's user resumes a paused worker. Draining workers go on draining.
     ResumeRequested {
-        /// Which worker.
+        /// The worker to resume.
         worker: WorkerId,
     },
-    /// The pixels of a lease were checked and are in the framebuffer.
+    /// The pixels of a lease are valid and in the framebuffer.
     SegmentDone {
-        /// Who rendered them.
+        /// The worker that rendered them.
         worker: WorkerId,
         /// The lease as it was granted.
         lease: Lease,
-        /// What the worker says they took.
+        /// The cost that the worker reports.
         cost: Cost,
     },
-    /// A segment of an audit was rendered again, and compared with what its seal tells.
+    /// The second rendering of a segment was compared with the digest of the first one.
     SegmentVerified {
-        /// Who rendered it.
+        /// The worker that rendered it the second time.
         worker: WorkerId,
         /// The lease as it was granted.
         lease: Lease,
-        /// What the worker says it took.
+        /// The cost that the worker reports.
         cost: Cost,
-        /// What has come of it.
+        /// Outcome of the comparison.
         finding: Finding,
     },
-    /// The master has traced a segment of an audit itself.
-    SegmentJudged {
+    /// The arbiter has rendered a segment on the master.
+    SegmentArbitrated {
         /// The frame.
         frame: FrameId,
-        /// The number of the audit in it.
+        /// The number of the verification in that frame.
         segment: u32,
-        /// Whose bytes are others.
-        verdict: Verdict,
+        /// Which renderings differ from the master's.
+        result: ArbiterResult,
     },
-    /// Rows of a frame in flight are not in its picture any more: whoever sent them was expelled.
+    /// Rows of a frame in flight have left its picture, because the worker that rendered them was banned.
     RowsRejected {
-        /// Which frame.
+        /// The frame.
         frame: FrameId,
-        /// The first of them.
+        /// The first of the rows.
         first_row: u32,
-        /// How many.
+        /// Number of rows.
         row_count: u32,
     },
     /// A worker cannot render a frame.
     WorkerFailed {
-        /// Who cannot.
+        /// The worker.
         worker: WorkerId,
-        /// Which frame.
+        /// The frame.
         frame: FrameId,
     },
-    /// A ping was answered.
+    /// A worker has answered a ping.
     Pong {
-        /// By whom.
+        /// The worker.
         worker: WorkerId,
-        /// The ping's number.
+        /// The ping's nonce.
         nonce: u64,
     },
-    /// A worker has given another sign of life: it takes the assets that it is sent.
+    /// A worker is alive: it is receiving assets.
     Heard {
-        /// Who.
+        /// The worker.
         worker: WorkerId,
     },
     /// The time of [`poll_timeout`](super::Scheduler::poll_timeout) has come.

@@ -1,4 +1,4 @@
-//! One frame's rows: queued, leased or done.
+//! Rows of one frame: queued, leased or done.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::ops::Range;
@@ -7,52 +7,52 @@ use std::time::Duration;
 use super::forecast::Forecast;
 use super::{Cost, FrameId, Lease, WorkerId};
 
-/// Rows that wait for a worker.
+/// Queued rows: a range that waits for a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Run {
+pub(super) struct RowRange {
     pub(super) first: u32,
     pub(super) count: u32,
-    /// Segment number and next attempt, when these rows were leased before and came back whole.
-    came_back: Option<(u32, u32)>,
-    /// Whether the policy `smart` has cut it already.
+    /// Segment number and next attempt, if these rows were leased before as one segment.
+    requeued_as: Option<(u32, u32)>,
+    /// Whether the policy `smart` has halved it already.
     pub(super) halved: bool,
 }
 
-impl Run {
+impl RowRange {
     pub(super) fn new(first: u32, count: u32) -> Self {
-        Self { first, count, came_back: None, halved: false }
+        Self { first, count, requeued_as: None, halved: false }
     }
 }
 
-/// Rows that were leased.
+/// Leased or finished rows.
 #[derive(Clone, Debug)]
 pub(super) struct Segment {
     pub(super) first: u32,
     pub(super) count: u32,
-    /// The attempt that the next lease of these rows gets.
+    /// Attempt number of the next lease of these rows.
     next_attempt: u32,
     halved: bool,
-    /// Who renders it now; empty once it is done.
+    /// Workers that hold it; empty once it is done.
     pub(super) holders: BTreeSet<WorkerId>,
     pub(super) done: bool,
-    /// What it took, once it is done.
+    /// Its cost, once it is done.
     cost: Cost,
 }
 
-/// A frame that has begun.
+/// A frame in flight.
 #[derive(Debug)]
 pub(super) struct Frame {
     pub(super) id: FrameId,
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) forecast: Forecast,
-    /// When its first lease was granted.
+    /// Time of its first lease.
     pub(super) started_at: Option<Duration>,
-    pub(super) queue: VecDeque<Run>,
+    pub(super) queue: VecDeque<RowRange>,
     pub(super) segments: BTreeMap<u32, Segment>,
     next_segment: u32,
     pub(super) rows_done: u32,
-    /// How often each worker has said that it cannot render this frame, since somebody last could.
+    /// Refusals of this frame per worker since the last finished segment.
     refusals: BTreeMap<WorkerId, u32>,
 }
 
@@ -61,7 +61,7 @@ impl Frame {
         id: FrameId,
         (width, height): (u32, u32),
         forecast: Forecast,
-        runs: impl IntoIterator<Item = Run>,
+        ranges: impl IntoIterator<Item = RowRange>,
     ) -> Self {
         Self {
             id,
@@ -69,7 +69,7 @@ impl Frame {
             height,
             forecast,
             started_at: None,
-            queue: runs.into_iter().collect(),
+            queue: ranges.into_iter().collect(),
             segments: BTreeMap::new(),
             next_segment: 0,
             rows_done: 0,
@@ -77,23 +77,23 @@ impl Frame {
         }
     }
 
-    /// Rows that were leased at least once and are not queued again.
+    /// Number of rows that are not queued.
     pub(super) fn rows_leased(&self) -> u32 {
-        self.height - self.queue.iter().map(|run| run.count).sum::<u32>()
+        self.height - self.queue.iter().map(|range| range.count).sum::<u32>()
     }
 
-    /// The predicted work of the rows that wait.
-    pub(super) fn waiting_work(&self) -> f64 {
-        self.queue.iter().map(|run| self.forecast.work(run.first..run.first + run.count)).sum()
+    /// Predicted work of the queued rows.
+    pub(super) fn queued_work(&self) -> f64 {
+        self.queue.iter().map(|range| self.forecast.work(range.first..range.first + range.count)).sum()
     }
 
-    /// A worker says that it cannot render this frame.
+    /// Counts a refusal: a worker cannot render this frame.
     pub(super) fn refuse(&mut self, worker: WorkerId) {
         let count = self.refusals.entry(worker).or_default();
         *count = count.saturating_add(1);
     }
 
-    /// How often a worker has said so since somebody last could.
+    /// Refusals of a worker since the last finished segment.
     pub(super) fn refusals(&self, worker: WorkerId) -> u32 {
         self.refusals.get(&worker).copied().unwrap_or(0)
     }
@@ -102,13 +102,13 @@ impl Frame {
         self.rows_done == self.height
     }
 
-    /// A number that no segment of this frame has had.
+    /// A segment number that is new in this frame.
     pub(super) fn next_number(&mut self) -> u32 {
         self.next_segment += 1;
         self.next_segment - 1
     }
 
-    /// What the done segments took, summed.
+    /// Sum of the costs of the done segments.
     pub(super) fn cost(&self) -> Cost {
         let mut sum = Cost::default();
         self.segments.values().for_each(|segment| sum += segment.cost);
@@ -116,30 +116,30 @@ impl Frame {
     }
 
     /// Leases up to `max_rows` rows from the front of the queue.
-    pub(super) fn take(&mut self, worker: WorkerId, max_rows: u32) -> Option<Lease> {
-        let run = self.queue.pop_front()?;
-        let (run, rest) = cut(run, max_rows.max(1));
+    pub(super) fn lease_front(&mut self, worker: WorkerId, max_rows: u32) -> Option<Lease> {
+        let range = self.queue.pop_front()?;
+        let (range, rest) = cut(range, max_rows.max(1));
         if let Some(rest) = rest {
             self.queue.push_front(rest);
         }
-        let (number, attempt) = run.came_back.unwrap_or_else(|| (self.next_number(), 0));
+        let (number, attempt) = range.requeued_as.unwrap_or_else(|| (self.next_number(), 0));
         let segment = Segment {
-            first: run.first,
-            count: run.count,
+            first: range.first,
+            count: range.count,
             next_attempt: attempt,
-            halved: run.halved,
+            halved: range.halved,
             holders: BTreeSet::new(),
             done: false,
             cost: Cost::default(),
         };
         self.segments.insert(number, segment);
-        self.copy(number, worker)
+        self.lease_to(number, worker)
     }
 
-    /// Cuts the run at the front of the queue in two; a single row stays whole.
+    /// Halves the range at the front of the queue; a single row stays whole.
     pub(super) fn halve_front(&mut self) {
-        let Some(run) = self.queue.pop_front() else { return };
-        let (mut first, second) = cut(run.clone(), run.count.div_ceil(2));
+        let Some(range) = self.queue.pop_front() else { return };
+        let (mut first, second) = cut(range.clone(), range.count.div_ceil(2));
         first.halved = true;
         if let Some(mut second) = second {
             second.halved = true;
@@ -149,7 +149,7 @@ impl Frame {
     }
 
     /// Leases a segment to one more worker.
-    pub(super) fn copy(&mut self, number: u32, worker: WorkerId) -> Option<Lease> {
+    pub(super) fn lease_to(&mut self, number: u32, worker: WorkerId) -> Option<Lease> {
         let segment = self.segments.get_mut(&number)?;
         let attempt = segment.next_attempt;
         segment.next_attempt += 1;
@@ -158,16 +158,17 @@ impl Frame {
         Some(Lease { frame: self.id, segment: number, attempt, first_row, row_count })
     }
 
-    /// Marks the rows of a lease done; which of them were not, as runs. Every row's cost is counted once.
+    /// Marks the rows of a lease done. Returns those that were not done before, as disjoint ranges in order. Every row's
+    /// cost counts once.
     ///
-    /// The lease may have been taken back as overdue, and its rows be queued again or leased to others in pieces: each
-    /// of these pieces lies within it.
+    /// The lease may have been revoked as overdue, and its rows be queued again or leased to others in pieces: each of
+    /// these pieces is within it.
     pub(super) fn finish(&mut self, lease: &Lease, cost: Cost) -> Vec<Range<u32>> {
         let rows = lease.first_row..lease.first_row.saturating_add(lease.row_count);
         let within = |first: u32, count: u32| rows.start <= first && first + count <= rows.end;
         for index in (0..self.queue.len()).rev() {
-            if self.queue.get(index).is_some_and(|run| within(run.first, run.count)) {
-                self.settle(index);
+            if self.queue.get(index).is_some_and(|range| within(range.first, range.count)) {
+                self.promote(index);
             }
         }
         let mut fresh = Vec::new();
@@ -175,23 +176,23 @@ impl Frame {
             segment.done = true;
             segment.holders.clear();
             let start = segment.first - rows.start;
-            segment.cost = share(cost, start..start + segment.count, lease.row_count);
+            segment.cost = cost_share(cost, start..start + segment.count, lease.row_count);
             self.rows_done += segment.count;
             fresh.push(segment.first..segment.first + segment.count);
         }
         self.refusals.clear();
         fresh.sort_unstable_by_key(|rows| rows.start);
-        fresh.dedup_by(|next, run| {
-            let adjoins = run.end == next.start;
+        fresh.dedup_by(|next, range| {
+            let adjoins = range.end == next.start;
             if adjoins {
-                run.end = next.end;
+                range.end = next.end;
             }
             adjoins
         });
         fresh
     }
 
-    /// Done segments of which rows have left the picture go to the front of the queue, in order. Returns their numbers.
+    /// Requeues done segments that overlap rejected rows, in order, at the front. Returns their numbers.
     pub(super) fn reject(&mut self, rows: Range<u32>) -> Vec<u32> {
         let hit = |s: &Segment| s.done && s.first < rows.end && rows.start < s.first + s.count;
         let numbers: Vec<u32> = self.segments.iter().filter(|(_, s)| hit(s)).map(|(&n, _)| n).collect();
@@ -201,36 +202,46 @@ impl Frame {
                 continue;
             };
             self.rows_done -= count;
-            self.queue.push_front(Run { first, count, came_back: Some((number, next_attempt)), halved });
+            self.queue.push_front(RowRange {
+                first,
+                count,
+                requeued_as: Some((number, next_attempt)),
+                halved,
+            });
         }
         numbers
     }
 
-    /// Makes a segment of a run in the queue.
-    fn settle(&mut self, index: usize) {
-        let Some(Run { first, count, came_back, halved }) = self.queue.remove(index) else { return };
-        let (number, next_attempt) = came_back.unwrap_or_else(|| (self.next_number(), 0));
+    /// Makes a segment of the queued range at `index`.
+    fn promote(&mut self, index: usize) {
+        let Some(RowRange { first, count, requeued_as, halved }) = self.queue.remove(index) else { return };
+        let (number, next_attempt) = requeued_as.unwrap_or_else(|| (self.next_number(), 0));
         let (holders, cost) = (BTreeSet::new(), Cost::default());
         let segment = Segment { first, count, next_attempt, halved, holders, done: false, cost };
         self.segments.insert(number, segment);
     }
 
-    /// Takes a segment from a worker; rows that nobody else renders go back to the front of the queue.
-    pub(super) fn give_up(&mut self, number: u32, worker: WorkerId) {
+    /// Removes a holder of a segment; rows without another holder go back to the front of the queue.
+    pub(super) fn release(&mut self, number: u32, worker: WorkerId) {
         let Some(segment) = self.segments.get_mut(&number) else { return };
         segment.holders.remove(&worker);
         if segment.done || !segment.holders.is_empty() {
             return;
         }
         if let Some(Segment { first, count, next_attempt, halved, .. }) = self.segments.remove(&number) {
-            self.queue.push_front(Run { first, count, came_back: Some((number, next_attempt)), halved });
+            self.queue.push_front(RowRange {
+                first,
+                count,
+                requeued_as: Some((number, next_attempt)),
+                halved,
+            });
         }
     }
 }
 
-/// The part of a lease's cost that belongs to some of its `rows` rows. Parts of adjoining ranges sum to the whole: a lease may be
-/// answered after its rows were divided.
-fn share(cost: Cost, range: Range<u32>, rows: u32) -> Cost {
+/// The part of a lease's cost that belongs to a range of its `rows` rows. Parts of adjoining ranges sum to the whole: the
+/// rows of a lease may have been divided before it is answered.
+fn cost_share(cost: Cost, range: Range<u32>, rows: u32) -> Cost {
     let up_to = |whole: u64, row: u32| u128::from(whole) * u128::from(row) / u128::from(rows.max(1));
     let part = |whole: u64| {
         let part = up_to(whole, range.end) - up_to(whole, range.start);
@@ -247,13 +258,13 @@ fn share(cost: Cost, range: Range<u32>, rows: u32) -> Cost {
     }
 }
 
-/// The first `rows` rows of a run, and what is left of it. Pieces of a segment are new segments.
-fn cut(run: Run, rows: u32) -> (Run, Option<Run>) {
-    if run.count <= rows {
-        return (run, None);
+/// Cuts a range after `rows` rows. Pieces of a former segment become new segments.
+fn cut(range: RowRange, rows: u32) -> (RowRange, Option<RowRange>) {
+    if range.count <= rows {
+        return (range, None);
     }
-    let first = Run { count: rows, came_back: None, ..run };
-    let rest = Run { first: run.first + rows, count: run.count - rows, came_back: None, ..run };
+    let first = RowRange { count: rows, requeued_as: None, ..range };
+    let rest = RowRange { first: range.first + rows, count: range.count - rows, requeued_as: None, ..range };
     (first, Some(rest))
 }
 

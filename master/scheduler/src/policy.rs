@@ -1,42 +1,38 @@
-//! How a frame is cut into segments.
+//! Segment policies: how a frame is cut into segments.
 
 use std::fmt;
 use std::str::FromStr;
 
-use super::frame::Run;
+use super::frame::RowRange;
 
-/// Leases that a worker holds under the seed's policies: one to render and one to go on with.
-pub(super) const SEED_WINDOW: usize = 2;
-/// Leases that a worker ever holds.
-pub(super) const MAX_WINDOW: usize = 64;
-
-/// How a frame is cut into segments. Written `static:ROWS`, `smart:ROWS` or `adaptive` on the command line.
+/// Policy that cuts a frame into segments; `static:ROWS`, `smart:ROWS` or `adaptive` on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum SegmentPolicy {
-    /// Segments of so many rows, in order. At the end, idle workers repeat what others still hold.
+    /// Segments of this number of rows, in order. At a frame's end, idle workers render segments again that others
+    /// still hold.
     Static(u32),
-    /// As `Static`, with the last n_workers / 2 segments halved.
+    /// As `Static`, with the last `workers / 2` segments halved.
     Smart(u32),
     /// Segments of equal predicted time, from the last frame's cost per row and each worker's measured speed.
     #[default]
     Adaptive,
 }
 
-/// Why a text names no policy.
+/// A text that names no policy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{text:?} is no segment policy: expected static:ROWS, smart:ROWS (ROWS at least 1) or adaptive")]
+#[error("{text:?} is not a segment policy: expected static:ROWS, smart:ROWS (ROWS at least 1) or adaptive")]
 pub struct PolicyError {
     text: String,
 }
 
 impl SegmentPolicy {
-    /// How a frame's rows are queued when it begins.
-    pub(super) fn runs(self, height: u32, max_rows: u32) -> impl Iterator<Item = Run> {
+    /// Row ranges that are queued when a frame of `height` rows begins.
+    pub(super) fn ranges(self, height: u32, max_rows: u32) -> impl Iterator<Item = RowRange> {
         let rows = match self {
             Self::Static(rows) | Self::Smart(rows) => rows.clamp(1, max_rows),
             Self::Adaptive => height.max(1),
         };
-        (0..height).step_by(rows as usize).map(move |first| Run::new(first, rows.min(height - first)))
+        (0..height).step_by(rows as usize).map(move |first| RowRange::new(first, rows.min(height - first)))
     }
 }
 
@@ -70,7 +66,7 @@ mod tests {
     use super::*;
 
     fn counts(policy: SegmentPolicy, height: u32, max_rows: u32) -> Vec<u32> {
-        policy.runs(height, max_rows).map(|run| run.count).collect()
+        policy.ranges(height, max_rows).map(|range| range.count).collect()
     }
 
     #[test]
@@ -82,14 +78,14 @@ mod tests {
     }
 
     #[test]
-    fn a_policy_reads_back_as_it_is_written() {
+    fn a_policy_parses_back_from_its_display() {
         for policy in [SegmentPolicy::Static(1), SegmentPolicy::Smart(24), SegmentPolicy::Adaptive] {
             assert_eq!(policy.to_string().parse(), Ok(policy));
         }
     }
 
     #[test]
-    fn what_is_no_policy_is_refused_by_name() {
+    fn an_invalid_policy_is_refused_and_quoted() {
         for text in
             ["", "static", "static:", "static:0", "smart:-1", "adaptive:8", "Static:8", "static:4294967296"]
         {

@@ -1,4 +1,4 @@
-//! What can be seen of the scheduler from outside: for overlays and commands, never for its own decisions.
+//! Read-only views of the scheduler for overlays and commands. Decisions never use them.
 
 use std::fmt;
 use std::time::Duration;
@@ -6,31 +6,31 @@ use std::time::Duration;
 use super::worker::{Service, Worker};
 use super::{FrameId, Scheduler, WorkerId};
 
-/// A worker's record.
+/// Record of one worker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorkerRecord {
-    /// Which worker.
+    /// The worker.
     pub worker: WorkerId,
-    /// Segments it has finished.
+    /// Segments that it has finished.
     pub segments_done: u64,
-    /// Rows of average cost that it delivers each second; 0 before that is known.
+    /// Speed in rows of average cost per second; 0 before it is measured.
     pub speed: f64,
-    /// Whether it is given work, and why not.
+    /// Whether it gets leases, or why not.
     pub state: WorkerState,
 }
 
-/// Whether a worker is given work, and why not.
+/// Whether a worker gets leases, or why not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkerState {
-    /// It is given leases.
+    /// It gets leases.
     Working,
-    /// Somebody at the master wants it to pause: it keeps what it holds and gets nothing more.
+    /// It is paused: it finishes its leases and gets no more.
     Paused,
-    /// It finishes what it holds, and then leaves.
+    /// It finishes its leases and is then disconnected.
     Draining,
-    /// It could not render a frame, and is tried again later.
+    /// It could not render a frame or a lease was overdue, and it backs off for a while.
     Resting,
-    /// It leaves a question unanswered, and may be dead.
+    /// A ping is unanswered: it may be dead.
     Silent,
 }
 
@@ -46,10 +46,10 @@ impl fmt::Display for WorkerState {
     }
 }
 
-/// How far the oldest frame in flight is.
+/// Progress of the oldest frame in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Which frame.
+    /// The frame.
     pub frame: FrameId,
     /// Its finished rows.
     pub rows_done: u32,
@@ -58,20 +58,20 @@ pub struct Progress {
 }
 
 impl Worker {
-    /// Why it gets no leases, or that it does. What somebody wants comes before what has happened to it.
+    /// Its state; what users have set takes precedence over its liveness.
     fn state(&self, now: Duration) -> WorkerState {
         match self.service {
             Service::Draining => WorkerState::Draining,
             Service::Paused => WorkerState::Paused,
             Service::Active if self.is_suspect(now) => WorkerState::Silent,
-            Service::Active if self.rested_at(now).is_some() => WorkerState::Resting,
+            Service::Active if self.backoff_until(now).is_some() => WorkerState::Resting,
             Service::Active => WorkerState::Working,
         }
     }
 }
 
 impl Scheduler {
-    /// Every worker's record, in the order in which they joined.
+    /// Records of all workers, in the order in which they joined.
     pub fn workers(&self) -> impl Iterator<Item = WorkerRecord> {
         self.workers.iter().map(|(&worker, known)| WorkerRecord {
             worker,
@@ -81,7 +81,7 @@ impl Scheduler {
         })
     }
 
-    /// How far the oldest frame in flight is; `None` when there is nothing to render.
+    /// Progress of the oldest frame in flight; `None` when none is.
     pub fn progress(&self) -> Option<Progress> {
         let frame = self.frames.front()?;
         Some(Progress { frame: frame.id, rows_done: frame.rows_done, rows: frame.height })

@@ -1,4 +1,4 @@
-//! Scenarios: what the scheduler does, action by action. The language of the scripts is told in `transcript`.
+//! Scenarios of policies, timeouts and requests, action by action. `transcript` describes the scripts.
 
 use super::transcript::{expect, transcript};
 
@@ -64,7 +64,7 @@ fn smart_halves_the_last_segments() {
 }
 
 #[test]
-fn a_lost_workers_rows_go_first_to_those_who_stay() {
+fn rows_of_a_lost_worker_are_requeued_at_the_front() {
     let script = "
         0 join 1 1
         0 join 2 1
@@ -105,7 +105,7 @@ fn a_lost_workers_rows_go_first_to_those_who_stay() {
 }
 
 #[test]
-fn the_last_worker_leaves_and_the_next_one_finishes() {
+fn a_new_worker_finishes_the_frame_of_the_last_one() {
     let script = "
         0 frame 1 10x20
         0 join 1 1
@@ -135,7 +135,7 @@ fn the_last_worker_leaves_and_the_next_one_finishes() {
 }
 
 #[test]
-fn a_worker_that_cannot_rests_and_is_told_of_the_frame_again() {
+fn a_failing_worker_backs_off_and_gets_the_frame_announced_again() {
     let script = "
         0 join 1 1
         0 frame 1 10x10
@@ -165,7 +165,7 @@ fn a_worker_that_cannot_rests_and_is_told_of_the_frame_again() {
 }
 
 #[test]
-fn a_silent_worker_is_asked_and_then_dismissed() {
+fn a_silent_worker_is_pinged_and_then_disconnected() {
     let script = "
         0 join 1 1
         0 join 2 1
@@ -182,7 +182,7 @@ fn a_silent_worker_is_asked_and_then_dismissed() {
     let log = transcript("static:10", script);
     let end = log.split("> 8001 pong 2 7\n").nth(1).unwrap();
     let expected = "> 10000 wake
-1: goodbye, it has given no sign of life for 10 s
+1: disconnect (reconnect now), it has been silent for 10 s
 2: ping 8
 2: render 1.0 (attempt 1), rows 0+10
 ";
@@ -190,7 +190,7 @@ fn a_silent_worker_is_asked_and_then_dismissed() {
 }
 
 #[test]
-fn a_suspect_gets_nothing_new_until_it_gives_a_sign_of_life() {
+fn a_suspect_worker_gets_no_leases_until_it_is_heard() {
     let script = "
         0 join 1 1
         0 join 2 1
@@ -236,13 +236,13 @@ fn a_suspect_gets_nothing_new_until_it_gives_a_sign_of_life() {
 }
 
 #[test]
-fn nobody_is_dismissed_for_the_masters_own_absence() {
+fn no_worker_is_disconnected_for_a_pause_of_the_master() {
     let log = transcript("static:10", "0 join 1 1\n0 frame 1 10x10\n60000 wake\n60100 done 1 1.0");
-    assert!(!log.contains("goodbye") && log.contains("finished 1"), "{log}");
+    assert!(!log.contains("disconnect") && log.contains("finished 1"), "{log}");
 }
 
 #[test]
-fn the_latest_request_replaces_the_one_that_waits() {
+fn the_latest_request_replaces_the_waiting_one() {
     let script = "
         0 frame 1 10x10
         0 frame 2 10x10
@@ -258,7 +258,7 @@ fn the_latest_request_replaces_the_one_that_waits() {
         begin 1
         > 0 frame 2 10x10
         > 0 frame 3 10x10
-        forget 2
+        drop 2
         > 0 join 1 1
         1: frame 1
         1: render 1.0, rows 0+10
@@ -273,12 +273,12 @@ fn the_latest_request_replaces_the_one_that_waits() {
 }
 
 #[test]
-fn what_is_given_up_is_cancelled_at_once() {
+fn leases_of_dropped_requests_are_cancelled_at_once() {
     let script = "
         0 join 1 1
         0 frame 1 10x10
         0 frame 2 10x10
-        1 give-up 3
+        1 drop-requests 3
         1 frame 3 20x10
         5 done 1 1.0
         9 done 1 3.0";
@@ -292,9 +292,9 @@ fn what_is_given_up_is_cancelled_at_once() {
         1: frame 1
         1: render 1.0, rows 0+10
         > 0 frame 2 10x10
-        > 1 give-up 3
-        forget 1
-        forget 2
+        > 1 drop-requests 3
+        drop 1
+        drop 2
         1: cancel before 3
         > 1 frame 3 20x10
         begin 3
@@ -334,7 +334,7 @@ fn under_adaptive_idle_workers_begin_the_next_frame() {
         2: render 1.3, rows 3+1
         > 0 frame 2 10x4
         > 1 frame 3 10x4
-        forget 2
+        drop 2
         > 5 done 1 1.0
         begin 3
         1: frame 3

@@ -1,40 +1,33 @@
-//! Who renders a segment the second time: drawn with the secret of the run, when its pixels are here.
+//! Draws the second renderer of a segment with the secret key of the run, when its pixels arrive.
 //!
-//! A worker that sends wrong pixels may have accomplices that confirm them. So the second rendering is another
-//! machine's, where there is one; which one is drawn, and no worker can ask for it; and a share of the segments is
-//! traced by the master, so that a farm of accomplices alone is found as well. Machines count once, however many workers
-//! they run.
+//! Colluding workers confirm each other's wrong pixels. So the second rendering goes to another host, where one is
+//! ready; the host is drawn, and no worker can request it; and a share of the segments goes to the master, which detects
+//! collusion of the whole farm. Each host counts once, however many workers it runs.
 
 use std::collections::BTreeMap;
 
-use super::audits::Stage;
+use super::verification::{MAX_FOR_MASTER, SecondRenderer, Stage};
 use super::{FrameId, HostId, Scheduler, WorkerId};
 
-/// The share of the second renderings that is the master's, in per cent.
+/// The master's share of the second renderings, in per cent.
 const MASTER_PERCENT: u8 = 25;
-/// Second renderings that wait for the master; of more, those with the lowest lots stay.
-pub(super) const MAX_FOR_MASTER: usize = 8;
-/// The weight of a host of average speed; slow and fast ones have a quarter and twice as much at the utmost, so that no
-/// claim of speed attracts all second renderings.
-const WEIGHT: f64 = 16.0;
-
-/// Who renders a segment again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Second {
-    /// A worker.
-    Worker(WorkerId),
-    /// The master itself.
-    Master,
-}
+/// Weight of a host of average speed. Weights range from a quarter to twice of it, so that a host with a false speed
+/// cannot attract all second renderings.
+const MEAN_WEIGHT: f64 = 16.0;
 
 impl Scheduler {
-    /// Draws who renders again what `first` has rendered on its host.
-    pub(super) fn draw_second(&mut self, first: WorkerId, host: HostId, except: Option<WorkerId>) -> Second {
-        let is_masters = self.audits.lots.hits(MASTER_PERCENT);
-        if is_masters && self.audits.waiting_for_master() < MAX_FOR_MASTER {
-            return Second::Master;
+    /// Draws the second renderer of a segment that `first` rendered on `host`, other than `except`.
+    pub(super) fn draw_second_renderer(
+        &mut self,
+        first: WorkerId,
+        host: HostId,
+        except: Option<WorkerId>,
+    ) -> SecondRenderer {
+        let for_master = self.verifications.rng.chance(MASTER_PERCENT);
+        if for_master && self.verifications.waiting_for_master() < MAX_FOR_MASTER {
+            return SecondRenderer::Master;
         }
-        self.draw_worker(first, host, except).map_or(Second::Master, Second::Worker)
+        self.draw_worker(first, host, except).map_or(SecondRenderer::Master, SecondRenderer::Worker)
     }
 
     fn draw_worker(&mut self, first: WorkerId, host: HostId, except: Option<WorkerId>) -> Option<WorkerId> {
@@ -49,43 +42,45 @@ impl Scheduler {
             *speed = worker.speed.value().into_iter().chain(*speed).reduce(f64::max);
             ids.push(id);
         }
-        // Accomplices of one machine would confirm each other.
+        // Workers of one host may collude.
         if hosts.keys().any(|known| *known != host) {
             hosts.remove(&host);
         }
         let speeds: Vec<f64> = hosts.values().filter_map(|(speed, _)| *speed).collect();
         let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
-        let weight = |speed: f64| (WEIGHT * speed / mean).clamp(WEIGHT / 4.0, WEIGHT * 2.0);
+        let weight = |speed: f64| (MEAN_WEIGHT * speed / mean).clamp(MEAN_WEIGHT / 4.0, MEAN_WEIGHT * 2.0);
         let weights: Vec<u64> =
-            hosts.values().map(|(speed, _)| speed.map_or(WEIGHT, weight).max(1.0) as u64).collect();
-        let drawn = self.audits.lots.pick(&weights)?;
+            hosts.values().map(|(speed, _)| speed.map_or(MEAN_WEIGHT, weight).max(1.0) as u64).collect();
+        let drawn = self.verifications.rng.pick_weighted(&weights)?;
         let (_, ids) = hosts.into_values().nth(drawn)?;
-        let among = self.audits.lots.pick(&vec![1; ids.len()])?;
+        let among = self.verifications.rng.pick_weighted(&vec![1; ids.len()])?;
         ids.get(among).copied()
     }
 
-    /// A worker renders nothing for now: what it was to render again is drawn anew.
-    pub(super) fn draw_anew(&mut self, id: WorkerId) {
-        let waits = |stage| stage == Stage::Waiting(Second::Worker(id));
-        let keys: Vec<_> =
-            self.audits.open.iter().filter(|(_, audit)| waits(audit.stage)).map(|(&key, _)| key).collect();
-        keys.into_iter().for_each(|key| self.draw_anew_of(key, id));
+    /// Draws new second renderers for verifications that wait for a worker which gets no leases at present.
+    pub(super) fn redraw_second_renderers(&mut self, id: WorkerId) {
+        let waits = |stage| stage == Stage::Waiting(SecondRenderer::Worker(id));
+        let waiting = self.verifications.pending.iter().filter(|(_, pending)| waits(pending.stage));
+        let keys: Vec<_> = waiting.map(|(&key, _)| key).collect();
+        keys.into_iter().for_each(|key| self.redraw_second_renderer(key, id));
     }
 
-    /// A lease of a second rendering was taken from a worker: it is drawn anew.
-    pub(super) fn reopen_audit(&mut self, id: WorkerId, key: (FrameId, u32)) {
-        if self.audits.open.get(&key).is_some_and(|audit| audit.stage == Stage::Leased(id)) {
-            self.draw_anew_of(key, id);
+    /// Draws a new second renderer for a verification whose lease was revoked.
+    pub(super) fn reopen_verification(&mut self, id: WorkerId, key: (FrameId, u32)) {
+        let pending = self.verifications.pending.get(&key);
+        if pending.is_some_and(|pending| pending.stage == Stage::Leased(id)) {
+            self.redraw_second_renderer(key, id);
         }
     }
 
-    fn draw_anew_of(&mut self, key: (FrameId, u32), except: WorkerId) {
-        let Some((first, host)) = self.audits.open.get(&key).map(|audit| (audit.painter, audit.host)) else {
+    fn redraw_second_renderer(&mut self, key: (FrameId, u32), except: WorkerId) {
+        let pending = self.verifications.pending.get(&key);
+        let Some((first, host)) = pending.map(|pending| (pending.first, pending.first_host)) else {
             return;
         };
-        let second = self.draw_second(first, host, Some(except));
-        if let Some(audit) = self.audits.open.get_mut(&key) {
-            audit.stage = Stage::Waiting(second);
+        let second = self.draw_second_renderer(first, host, Some(except));
+        if let Some(pending) = self.verifications.pending.get_mut(&key) {
+            pending.stage = Stage::Waiting(second);
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Scenarios of workers that are to wait or to leave.
+//! Scenarios of paused and draining workers.
 
 use super::transcript::expect;
 
 #[test]
-fn a_draining_worker_finishes_what_it_has() {
+fn a_draining_worker_finishes_its_leases() {
     let script = "
         0 join 1 1
         0 frame 1 10x30
@@ -25,7 +25,7 @@ fn a_draining_worker_finishes_what_it_has() {
         > 1 drain 1
         > 2 done 1 1.0
         > 3 done 1 1.1
-        1: goodbye for good, it drains, and has finished its segments
+        1: disconnect (reconnect never), it drains and holds no more leases
         > 4 join 2 1
         2: frame 1
         2: render 1.2, rows 20+10
@@ -35,12 +35,12 @@ fn a_draining_worker_finishes_what_it_has() {
 }
 
 #[test]
-fn a_worker_that_shall_leave_is_told_and_goes_when_it_has_finished() {
+fn a_drain_request_notifies_the_worker_and_ends_with_its_leases() {
     let script = "
         0 join 1 1
         0 frame 1 10x30
-        1 retire 1
-        1 retire 1
+        1 request-drain 1
+        1 request-drain 1
         1 resume 1
         2 done 1 1.0
         3 done 1 1.1";
@@ -54,18 +54,18 @@ fn a_worker_that_shall_leave_is_told_and_goes_when_it_has_finished() {
         1: frame 1
         1: render 1.0, rows 0+10
         1: render 1.1, rows 10+10
-        > 1 retire 1
+        > 1 request-drain 1
         1: drain
-        > 1 retire 1
+        > 1 request-drain 1
         > 1 resume 1
         > 2 done 1 1.0
         > 3 done 1 1.1
-        1: goodbye for good, it drains, and has finished its segments",
+        1: disconnect (reconnect never), it drains and holds no more leases",
     );
 }
 
 #[test]
-fn a_paused_worker_gets_nothing_new_and_others_may_repeat_what_it_holds() {
+fn a_paused_worker_gets_no_leases_and_its_segments_get_backup_tasks() {
     let script = "
         0 join 1 1
         0 frame 1 10x30

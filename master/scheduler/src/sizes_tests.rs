@@ -1,4 +1,4 @@
-//! How many rows whom: in proportion to speed, on tile boundaries, within what a message holds; and pictures of several sizes.
+//! Sizes of leases (in proportion to speed, on tile boundaries, within the limit of a message) and of pictures.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -10,15 +10,15 @@ fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
     let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
     let rows = drive_two(&mut scheduler, [1, 4], 6);
     let last: Vec<u32> = rows.last().copied().unwrap().into();
-    assert!(last[1] > 2 * last[0], "rows of the worker and of one four times as fast, by frame: {rows:?}");
+    assert!(last[1] > 2 * last[0], "rows of workers of speed 1 and 4, by frame: {rows:?}");
 }
 
 fn joined(worker: u64) -> Event {
     Event::WorkerJoined { worker: WorkerId(worker), threads: 1, host: HostId(worker.into()) }
 }
 
-/// Renders frames of 512 rows with two workers whose speeds, in rows a millisecond, are given. Returns the rows
-/// that each did, by frame.
+/// Renders frames of 512 rows with two workers; `speeds` are in rows per millisecond. Returns the rows of each worker,
+/// by frame.
 fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u32; 2]> {
     for worker in [0, 1] {
         scheduler.handle(Duration::ZERO, joined(worker));
@@ -48,7 +48,7 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
                     .map(|lease| busy_until_us[w] + u64::from(lease.row_count * 1000 / speeds[w]))
             };
             let next = [0, 1].into_iter().filter_map(|w| Some((ends_us(w)?, w))).min();
-            let (at_us, w) = next.expect("rows are left and nobody renders");
+            let (at_us, w) = next.expect("rows are left and no worker renders");
             let lease = queues[w].remove(0);
             (now_us, busy_until_us[w]) = (at_us, at_us);
             done[w] += lease.row_count;
@@ -63,7 +63,7 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
 }
 
 #[test]
-fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
+fn a_lease_never_exceeds_the_bytes_of_a_message() {
     for policy in ["static:1000", "smart:1000", "adaptive"] {
         let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000);
         scheduler.handle(Duration::ZERO, joined(1));
@@ -77,7 +77,7 @@ fn a_lease_never_asks_for_more_bytes_than_a_message_holds() {
     }
 }
 
-/// What begins and what is complete, in turn, when frames 4 and 5 are asked for at once.
+/// The order in which frames begin and complete when frames 4 and 5 are requested at once.
 fn begun_and_done(second: (u32, u32)) -> Vec<Action> {
     let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
     drive_two(&mut scheduler, [1, 2], 3);
@@ -85,11 +85,11 @@ fn begun_and_done(second: (u32, u32)) -> Vec<Action> {
     for (frame, (width, height)) in [(4, (64, 512)), (5, second)] {
         scheduler.handle(now, Event::FrameRequested { frame: FrameId(frame), width, height, tile_rows: 16 });
     }
-    let (mut held, mut log) = (VecDeque::new(), Vec::new());
+    let (mut granted, mut log) = (VecDeque::new(), Vec::new());
     loop {
         while let Some(action) = scheduler.poll_action() {
             match action {
-                Action::Grant { worker, lease } => held.push_back((worker, lease)),
+                Action::Grant { worker, lease } => granted.push_back((worker, lease)),
                 Action::BeginFrame { .. } => log.push(action),
                 Action::FrameDone { frame, .. } => {
                     log.push(Action::FrameDone { frame, cost: Cost::default(), elapsed: Duration::ZERO });
@@ -97,16 +97,16 @@ fn begun_and_done(second: (u32, u32)) -> Vec<Action> {
                 _ => {}
             }
         }
-        let Some((worker, lease)) = held.pop_front() else { return log };
+        let Some((worker, lease)) = granted.pop_front() else { return log };
         now += Duration::from_millis(lease.row_count.into());
         let cost = Cost { trace_ns: u64::from(lease.row_count) * 1_000_000, ..Cost::default() };
         scheduler.handle(now, Event::SegmentDone { worker, lease, cost });
     }
 }
 
-/// The size may change from frame to frame: the frame on the way is completed, and the next begins after it.
+/// The size may change from frame to frame: the next frame then begins after the frame in flight is complete.
 #[test]
-fn another_size_begins_after_the_frame_on_the_way_and_not_beside_it() {
+fn a_frame_of_another_size_is_not_pipelined() {
     let begun = |frame| Action::BeginFrame { frame: FrameId(frame) };
     let done =
         |frame| Action::FrameDone { frame: FrameId(frame), cost: Cost::default(), elapsed: Duration::ZERO };
@@ -116,7 +116,7 @@ fn another_size_begins_after_the_frame_on_the_way_and_not_beside_it() {
     assert_eq!(begun_and_done((64, 512)), [begun(4), begun(5), done(4), done(5)]);
 }
 
-/// Half as wide a row is half the work: a worker's speed is known in the rows of the next frame before it has rendered one.
+/// A row of half the width is half the work, so speeds in rows double before the first lease of the next frame.
 #[test]
 fn speeds_follow_the_width() {
     let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);

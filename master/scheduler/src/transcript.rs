@@ -1,22 +1,30 @@
-//! Scripts and transcripts: what is told to the scheduler (`>`), and exactly what it answers.
+//! Scripts and transcripts: events into the scheduler (`>`) and the exact actions that follow.
 //!
-//! A line of a script is `MILLISECONDS COMMAND`: `frame N WxH`, `join W THREADS [HOST]` (without it, a host of its own), `leave W`, `drain W`,
-//! `retire W` (the user wants it to drain), `pause W`, `resume W`, `done W FRAME.SEGMENT`, `fail W FRAME`, `pong W NONCE`, `wake`,
-//! `verified W FRAME.SEGMENT same|different`, `judged FRAME.SEGMENT right|wrong right|wrong` (painter, checker),
-//! `reject FRAME FIRST+ROWS`. After the policy, `, verify PERCENT SEED` may stand.
+//! A line of a script is `MILLISECONDS COMMAND`. Commands, with `W` a worker's number:
+//!
+//! - `frame N WxH`, `drop-requests NEXT`
+//! - `join W THREADS [HOST]` (by default each worker has a host of its own), `leave W`
+//! - `drain W` (by the worker), `request-drain W` (by the master's user), `pause W`, `resume W`
+//! - `done W FRAME.SEGMENT`, `fail W FRAME`, `reject FRAME FIRST+ROWS`
+//! - `verified W FRAME.SEGMENT same|different`, `arbitrated FRAME.SEGMENT right|wrong right|wrong` (first, second)
+//! - `pong W NONCE`, `wake`
+//!
+//! The policy may be followed by `, verify PERCENT KEY`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use super::{Action, Cost, Event, Finding, FrameId, HostId, Lease, Return, Scheduler, Verdict, WorkerId};
+use super::{
+    Action, ArbiterResult, Cost, Event, Finding, FrameId, HostId, Lease, Reconnect, Scheduler, WorkerId,
+};
 
-/// Runs a script and writes the transcript.
+/// Runs a script and returns the transcript.
 pub(super) fn transcript(policy: &str, script: &str) -> String {
     let (policy, verify) = policy.split_once(", verify ").unwrap_or((policy, "0 0"));
-    let (percent, seed) = verify.split_once(' ').unwrap();
+    let (percent, key) = verify.split_once(' ').unwrap();
     let scheduler = Scheduler::new(policy.parse().unwrap(), 1 << 20);
-    let mut scheduler = scheduler.with_verification(percent.parse().unwrap(), [seed.parse().unwrap(); 32]);
+    let mut scheduler = scheduler.with_verification(percent.parse().unwrap(), [key.parse().unwrap(); 32]);
     let mut granted = BTreeMap::new();
     let mut log = String::new();
     for line in script.lines().map(str::trim).filter(|line| !line.is_empty()) {
@@ -28,7 +36,7 @@ pub(super) fn transcript(policy: &str, script: &str) -> String {
             if let Action::Grant { worker, lease } | Action::Verify { worker, lease } = &action {
                 granted.insert((*worker, lease.frame, lease.segment), *lease);
             }
-            writeln!(log, "{}", spoken(&action)).unwrap();
+            writeln!(log, "{}", described(&action)).unwrap();
         }
     }
     log
@@ -44,7 +52,7 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             let (width, height) = pair(size, 'x');
             Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height, tile_rows: 8 }
         }
-        ["give-up", next] => Event::RequestsGivenUp { next: FrameId(number(next)) },
+        ["drop-requests", next] => Event::RequestsDropped { next: FrameId(number(next)) },
         ["join", _, threads] => {
             let host = HostId(1000 + u128::from(worker.0));
             Event::WorkerJoined { worker, threads: number(threads) as u32, host }
@@ -55,7 +63,7 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
         }
         ["leave", _] => Event::WorkerLeft { worker },
         ["drain", _] => Event::WorkerDrains { worker },
-        ["retire", _] => Event::DrainRequested { worker },
+        ["request-drain", _] => Event::DrainRequested { worker },
         ["pause", _] => Event::PauseRequested { worker },
         ["resume", _] => Event::ResumeRequested { worker },
         ["done", _, segment] => {
@@ -69,10 +77,11 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             let finding = if finding == "same" { Finding::Same } else { Finding::Different };
             Event::SegmentVerified { worker, lease, cost: Cost::default(), finding }
         }
-        ["judged", segment, painter, checker] => {
+        ["arbitrated", segment, first, second] => {
             let (frame, segment) = pair(segment, '.');
-            let verdict = Verdict { traced: true, painter: painter == "wrong", checker: checker == "wrong" };
-            Event::SegmentJudged { frame: FrameId(frame), segment, verdict }
+            let (first_differs, second_differs) = (first == "wrong", second == "wrong");
+            let result = ArbiterResult { rendered: true, first_differs, second_differs };
+            Event::SegmentArbitrated { frame: FrameId(frame), segment, result }
         }
         ["reject", frame, rows] => {
             let (first_row, row_count) = pair(rows, '+');
@@ -85,41 +94,40 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
     }
 }
 
-fn spoken(action: &Action) -> String {
+fn described(action: &Action) -> String {
     match action {
         Action::BeginFrame { frame } => format!("begin {}", frame.0),
         Action::FrameDone { frame, cost, elapsed } => {
             format!("finished {} after {} ms, {} rays", frame.0, elapsed.as_millis(), cost.primary)
         }
-        Action::FrameDropped { frame } => format!("forget {}", frame.0),
-        Action::FrameFailed { frame } => format!("give up {}", frame.0),
+        Action::FrameDropped { frame } => format!("drop {}", frame.0),
+        Action::FrameFailed { frame } => format!("fail {}", frame.0),
         Action::Announce { worker, frame } => format!("{}: frame {}", worker.0, frame.0),
         Action::Grant { worker, lease } => {
             let Lease { frame, segment, attempt, first_row, row_count } = lease;
             let again = if *attempt > 0 { format!(" (attempt {attempt})") } else { String::new() };
             format!("{}: render {}.{segment}{again}, rows {first_row}+{row_count}", worker.0, frame.0)
         }
-        Action::Seal { worker, lease } => {
+        Action::RecordDigest { worker, lease } => {
             let Lease { frame, segment, first_row, row_count, .. } = lease;
-            format!("seal {}.{segment}, rows {first_row}+{row_count} of {}", frame.0, worker.0)
+            format!("record digest {}.{segment}, rows {first_row}+{row_count} of {}", frame.0, worker.0)
         }
         Action::Verify { worker, lease } => {
             let Lease { frame, segment, first_row, row_count, .. } = lease;
             format!("{}: verify {}.{segment}, rows {first_row}+{row_count}", worker.0, frame.0)
         }
-        Action::Judge { frame, segment } => format!("judge {}.{segment}", frame.0),
-        Action::Unseal { frame, segment } => format!("unseal {}.{segment}", frame.0),
-        Action::Expel { worker, reason } => format!("{}: expelled, {reason}", worker.0),
+        Action::Arbitrate { frame, segment } => format!("arbitrate {}.{segment}", frame.0),
+        Action::DropDigest { frame, segment } => format!("drop digest {}.{segment}", frame.0),
+        Action::Ban { worker, reason } => format!("{}: ban, {reason}", worker.0),
         Action::Cancel { worker, before } => format!("{}: cancel before {}", worker.0, before.0),
         Action::Ping { worker, nonce } => format!("{}: ping {nonce}", worker.0),
-        Action::Dismiss { worker, reason, again: Return::Welcome } => {
-            format!("{}: goodbye, {reason}", worker.0)
-        }
-        Action::Dismiss { worker, reason, again: Return::NextMaster } => {
-            format!("{}: goodbye until the next master, {reason}", worker.0)
-        }
-        Action::Dismiss { worker, reason, again: Return::Unwanted } => {
-            format!("{}: goodbye for good, {reason}", worker.0)
+        Action::Disconnect { worker, reason, reconnect } => {
+            let reconnect = match reconnect {
+                Reconnect::Now => "now",
+                Reconnect::NextMaster => "to the next master",
+                Reconnect::Never => "never",
+            };
+            format!("{}: disconnect (reconnect {reconnect}), {reason}", worker.0)
         }
         Action::Drain { worker } => format!("{}: drain", worker.0),
     }

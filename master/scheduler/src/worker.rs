@@ -1,78 +1,77 @@
-//! One worker as the scheduler knows it: what it holds, how fast it is, whether it still answers.
+//! State of one worker: its leases, its speed, its liveness and back-off.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use super::assign::MAX_FRAMES;
-use super::audits::TRAILING_FRAMES;
-use super::held::Held;
+use super::active_lease::ActiveLease;
+use super::limits::{MAX_FRAMES, TRAILING_FRAMES};
 use super::speed::{Observation, Speed};
 use super::{Cost, FrameId, HostId, Lease};
 
-/// A worker is asked for a sign of life this often.
-pub(super) const PING_EVERY: Duration = Duration::from_secs(2);
-/// A worker that has given no sign of life for this long is lost.
-pub(super) const SILENCE_LIMIT: Duration = Duration::from_secs(10);
-/// A worker that leaves a ping unanswered for this long gets no more leases until it gives a sign of life.
-const SUSPICION: Duration = Duration::from_secs(1);
-/// The first rest of a worker that cannot render a frame; doubled with each failure in a row.
-const FIRST_REST: Duration = Duration::from_secs(1);
-/// The longest rest.
-const LONGEST_REST: Duration = Duration::from_secs(30);
-/// The first rest of a worker that was late; doubled with each time in a row.
-const FIRST_LATE_REST: Duration = Duration::from_millis(250);
-/// A lease is overdue when it takes longer, by this factor, than any lately did beyond their predictions, and at least
-/// by this time...
+/// Time between two pings of a worker.
+pub(super) const PING_INTERVAL: Duration = Duration::from_secs(2);
+/// A worker that is silent for this long is disconnected.
+pub(super) const SILENCE_TIMEOUT: Duration = Duration::from_secs(10);
+/// A worker that leaves a ping unanswered for this long is suspect: it gets no leases until it is heard again.
+const SUSPECT_AFTER: Duration = Duration::from_secs(1);
+/// First back-off of a worker that cannot render a frame; doubled with each consecutive failure.
+const FIRST_BACKOFF: Duration = Duration::from_secs(1);
+/// Longest back-off.
+const MAX_BACKOFF: Duration = Duration::from_secs(30);
+/// First back-off of a worker with an overdue lease; doubled with each consecutive timeout.
+const FIRST_LATE_BACKOFF: Duration = Duration::from_millis(250);
+/// The slack of a deadline is the largest of: the predicted time, times (this factor times the recent overrun factor,
+/// minus 1)...
 const SLACK_FACTOR: f64 = 1.25;
-const LEAST_SLACK: Duration = Duration::from_millis(5);
-/// ...and by this part of a frame, times the factor by which predictions have lately been wrong, up to a limit...
+const MIN_SLACK: Duration = Duration::from_millis(5);
+/// ...this part of a frame's time, times the recent overrun factor up to a limit...
 const SLACK_FRAMES: f64 = 0.3;
-const SLACK_SURPRISE: f64 = 4.0;
-/// ...and by so many round trips.
+const MAX_SLACK_OVERRUN: f64 = 4.0;
+/// ...this number of round trips; and [`MIN_SLACK`].
 const SLACK_ROUND_TRIPS: f64 = 4.0;
-/// Two in flight, and the complete ones that are verified.
+/// Frames that a worker keeps at a time: those in flight, and the complete ones that are being verified.
 const KNOWN_FRAMES: usize = MAX_FRAMES + TRAILING_FRAMES;
 
-/// What somebody wants of a worker.
+/// Service level that users and the worker have set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Service {
-    /// That it renders.
+    /// It gets leases.
     Active,
-    /// That it waits.
+    /// It gets no leases and stays connected.
     Paused,
-    /// That it leaves when it holds nothing any more.
+    /// It gets no leases, and is disconnected once it holds none.
     Draining,
 }
 
-/// A connected worker.
+/// State of a connected worker.
 #[derive(Debug)]
 pub(super) struct Worker {
     pub(super) threads: u32,
     pub(super) host: HostId,
-    pub(super) leases: BTreeMap<(FrameId, u32), Held>,
-    /// Leases that were taken from it because they were overdue: its answer is still welcome.
-    pub(super) owed: BTreeMap<(FrameId, u32), Held>,
-    /// Whether it renders rows of a frame that was given up meanwhile, and has yet to be told.
+    pub(super) leases: BTreeMap<(FrameId, u32), ActiveLease>,
+    /// Leases that were revoked because they were overdue. A late answer is still accepted.
+    pub(super) overdue: BTreeMap<(FrameId, u32), ActiveLease>,
+    /// Whether it may still render rows of a dropped lease, because the cancellation is not sent yet.
     pub(super) stale: bool,
-    /// Frames it has lately been told of: those in flight, and those of which rows are verified.
+    /// Frames that were announced to it most recently.
     announced: [Option<FrameId>; KNOWN_FRAMES],
     pub(super) service: Service,
     pub(super) speed: Speed,
     pub(super) segments_done: u64,
-    /// Smoothed round trip of pings, in seconds.
+    /// Smoothed round trip time of pings, in seconds.
     pub(super) round_trip: Option<f64>,
-    last_heard: Duration,
+    last_alive_at: Duration,
     pinged_at: Duration,
     open_ping: Option<u64>,
-    /// Since when it has been asked for a sign of life without giving one.
+    /// Time of the first ping since it was last heard.
     unanswered_since: Option<Duration>,
     last_done_at: Duration,
-    resting_until: Option<Duration>,
+    backoff_until: Option<Duration>,
     failures: u32,
-    /// Times in a row that it was late.
-    lapses: u32,
-    /// Since when it owes something without having given anything.
-    waited_for_since: Option<Duration>,
+    /// Consecutive timeouts.
+    timeouts: u32,
+    /// Since when it holds leases, or has overdue ones, without having finished any.
+    stalled_since: Option<Duration>,
 }
 
 impl Worker {
@@ -81,41 +80,41 @@ impl Worker {
             threads: threads.max(1),
             host,
             leases: BTreeMap::new(),
-            owed: BTreeMap::new(),
+            overdue: BTreeMap::new(),
             stale: false,
             announced: [None; KNOWN_FRAMES],
             service: Service::Active,
             speed: Speed::new(threads),
             segments_done: 0,
             round_trip: None,
-            last_heard: now,
+            last_alive_at: now,
             pinged_at: now,
             open_ping: None,
             unanswered_since: None,
             last_done_at: now,
-            resting_until: None,
+            backoff_until: None,
             failures: 0,
-            lapses: 0,
-            waited_for_since: None,
+            timeouts: 0,
+            stalled_since: None,
         }
     }
 
-    /// Whether it may be given leases.
+    /// Whether it may get leases.
     pub(super) fn is_ready(&self, now: Duration) -> bool {
-        self.service == Service::Active && !self.is_suspect(now) && self.rested_at(now).is_none()
+        self.service == Service::Active && !self.is_suspect(now) && self.backoff_until(now).is_none()
     }
 
-    /// Whether it may have died without a word.
+    /// Whether a ping is unanswered for longer than [`SUSPECT_AFTER`].
     pub(super) fn is_suspect(&self, now: Duration) -> bool {
-        self.unanswered_since.is_some_and(|since| since + SUSPICION <= now)
+        self.unanswered_since.is_some_and(|since| since + SUSPECT_AFTER <= now)
     }
 
-    /// When it becomes suspect, if it stays silent and is not suspect already.
+    /// When it becomes suspect if it stays silent; `None` if it is suspect already.
     pub(super) fn suspect_at(&self, now: Duration) -> Option<Duration> {
-        self.unanswered_since.map(|since| since + SUSPICION).filter(|&at| at > now)
+        self.unanswered_since.map(|since| since + SUSPECT_AFTER).filter(|&at| at > now)
     }
 
-    /// Whether it has yet to be told what `frame` shows; from now on it has been.
+    /// Returns whether `frame` must be announced to it first, and notes that it has been.
     pub(super) fn must_announce(&mut self, frame: FrameId) -> bool {
         if self.announced.contains(&Some(frame)) {
             return false;
@@ -125,167 +124,178 @@ impl Worker {
         true
     }
 
-    /// Writes a lease down.
-    pub(super) fn hold(&mut self, now: Duration, held: Held) {
-        self.leases.insert((held.lease.frame, held.lease.segment), held);
-        self.waited_for_since.get_or_insert(now);
+    /// Records a lease that was granted.
+    pub(super) fn record(&mut self, now: Duration, active: ActiveLease) {
+        self.leases.insert((active.lease.frame, active.lease.segment), active);
+        self.stalled_since.get_or_insert(now);
     }
 
-    /// Takes a finished lease off its list, or off the list of what it owes. Returns it with the work it turned out to
-    /// be, if that can be told.
+    /// Ends a lease that it has answered, active or overdue. Returns the lease with the actual work of its rows,
+    /// where that can be measured; `None` if there is no such lease.
     pub(super) fn finish(
         &mut self,
         now: Duration,
         lease: Lease,
         cost: Cost,
         half_life: Duration,
-    ) -> Option<(Held, Option<f64>)> {
+    ) -> Option<(ActiveLease, Option<f64>)> {
         let key = (lease.frame, lease.segment);
-        let is_held = self.leases.get(&key).is_some_and(|held| held.lease == lease);
-        let list = if is_held { &mut self.leases } else { &mut self.owed };
-        let held = *list.get(&key).filter(|held| held.lease == lease)?;
+        let is_held = self.leases.get(&key).is_some_and(|active| active.lease == lease);
+        let list = if is_held { &mut self.leases } else { &mut self.overdue };
+        let active = *list.get(&key).filter(|active| active.lease == lease)?;
         list.remove(&key);
-        self.heard(now);
-        (self.failures, self.lapses, self.resting_until) = (0, 0, None);
-        let measured = self.measure(now, &held, cost, half_life);
+        self.mark_alive(now);
+        (self.failures, self.timeouts, self.backoff_until) = (0, 0, None);
+        let measured = self.measure(now, &active, cost, half_life);
         self.segments_done += 1;
         self.last_done_at = now;
-        self.waited_for_since = (!self.leases.is_empty() || !self.owed.is_empty()).then_some(now);
-        Some((held, measured))
+        self.stalled_since = (!self.leases.is_empty() || !self.overdue.is_empty()).then_some(now);
+        Some((active, measured))
     }
 
-    /// The work that a segment turned out to be, on the scale of this worker's earlier ones.
-    fn measure(&mut self, now: Duration, held: &Held, cost: Cost, half_life: Duration) -> Option<f64> {
-        let held_for = now.saturating_sub(held.granted_at).as_secs_f64();
-        // No thread has traced for longer than the lease was held.
+    /// The actual work of a segment, on the scale of this worker's earlier segments.
+    fn measure(
+        &mut self,
+        now: Duration,
+        active: &ActiveLease,
+        cost: Cost,
+        half_life: Duration,
+    ) -> Option<f64> {
+        let held_for = now.saturating_sub(active.granted_at).as_secs_f64();
+        // No thread can have traced for longer than the lease was held.
         let traced =
             Duration::from_nanos(cost.trace_ns).as_secs_f64().min(held_for * f64::from(self.threads));
         let work = self.speed.of_thread().map(|rate| rate * traced).filter(|&work| work > 0.0);
-        // Its first segment waited for the scene, and one that it was given while it was idle for the network.
-        let had_work = self.segments_done > 0 && held.granted_at < self.last_done_at;
+        // Its first segment waited for the scene, and a segment that was granted while it was idle waited for the
+        // network.
+        let had_work = self.segments_done > 0 && active.granted_at < self.last_done_at;
         let busy = had_work.then(|| now.saturating_sub(self.last_done_at).as_secs_f64());
-        self.speed.observe(Observation { work: held.work, traced, busy }, half_life);
+        self.speed.observe(Observation { work: active.work, traced, busy }, half_life);
         work
     }
 
-    /// How late it may be with a lease that takes so long, where predictions have lately been wrong by a factor of
-    /// `surprise` and a frame is complete every so often: a third of a frame late is soon enough to act, where predictions
-    /// are right.
-    pub(super) fn slack(&self, takes: Duration, surprise: f64, every: Duration) -> Duration {
+    /// How much later than predicted a lease may finish: `takes` is its predicted time, `overrun` the recent
+    /// overrun factor, `frame_interval` the time between two complete frames. Where predictions are right, acting a
+    /// third of a frame late is early enough.
+    pub(super) fn slack(&self, takes: Duration, overrun: f64, frame_interval: Duration) -> Duration {
         let network = SLACK_ROUND_TRIPS * self.round_trip.unwrap_or(0.0);
         let slack =
-            Duration::try_from_secs_f64(network.max(takes.as_secs_f64() * (SLACK_FACTOR * surprise - 1.0)));
-        let frames = every.mul_f64(SLACK_FRAMES * surprise.clamp(1.0, SLACK_SURPRISE));
-        slack.unwrap_or(Duration::MAX).max(frames).max(LEAST_SLACK)
+            Duration::try_from_secs_f64(network.max(takes.as_secs_f64() * (SLACK_FACTOR * overrun - 1.0)));
+        let frames = frame_interval.mul_f64(SLACK_FRAMES * overrun.clamp(1.0, MAX_SLACK_OVERRUN));
+        slack.unwrap_or(Duration::MAX).max(frames).max(MIN_SLACK)
     }
 
-    /// When it gave its last answer, or joined.
+    /// When it finished its last lease, or joined.
     pub(super) fn last_done_at(&self) -> Duration {
         self.last_done_at
     }
 
-    /// When its first lease is overdue.
-    pub(super) fn overdue_at(&self) -> Option<Duration> {
-        self.leases.values().filter_map(|held| held.deadline).min()
+    /// When the first of its leases becomes overdue.
+    pub(super) fn next_deadline(&self) -> Option<Duration> {
+        self.leases.values().filter_map(|active| active.deadline).min()
     }
 
-    /// It is late: what it holds is taken from it, and it rests, unless it answers. Returns what it held.
-    pub(super) fn lapse(&mut self, now: Duration) -> Vec<(FrameId, u32)> {
-        if let Some(first) = self.leases.values().min_by_key(|held| held.deadline.unwrap_or(Duration::MAX)) {
+    /// Revokes all of its leases because one is overdue, and backs off until it answers. Returns the keys of the
+    /// leases.
+    pub(super) fn time_out(&mut self, now: Duration) -> Vec<(FrameId, u32)> {
+        if let Some(first) =
+            self.leases.values().min_by_key(|active| active.deadline.unwrap_or(Duration::MAX))
+        {
             let since = first.granted_at.max(self.last_done_at);
-            self.speed.miss(first.work, now.saturating_sub(since).as_secs_f64());
+            self.speed.observe_unfinished(first.work, now.saturating_sub(since).as_secs_f64());
         }
-        let rest = FIRST_LATE_REST.saturating_mul(1 << self.lapses.min(7)).min(LONGEST_REST);
-        self.lapses = self.lapses.saturating_add(1);
-        self.resting_until = self.resting_until.max(Some(now + rest));
-        let taken = std::mem::take(&mut self.leases);
-        let keys = taken.keys().copied().collect();
-        self.owed.extend(taken);
+        let backoff = FIRST_LATE_BACKOFF.saturating_mul(1 << self.timeouts.min(7)).min(MAX_BACKOFF);
+        self.timeouts = self.timeouts.saturating_add(1);
+        self.backoff_until = self.backoff_until.max(Some(now + backoff));
+        let revoked = std::mem::take(&mut self.leases);
+        let keys = revoked.keys().copied().collect();
+        self.overdue.extend(revoked);
         keys
     }
 
-    /// Since when it owes something without having given anything.
-    pub(super) fn waited_for_since(&self) -> Option<Duration> {
-        self.waited_for_since
+    /// Since when it holds leases, or has overdue ones, without having finished any.
+    pub(super) fn stalled_since(&self) -> Option<Duration> {
+        self.stalled_since
     }
 
-    /// Leases of frames before `before` are of no use any more, unless they verify. Whether it is to be told now: it is
-    /// not while it verifies rows of such a frame.
+    /// Drops its leases of frames before `before`, except second renderings. Returns whether to send the
+    /// cancellation now: not while it renders such a frame a second time.
     pub(super) fn cancel(&mut self, before: FrameId) -> bool {
-        self.keep(|frame, held| frame >= before || held.audit);
-        let tell = self.stale && !self.audits_before(before);
-        if tell {
-            self.told_to_cancel(before);
+        self.retain_leases(|frame, active| frame >= before || active.verifies);
+        let notify = self.stale && !self.verifies_before(before);
+        if notify {
+            self.mark_cancelled(before);
         }
-        tell
+        notify
     }
 
-    /// Whether it verifies rows of a frame before `before`.
-    pub(super) fn audits_before(&self, before: FrameId) -> bool {
-        let mut all = self.leases.values().chain(self.owed.values());
-        all.any(|held| held.audit && held.lease.frame < before)
+    /// Whether it renders rows of a frame before `before` a second time.
+    pub(super) fn verifies_before(&self, before: FrameId) -> bool {
+        let mut all = self.leases.values().chain(self.overdue.values());
+        all.any(|active| active.verifies && active.lease.frame < before)
     }
 
-    /// It is told to forget all frames before `before`: of any of them, it has to be told again.
-    pub(super) fn told_to_cancel(&mut self, before: FrameId) {
+    /// Notes that the cancellation of all frames before `before` is sent: the worker forgets their views.
+    pub(super) fn mark_cancelled(&mut self, before: FrameId) {
         self.stale = false;
         for known in &mut self.announced {
             known.take_if(|frame| *frame < before);
         }
     }
 
-    /// A lease is of no use any more.
+    /// Drops a lease that is not needed any more.
     pub(super) fn drop_lease(&mut self, key: (FrameId, u32)) {
-        self.keep(|frame, held| (frame, held.lease.segment) != key);
+        self.retain_leases(|frame, active| (frame, active.lease.segment) != key);
     }
 
-    /// Keeps some of what it holds and owes. It still renders the rest, until it is told. Whether there was any.
-    fn keep(&mut self, which: impl Fn(FrameId, &Held) -> bool) -> bool {
-        let count = |worker: &Self| worker.leases.len() + worker.owed.len();
-        let held = count(self);
-        self.leases.retain(|&(frame, _), held| which(frame, held));
-        self.owed.retain(|&(frame, _), held| which(frame, held));
+    /// Keeps the leases that match, active and overdue. The worker goes on rendering the others until it gets a
+    /// cancellation. Returns whether there were any.
+    fn retain_leases(&mut self, which: impl Fn(FrameId, &ActiveLease) -> bool) -> bool {
+        let count = |worker: &Self| worker.leases.len() + worker.overdue.len();
+        let before = count(self);
+        self.leases.retain(|&(frame, _), active| which(frame, active));
+        self.overdue.retain(|&(frame, _), active| which(frame, active));
         let left = count(self);
         if left == 0 {
-            self.waited_for_since = None;
+            self.stalled_since = None;
         }
-        self.stale |= left < held;
-        left < held
+        self.stale |= left < before;
+        left < before
     }
 
-    /// A frame is out of flight; whether it held some of it.
-    pub(super) fn forget(&mut self, frame: FrameId) -> bool {
-        self.keep(|known, _| known != frame)
+    /// Drops its leases of a frame that leaves flight. Returns whether there were any.
+    pub(super) fn drop_frame(&mut self, frame: FrameId) -> bool {
+        self.retain_leases(|known, _| known != frame)
     }
 
-    /// Nobody listened for a while: what it has not said does not count against it.
-    pub(super) fn excuse(&mut self, now: Duration) {
-        self.fed(now);
-        for held in self.leases.values_mut() {
-            (held.expected_at, held.deadline) = (None, None);
+    /// Counts it as alive now, and removes the deadlines of its leases, after a pause of the scheduler itself.
+    pub(super) fn reset_liveness(&mut self, now: Duration) {
+        self.touch(now);
+        for active in self.leases.values_mut() {
+            (active.expected_at, active.deadline) = (None, None);
         }
     }
 
-    /// Everything that it holds is taken from it for good.
-    pub(super) fn take_all(&mut self) -> BTreeMap<(FrameId, u32), Held> {
-        self.owed.clear();
-        self.waited_for_since = None;
+    /// Revokes all of its leases for good.
+    pub(super) fn revoke_all(&mut self) -> BTreeMap<(FrameId, u32), ActiveLease> {
+        self.overdue.clear();
+        self.stalled_since = None;
         std::mem::take(&mut self.leases)
     }
 
-    /// Its master sends it what it has asked for.
-    pub(super) fn fed(&mut self, now: Duration) {
-        self.heard(now);
-        self.waited_for_since = self.waited_for_since.map(|_| now);
+    /// Counts it as alive and not stalled: it is receiving assets.
+    pub(super) fn touch(&mut self, now: Duration) {
+        self.mark_alive(now);
+        self.stalled_since = self.stalled_since.map(|_| now);
     }
 
-    pub(super) fn heard(&mut self, now: Duration) {
-        self.last_heard = now;
+    pub(super) fn mark_alive(&mut self, now: Duration) {
+        self.last_alive_at = now;
         self.unanswered_since = None;
     }
 
     pub(super) fn pong(&mut self, now: Duration, nonce: u64) {
-        self.heard(now);
+        self.mark_alive(now);
         if self.open_ping.take_if(|open| *open == nonce).is_some() {
             let seconds = now.saturating_sub(self.pinged_at).as_secs_f64();
             self.round_trip = Some(self.round_trip.map_or(seconds, |old| 0.75 * old + 0.25 * seconds));
@@ -293,37 +303,37 @@ impl Worker {
     }
 
     /// When the next ping is due.
-    pub(super) fn ping_at(&self) -> Duration {
-        self.pinged_at + PING_EVERY
+    pub(super) fn next_ping_at(&self) -> Duration {
+        self.pinged_at + PING_INTERVAL
     }
 
-    pub(super) fn pinged(&mut self, now: Duration, nonce: u64) {
+    pub(super) fn mark_pinged(&mut self, now: Duration, nonce: u64) {
         (self.pinged_at, self.open_ping) = (now, Some(nonce));
         self.unanswered_since.get_or_insert(now);
     }
 
-    /// When it is lost, if it stays silent.
-    pub(super) fn lost_at(&self) -> Duration {
-        self.last_heard + SILENCE_LIMIT
+    /// When it is disconnected if it stays silent.
+    pub(super) fn silence_deadline(&self) -> Duration {
+        self.last_alive_at + SILENCE_TIMEOUT
     }
 
-    /// It cannot render: it rests, longer each time, and is told of its frames anew afterwards. Whether this is news: it
-    /// is not while it rests.
-    pub(super) fn fail(&mut self, now: Duration) -> bool {
-        self.heard(now);
-        if self.resting_until.is_some_and(|until| until > now) {
+    /// Backs off because it cannot render; each consecutive back-off is longer, and its frames are announced anew
+    /// afterwards. Returns `false` if it is backing off already.
+    pub(super) fn back_off(&mut self, now: Duration) -> bool {
+        self.mark_alive(now);
+        if self.backoff_until.is_some_and(|until| until > now) {
             return false;
         }
-        let rest = FIRST_REST.saturating_mul(1 << self.failures.min(5)).min(LONGEST_REST);
+        let backoff = FIRST_BACKOFF.saturating_mul(1 << self.failures.min(5)).min(MAX_BACKOFF);
         self.failures = self.failures.saturating_add(1);
-        self.resting_until = Some(now + rest);
+        self.backoff_until = Some(now + backoff);
         self.announced = [None; KNOWN_FRAMES];
         true
     }
 
-    /// When its rest ends, if it rests.
-    pub(super) fn rested_at(&self, now: Duration) -> Option<Duration> {
-        self.resting_until.filter(|&until| until > now)
+    /// When its back-off ends, if it is backing off.
+    pub(super) fn backoff_until(&self, now: Duration) -> Option<Duration> {
+        self.backoff_until.filter(|&until| until > now)
     }
 }
 

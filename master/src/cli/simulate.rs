@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::values::{Size, frame_count, size};
 use crate::farm::SegmentPolicy;
-use crate::simulator::{PassingSetup, Setup};
+use crate::measure::simulator::{DistributionSetup, Setup};
 
 /// Workers that are simulated at most.
 const MAX_WORKERS: i64 = 4096;
@@ -101,15 +101,15 @@ pub(crate) enum Profile {
 
 impl SimulateArgs {
     /// The asset to send, from the master alone and passed on, for each number of workers.
-    pub(crate) fn assets(&self) -> Vec<[PassingSetup; 2]> {
+    pub(crate) fn assets(&self) -> Vec<[DistributionSetup; 2]> {
         let Some(megabytes) = self.asset else { return Vec::new() };
-        let setup = |workers, pass_on| PassingSetup {
+        let setup = |workers, relay| DistributionSetup {
             workers,
             asset_bytes: (megabytes * 1e6) as u64,
-            pass_on,
+            relay,
             link_bits: self.link,
             round_trip: (self.rtt * 1e6) as u64,
-            deaths: 0,
+            exits: 0,
             hangs: 0,
             seed: self.seed,
         };

@@ -7,7 +7,7 @@ use super::source::Source;
 use crate::cli::{DialArgs, ErrorArgs};
 use crate::dial::{Dial, Ladder, measured_ladder, prior_ladder};
 use crate::error::CommandError;
-use crate::tradeoff::table::Table;
+use crate::measure::tradeoff::table::Table;
 use crate::wanted::WantedPicture;
 
 /// What a window shall show when it rests, and the dial for when it moves. With a rate to hold, the largest error is for

@@ -2,8 +2,8 @@
 
 use crate::cli::PlotArgs;
 use crate::error::CommandError;
+use crate::measure::plot::{Axis, Chart, Columns, PlotError, read_series};
 use crate::output::check_writable;
-use crate::plot::{Axis, Chart, Columns, PlotError, read_series};
 
 /// Reads the tables and writes each output.
 ///

@@ -8,8 +8,9 @@ use serde::Serialize;
 
 use crate::cli::{Profile, SimulateArgs};
 use crate::error::CommandError;
-use crate::simulator::{
-    CostProfile, Measured, Passed, PassingSetup, Schedule, Setup, Survivor, measure, pass, survive,
+use crate::measure::simulator::{
+    CostProfile, Distribution, DistributionSetup, Measured, Schedule, ScheduleOutcome, Setup, distribute,
+    measure, run_schedule,
 };
 
 /// Bytes of a file of costs.
@@ -32,8 +33,8 @@ struct Line<'a> {
 struct PassedLine {
     workers: u32,
     seed: u64,
-    alone: Passed,
-    passed_on: Passed,
+    alone: Distribution,
+    passed_on: Distribution,
 }
 
 /// A line of JSON about fault schedules that were survived.
@@ -60,17 +61,17 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), CommandError> {
 }
 
 /// How long an asset takes to all workers, and how often the master sends it.
-fn pass_all(args: &SimulateArgs, assets: Vec<[PassingSetup; 2]>) -> Result<(), CommandError> {
+fn pass_all(args: &SimulateArgs, assets: Vec<[DistributionSetup; 2]>) -> Result<(), CommandError> {
     if !args.json {
         tell("workers  from the master alone        passed on")?;
     }
     for setups in assets {
         let workers = setups[0].workers;
-        let [alone, passed_on] = setups.map(|setup| pass(&setup));
+        let [alone, passed_on] = setups.map(|setup| distribute(&setup));
         if args.json {
             tell_json(&PassedLine { workers, seed: args.seed, alone, passed_on })?;
         } else {
-            let told = |p: Passed| format!("{:8.2} s, {:6.2} copies", p.seconds, p.master_copies);
+            let told = |p: Distribution| format!("{:8.2} s, {:6.2} copies", p.seconds, p.master_copies);
             tell(&format!("{workers:7}  {}   {}", told(alone), told(passed_on)))?;
         }
     }
@@ -133,19 +134,19 @@ fn row(setup: &Setup, m: &Measured) -> String {
 }
 
 fn live_through(args: &SimulateArgs) -> Result<(), CommandError> {
-    let mut all = Survivor::default();
+    let mut all = ScheduleOutcome::default();
     for seed in (args.seed..).take(usize::try_from(args.schedules).unwrap_or(usize::MAX)) {
-        let survivor = survive(Schedule { seed }).map_err(|what| {
+        let outcome = run_schedule(Schedule { seed }).map_err(|what| {
             CommandError::Failed(format!(
                 "schedule {seed}: {what}; to see it again: rayfarm-master simulate --faults --seed {seed}"
             ))
         })?;
-        all.completed += survivor.completed;
-        all.requested += survivor.requested;
-        all.workers += survivor.workers;
-        all.lived += survivor.lived;
+        all.completed += outcome.completed;
+        all.requested += outcome.requested;
+        all.workers += outcome.workers;
+        all.virtual_ns += outcome.virtual_ns;
     }
-    let hours = all.lived as f64 / 3.6e12;
+    let hours = all.virtual_ns as f64 / 3.6e12;
     if args.json {
         return tell_json(&Survived {
             first_seed: args.seed,

@@ -18,14 +18,14 @@ use super::source::Source;
 use crate::cli::{QualityArgs, TradeoffArgs};
 use crate::error::CommandError;
 use crate::in_process::all_cores;
+use crate::measure::tradeoff::measure::{MeasureContext, summary};
+use crate::measure::tradeoff::oracle::{ReferenceCheck, affordable_pixels, check_pixels, sample_pixels};
+use crate::measure::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
+use crate::measure::tradeoff::setting::{SceneFeatures, Setting};
+use crate::measure::tradeoff::steps::Steps;
+use crate::measure::tradeoff::table::{Row, Table};
 use crate::output::check_writable;
 use crate::report::print_json;
-use crate::tradeoff::measure::{Studio, summary};
-use crate::tradeoff::oracle::{Verdict, affordable, chosen, judge};
-use crate::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
-use crate::tradeoff::setting::{Asked, Setting};
-use crate::tradeoff::steps::Steps;
-use crate::tradeoff::table::{Row, Table};
 
 /// What is written last, when all is measured.
 const TABLE: &str = "tradeoff.csv";
@@ -62,8 +62,8 @@ fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandErr
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let cancelled = || interrupted.is_cancelled();
     let threads = args.threads.unwrap_or_else(all_cores);
-    let studio = Studio { scene, view, threads, cancelled: &cancelled };
-    let report = measure(args.repeats, &source, &studio, &folder)?;
+    let context = MeasureContext { scene, view, threads, cancelled: &cancelled };
+    let report = measure(args.repeats, &source, &context, &folder)?;
     folder.write_report(&report)?;
     if args.json {
         return print_json(&report);
@@ -71,23 +71,28 @@ fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandErr
     print(&format!("{}the rest is in {}\n", front(&report.table), args.output.join(PAGE).display()))
 }
 
-fn measure(repeats: u32, source: &Source, studio: &Studio, folder: &Folder) -> Result<Report, CommandError> {
+fn measure(
+    repeats: u32,
+    source: &Source,
+    context: &MeasureContext,
+    folder: &Folder,
+) -> Result<Report, CommandError> {
     let steps = Steps::new();
-    let settings = Setting::worth_having(Asked::of(&studio.scene));
-    let reference_view = studio.reference_view();
+    let settings = Setting::applicable(SceneFeatures::of(&context.scene));
+    let reference_view = context.reference_view();
     steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
-    let reference = studio.reference(&|rows| steps.done(u64::from(rows)))?;
+    let reference = context.reference(&|rows| steps.done(u64::from(rows)))?;
     folder.save(REFERENCE, &reference)?;
-    let reference_check = check(source, studio, &reference_view, &reference, &steps)?;
-    let mut rows = compare(studio, &settings, &reference, folder, &steps)?;
-    for (row, times) in rows.iter_mut().zip(time(studio, &settings, repeats, &steps)?) {
+    let reference_check = check(source, context, &reference_view, &reference, &steps)?;
+    let mut rows = compare(context, &settings, &reference, folder, &steps)?;
+    for (row, times) in rows.iter_mut().zip(time(context, &settings, repeats, &steps)?) {
         (row.median_ms, row.min_ms) = summary(&times);
     }
     let table = Table {
         scene: source.name.clone(),
-        width: studio.view.width,
-        height: studio.view.height,
-        threads: studio.threads,
+        width: context.view.width,
+        height: context.view.height,
+        threads: context.threads,
         simd_level: simd_level().to_owned(),
         rows,
     };
@@ -99,21 +104,21 @@ fn measure(repeats: u32, source: &Source, studio: &Studio, folder: &Folder) -> R
 /// Asks the oracle about some pixels of the reference.
 fn check(
     source: &Source,
-    studio: &Studio,
+    context: &MeasureContext,
     view: &FrameView,
     reference: &RgbImage,
     steps: &Steps,
-) -> Result<Verdict, CommandError> {
-    let pixels = chosen(view.width, view.height, affordable(&studio.scene, view.samples));
+) -> Result<ReferenceCheck, CommandError> {
+    let pixels = sample_pixels(view.width, view.height, affordable_pixels(&context.scene, view.samples));
     steps.part("reference against the oracle", pixels.len() as u64);
     let oracle = Oracle::new(&source.scene, &source.meshes, &source.textures, view);
-    judge(&oracle, reference, &pixels, studio.threads, studio.cancelled, &|| steps.done(1))
+    check_pixels(&oracle, reference, &pixels, context.threads, context.cancelled, &|| steps.done(1))
         .ok_or_else(stopped)
 }
 
 /// Renders and compares each setting, and writes its two pictures.
 fn compare(
-    studio: &Studio,
+    context: &MeasureContext,
     settings: &[Setting],
     reference: &RgbImage,
     folder: &Folder,
@@ -121,7 +126,7 @@ fn compare(
 ) -> Result<Vec<Row>, CommandError> {
     steps.part("pictures", settings.len() as u64);
     let one = |setting: &Setting| {
-        let compared = studio.compare(setting, reference)?;
+        let compared = context.compare(setting, reference)?;
         folder.save(&picture_name(&compared.row.setting), &compared.picture)?;
         folder.save(&difference_name(&compared.row.setting), &compared.errors.picture())?;
         steps.done(1);
@@ -132,7 +137,7 @@ fn compare(
 
 /// The times of each setting, `repeats` rounds over all of them.
 fn time(
-    studio: &Studio,
+    context: &MeasureContext,
     settings: &[Setting],
     repeats: u32,
     steps: &Steps,
@@ -140,7 +145,7 @@ fn time(
     steps.part("times", u64::from(repeats) * settings.len() as u64);
     let mut times = vec![Vec::new(); settings.len()];
     for round in 0..repeats {
-        studio.time_round(settings, &mut times, round % 2 == 1, &|| steps.done(1))?;
+        context.time_round(settings, &mut times, round % 2 == 1, &|| steps.done(1))?;
     }
     Ok(times)
 }

@@ -9,9 +9,9 @@ use rayfarm_tracer::scene::{Attenuation, ColorDepth, FrameView, Light, LightKind
 use super::ladder::Rung;
 use super::*;
 use crate::accounting::{Parts, WorkerAccount};
-use crate::simulator::Dice;
+use crate::measure::simulator::Rng;
+use crate::measure::tradeoff::table::Table;
 use crate::test_scene;
-use crate::tradeoff::table::Table;
 
 const ROOM: &[u8] = include_bytes!("../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;
@@ -23,7 +23,7 @@ struct Simulation {
     threads: f64,
     wire: f64,
     noise: f64,
-    dice: Dice,
+    dice: Rng,
     now: Duration,
     in_flight: VecDeque<(Shown, Rung)>,
 }
@@ -36,7 +36,7 @@ impl Simulation {
             threads,
             wire,
             noise: 0.0,
-            dice: Dice::new(1),
+            dice: Rng::new(1),
             now: Duration::ZERO,
             in_flight: VecDeque::new(),
         };
@@ -103,7 +103,7 @@ fn a_slow_wire_turns_knobs_that_make_fewer_bytes_and_no_others() {
         [0.06, 0.1, 0.2, 0.4].into_iter().flat_map(|wire| (0..5).map(move |seed| (wire, seed)))
     {
         let mut simulation = Simulation::new(general(1), 30.0, 0.01, wire);
-        (simulation.noise, simulation.dice) = (0.1, Dice::new(seed));
+        (simulation.noise, simulation.dice) = (0.1, Rng::new(seed));
         simulation.frames(SETTLING);
         let frames = simulation.frames(1000);
         assert_eq!(changes(&frames), 0, "{wire}, {seed}");

@@ -5,8 +5,8 @@ use rayfarm_tracer::scene::RenderScale;
 use super::ladder::{Ladder, Origin, Rung};
 use super::setting::{Setting, bytes};
 use super::small_scales::continued;
-use crate::tradeoff::setting::Setting as Measured;
-use crate::tradeoff::table::{Row, Table};
+use crate::measure::tradeoff::setting::Setting as Measured;
+use crate::measure::tradeoff::table::{Row, Table};
 use crate::wanted::WantedPicture;
 
 /// The front of a table, for pictures that rest as `wanted`. Costs are parts of that row's time, losses what the mean FLIP

@@ -108,8 +108,8 @@ mod tests {
 
     use super::super::small_scales;
     use super::*;
-    use crate::tradeoff::setting::Setting as Measured;
-    use crate::tradeoff::table::Table;
+    use crate::measure::tradeoff::setting::Setting as Measured;
+    use crate::measure::tradeoff::table::Table;
 
     const TABLES: [&[u8]; 5] = [
         include_bytes!("../../../models/tradeoff/room.csv"),

@@ -6,7 +6,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::governor::Governor;
-use crate::simulator::Dice;
+use crate::measure::simulator::Rng;
 
 /// Requests that are open at a time: what the governor says counts from the second frame on.
 const IN_FLIGHT: usize = 2;
@@ -22,7 +22,7 @@ struct Simulation {
     governor: Governor,
     truth: Vec<f64>,
     noise: f64,
-    dice: Dice,
+    dice: Rng,
     in_flight: VecDeque<usize>,
 }
 
@@ -43,7 +43,7 @@ impl Simulation {
     fn with_truth(table: &[f64], truth: &[f64], noise: f64, seed: u64) -> Self {
         let governor = Governor::new(table.iter().copied(), Duration::from_secs_f64(BUDGET));
         let in_flight = VecDeque::from([0; IN_FLIGHT]);
-        Self { governor, truth: truth.to_vec(), noise, dice: Dice::new(seed), in_flight }
+        Self { governor, truth: truth.to_vec(), noise, dice: Rng::new(seed), in_flight }
     }
 
     /// A frame where the full one takes so many budgets.

@@ -181,12 +181,12 @@ impl Accounts {
             Event::PauseRequested { worker } => self.pause(now, worker, true),
             Event::ResumeRequested { worker } => self.pause(now, worker, false),
             Event::FrameRequested { .. }
-            | Event::RequestsGivenUp { .. }
+            | Event::RequestsDropped { .. }
             | Event::WorkerDrains { .. }
             | Event::DrainRequested { .. }
             | Event::Pong { .. }
             | Event::Heard { .. }
-            | Event::SegmentJudged { .. }
+            | Event::SegmentArbitrated { .. }
             | Event::Woken => {}
         }
     }
@@ -207,8 +207,8 @@ impl Accounts {
                 }
             }
             Action::Cancel { worker, before } => self.cancel(now, worker, before),
-            Action::Dismiss { worker, .. } | Action::Expel { worker, .. } => self.leave(now, worker),
-            Action::Seal { .. } | Action::Judge { .. } | Action::Unseal { .. } => {}
+            Action::Disconnect { worker, .. } | Action::Ban { worker, .. } => self.leave(now, worker),
+            Action::RecordDigest { .. } | Action::Arbitrate { .. } | Action::DropDigest { .. } => {}
             Action::Announce { .. } | Action::Ping { .. } | Action::Drain { .. } => {}
         }
     }

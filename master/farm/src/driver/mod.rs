@@ -214,7 +214,7 @@ impl Driver {
     pub(crate) fn drop_requests(&self) {
         let mut inner = self.lock();
         let next = FrameId(inner.last_frame + 1);
-        self.drive(&mut inner, Event::RequestsGivenUp { next });
+        self.drive(&mut inner, Event::RequestsDropped { next });
     }
 
     /// The announcement of a frame: serialised once, the same bytes for all workers.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use rayfarm_protocol::{FrameId, ToWorker};
-use rayfarm_scheduler::{Action, Cost, Event, Return, WorkerId};
+use rayfarm_scheduler::{Action, Cost, Event, Reconnect, WorkerId};
 
 use super::{Driver, Inner, Request};
 use crate::error::FarmError;
@@ -52,24 +52,24 @@ impl Driver {
             }
             Action::Ping { worker, nonce } => events.extend(send(inner, worker, ToWorker::Ping { nonce })),
             Action::Drain { worker } => events.extend(send(inner, worker, ToWorker::Drain)),
-            Action::Dismiss { worker, reason, again } => {
-                match again {
+            Action::Disconnect { worker, reason, reconnect } => {
+                match reconnect {
                     // The worker was drained on request.
-                    Return::Unwanted => inner.sessions.log_leave(worker, &reason),
-                    Return::Welcome | Return::NextMaster => inner.sessions.log_disconnect(worker, &reason),
+                    Reconnect::Never => inner.sessions.log_leave(worker, &reason),
+                    Reconnect::Now | Reconnect::NextMaster => inner.sessions.log_disconnect(worker, &reason),
                 }
-                inner.sessions.disconnect(worker, &reason, again);
+                inner.sessions.disconnect(worker, &reason, reconnect);
             }
-            Action::Seal { worker, lease } => self.open_segment(inner, worker, lease),
+            Action::RecordDigest { worker, lease } => self.open_segment(inner, worker, lease),
             Action::Verify { worker, lease } => {
                 if let Some(session) = inner.sessions.get_mut(worker) {
                     session.leases.verify(lease);
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
             }
-            Action::Judge { frame, segment } => events.extend(self.dispute(inner, frame, segment)),
-            Action::Unseal { frame, segment } => inner.open_segments.remove(frame, segment),
-            Action::Expel { worker, reason } => self.ban_for_wrong_pixels(inner, worker, &reason, events),
+            Action::Arbitrate { frame, segment } => events.extend(self.dispute(inner, frame, segment)),
+            Action::DropDigest { frame, segment } => inner.open_segments.remove(frame, segment),
+            Action::Ban { worker, reason } => self.ban_for_wrong_pixels(inner, worker, &reason, events),
         }
     }
 

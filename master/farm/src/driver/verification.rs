@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use bytes::Bytes;
 use rayfarm_protocol::{FrameId, Lease, PixelsHeader};
-use rayfarm_scheduler::{Event, Finding, Return, Verdict, WorkerId};
+use rayfarm_scheduler::{ArbiterResult, Event, Finding, Reconnect, WorkerId};
 
 use super::{Driver, Inner, Request};
 use crate::framebuffer::Misfit;
@@ -62,7 +62,7 @@ impl Driver {
 
     /// Queues a segment for the arbiter. Where that is impossible, the returned event settles it without a fault.
     pub(super) fn dispute(&self, inner: &Inner, frame: FrameId, segment: u32) -> Option<Event> {
-        let no_fault = Event::SegmentJudged { frame, segment, verdict: Verdict::default() };
+        let no_fault = Event::SegmentArbitrated { frame, segment, result: ArbiterResult::default() };
         let Some(open) = inner.open_segments.get(frame, segment) else { return Some(no_fault) };
         let first = open.first.digest.clone();
         let second = open.second.as_ref().map(|second| second.digest.clone());
@@ -84,7 +84,7 @@ impl Driver {
     ) {
         inner.sessions.ban(worker);
         inner.sessions.log_disconnect(worker, reason);
-        inner.sessions.disconnect(worker, reason, Return::Unwanted);
+        inner.sessions.disconnect(worker, reason, Reconnect::Never);
         let wrong = inner.delivered.mark_wrong(worker);
         if wrong.count() > 0 {
             let (count, frames) = (wrong.count(), as_text(wrong.runs()));

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use rayfarm_protocol::Hello;
 use rayfarm_protocol::handshake::Refusal;
-use rayfarm_scheduler::{Event, Return, WorkerId};
+use rayfarm_scheduler::{Event, Reconnect, WorkerId};
 
 use super::{Driver, Inner, Run};
 use crate::assets::TransferStatus;
@@ -60,7 +60,7 @@ impl Driver {
         if known {
             inner.sessions.log_disconnect(worker, reason);
             inner.sessions.ban(worker);
-            inner.sessions.disconnect(worker, reason, Return::Unwanted);
+            inner.sessions.disconnect(worker, reason, Reconnect::Never);
             self.drive(&mut inner, Event::WorkerLeft { worker });
         }
         known
@@ -91,7 +91,7 @@ impl Driver {
     /// Removes a session that has ended. The reason is sent to the worker if its connection still works.
     pub(crate) fn leave(&self, worker: WorkerId, reason: &str) {
         let mut inner = self.lock();
-        inner.sessions.disconnect(worker, reason, Return::Welcome);
+        inner.sessions.disconnect(worker, reason, Reconnect::Now);
         self.drive(&mut inner, Event::WorkerLeft { worker });
     }
 
@@ -166,7 +166,7 @@ impl Driver {
             let mut inner = self.lock();
             inner.is_ending = true;
             let goodbyes = inner.sessions.ids().into_iter().map(|worker| {
-                let goodbye = inner.sessions.disconnect(worker, reason, Return::NextMaster);
+                let goodbye = inner.sessions.disconnect(worker, reason, Reconnect::NextMaster);
                 self.drive(&mut inner, Event::WorkerLeft { worker });
                 goodbye
             });

@@ -4,7 +4,7 @@ use std::ops::Deref;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bytes::Bytes;
-use rayfarm_protocol::pixels::{BlockError, rgb565_bytes, unpack, from_rgb565};
+use rayfarm_protocol::pixels::{BlockError, from_rgb565, rgb565_bytes, unpack};
 use rayfarm_protocol::{Encoding, Lease};
 
 /// Buffers kept for later segments. Each decoding in progress uses one or two more.
@@ -69,8 +69,9 @@ impl Decoder {
         let misfit = |expected| Misfit::Bytes { lease, expected, got: bytes.len() };
         let invalid = |source| Misfit::Blocks { lease, source };
         let narrow = rgb565_bytes(size);
-        let widened =
-            |from: &[u8], rows: &mut [u8]| from_rgb565(from, rows).then_some(()).ok_or_else(|| misfit(narrow));
+        let widened = |from: &[u8], rows: &mut [u8]| {
+            from_rgb565(from, rows).then_some(()).ok_or_else(|| misfit(narrow))
+        };
         match encoding {
             Encoding::Raw if bytes.len() == size => Ok(DecodedRows(Storage::Received(bytes.clone()))),
             Encoding::Raw => Err(misfit(size)),

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use rayfarm_protocol::peer::ShareKey;
 use rayfarm_protocol::{AssetId, ToWorker};
-use rayfarm_scheduler::{Return, WorkerId};
+use rayfarm_scheduler::{Reconnect, WorkerId};
 use tokio::task::JoinHandle;
 
 pub(crate) mod addresses;
@@ -84,7 +84,7 @@ impl Sessions {
         let Some(session) = self.sessions.get(&worker) else { return Ok(()) };
         let Err(error) = session.sender.try_send(message) else { return Ok(()) };
         self.log_disconnect(worker, &format!("cannot send to it: {error}"));
-        self.disconnect(worker, "the worker does not read its messages", Return::Welcome);
+        self.disconnect(worker, "the worker does not read its messages", Reconnect::Now);
         Err(SendFailed)
     }
 
@@ -108,13 +108,13 @@ impl Sessions {
         &mut self,
         worker: WorkerId,
         reason: &str,
-        again: Return,
+        reconnect: Reconnect,
     ) -> Option<JoinHandle<()>> {
         let Session { sender, traffic, identity, .. } = self.sessions.remove(&worker)?;
         self.ended.add(&traffic);
         self.routing.remove_worker(worker);
         self.bans.add_disconnected(worker, identity);
-        Some(session::say_goodbye(sender, reason, again))
+        Some(session::say_goodbye(sender, reason, reconnect))
     }
 
     /// Bans a worker that is connected or has disconnected lately. A current session is not ended by this.

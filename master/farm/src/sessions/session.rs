@@ -7,7 +7,6 @@ use std::time::Duration;
 use rayfarm_protocol::peer::ShareKey;
 use rayfarm_protocol::session::{Sender, Traffic};
 use rayfarm_protocol::{Hello, Reconnect, ToWorker};
-use rayfarm_scheduler::Return;
 use tokio::task::JoinHandle;
 
 use super::identity::Identity;
@@ -58,12 +57,7 @@ impl Session {
 }
 
 /// Sends a goodbye in the background and closes the connection. The task ends within [`GOODBYE_TIMEOUT`].
-pub(super) fn say_goodbye(sender: Sender<ToWorker>, reason: &str, again: Return) -> JoinHandle<()> {
-    let reconnect = match again {
-        Return::Welcome => Reconnect::Now,
-        Return::Unwanted => Reconnect::Never,
-        Return::NextMaster => Reconnect::NextMaster,
-    };
+pub(super) fn say_goodbye(sender: Sender<ToWorker>, reason: &str, reconnect: Reconnect) -> JoinHandle<()> {
     let goodbye = ToWorker::Disconnect { reason: reason.to_owned(), reconnect };
     tokio::spawn(async move {
         let flush = async {

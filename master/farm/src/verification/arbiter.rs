@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use rayfarm_protocol::FrameId;
-use rayfarm_scheduler::{Event, Verdict};
+use rayfarm_scheduler::{ArbiterResult, Event};
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 use tokio::sync::mpsc;
@@ -42,21 +42,25 @@ pub(crate) async fn run(
         let Dispute { frame, segment, .. } = dispute;
         let renderer = renderer.clone();
         let settled = tokio::task::spawn_blocking(move || settle(dispute, &*renderer)).await;
-        let verdict = match settled.map_err(|error| error.to_string()).flatten() {
-            Ok(verdict) => verdict,
+        let result = match settled.map_err(|error| error.to_string()).flatten() {
+            Ok(result) => result,
             Err(error) => {
                 tracing::error!("the master cannot verify rows of frame {frame} itself: {error}");
-                Verdict::default()
+                ArbiterResult::default()
             }
         };
-        report(Event::SegmentJudged { frame, segment, verdict });
+        report(Event::SegmentArbitrated { frame, segment, result });
     }
 }
 
-fn settle(dispute: Dispute, renderer: &RowRenderer) -> Result<Verdict, String> {
+fn settle(dispute: Dispute, renderer: &RowRenderer) -> Result<ArbiterResult, String> {
     let Dispute { view, rows, first, second, .. } = dispute;
     let own = SegmentDigest::of(renderer(&view, rows)?);
-    Ok(Verdict { traced: true, painter: first != own, checker: second.is_some_and(|second| second != own) })
+    Ok(ArbiterResult {
+        rendered: true,
+        first_differs: first != own,
+        second_differs: second.is_some_and(|second| second != own),
+    })
 }
 
 /// A renderer of a scene on this machine, with the code that workers use. The scene is compiled at the first call; `stop`

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use rayfarm_protocol::{Cost, FrameId, Lease};
-use rayfarm_scheduler::{Action, Event, HostId, Return, WorkerId};
+use rayfarm_scheduler::{Action, Event, HostId, Reconnect, WorkerId};
 
 use super::*;
 
@@ -178,8 +178,8 @@ fn a_disconnected_worker_is_in_the_account_of_one_frame() {
     fixture.begin(0, 1);
     fixture.grant(0, BARN, lease(1, 0));
     fixture.event(10, Event::WorkerLeft { worker: BARN });
-    let (reason, again) = (String::new(), Return::Welcome);
-    fixture.action(15, Action::Dismiss { worker: MILL, reason, again });
+    let (reason, reconnect) = (String::new(), Reconnect::Now);
+    fixture.action(15, Action::Disconnect { worker: MILL, reason, reconnect });
     let FrameAccount { workers, .. } = fixture.frame(20, 1);
     assert_eq!(workers.iter().map(|worker| in_ms(worker.parts)[5]).collect::<Vec<_>>(), [30, 10]);
     fixture.begin(20, 2);

@@ -1,0 +1,106 @@
+//! Renders, compares and times settings in this process.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use rayfarm_tracer::image::{self, FlipMap, PIXELS_PER_DEGREE, RgbImage};
+use rayfarm_tracer::scene::{FrameView, MAX_SAMPLES};
+use rayfarm_tracer::{CompiledScene, PreparedFrame};
+
+use super::setting::Setting;
+use super::table::Row;
+use crate::error::CommandError;
+use crate::in_process::trace;
+use crate::report::{percentile, round_to_us};
+
+/// A scene with the view and the threads that it is measured with.
+pub(crate) struct MeasureContext<'a> {
+    /// The scene.
+    pub(crate) scene: Arc<CompiledScene>,
+    /// Camera and size of the finished pictures.
+    pub(crate) view: FrameView,
+    /// Render threads.
+    pub(crate) threads: usize,
+    /// Polled while rendering: whether to stop.
+    pub(crate) cancelled: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// A setting's picture compared with the reference.
+pub(crate) struct Compared {
+    /// The picture.
+    pub(crate) picture: RgbImage,
+    /// Where it differs visibly from the reference.
+    pub(crate) errors: FlipMap,
+    /// How much it differs, without times.
+    pub(crate) row: Row,
+}
+
+impl MeasureContext<'_> {
+    /// View of the reference: full quality with the largest number of samples.
+    pub(crate) fn reference_view(&self) -> FrameView {
+        FrameView { samples: MAX_SAMPLES, ..Setting::plain().applied_to(&self.view).view }
+    }
+
+    /// Renders the reference picture. `done` receives the number of rows that were rendered since the last call.
+    ///
+    /// # Errors
+    /// The measurement was cancelled.
+    pub(crate) fn reference(&self, done: &(dyn Fn(u32) + Sync)) -> Result<RgbImage, CommandError> {
+        self.render(&self.reference_view(), done)
+    }
+
+    /// Renders a setting's picture and compares it with the reference.
+    ///
+    /// # Errors
+    /// The measurement was cancelled.
+    pub(crate) fn compare(&self, setting: &Setting, reference: &RgbImage) -> Result<Compared, CommandError> {
+        let picture = self.picture(setting)?;
+        let difference = image::compare(reference, &picture).map_err(CommandError::failed)?;
+        let errors = image::flip(reference, &picture, PIXELS_PER_DEGREE).map_err(CommandError::failed)?;
+        let row = Row::new(setting.name(), &difference, errors.mean());
+        Ok(Compared { picture, errors, row })
+    }
+
+    /// Renders every setting once, in turn, and appends its time from the scene to the finished picture.
+    /// Alternating forward and backward rounds vary the neighbours of a setting.
+    ///
+    /// # Errors
+    /// The measurement was cancelled.
+    pub(crate) fn time_round(
+        &self,
+        settings: &[Setting],
+        times: &mut [Vec<Duration>],
+        backward: bool,
+        done: &dyn Fn(),
+    ) -> Result<(), CommandError> {
+        for step in 0..settings.len() {
+            let index = if backward { settings.len() - 1 - step } else { step };
+            let started = Instant::now();
+            self.picture(&settings[index])?;
+            times[index].push(started.elapsed());
+            done();
+        }
+        Ok(())
+    }
+
+    /// The picture under a setting, in its full size.
+    fn picture(&self, setting: &Setting) -> Result<RgbImage, CommandError> {
+        let wanted = setting.applied_to(&self.view);
+        wanted.delivered(self.render(&wanted.rendered(), &|_| ())?).map_err(CommandError::failed)
+    }
+
+    fn render(&self, view: &FrameView, done: &(dyn Fn(u32) + Sync)) -> Result<RgbImage, CommandError> {
+        let frame = PreparedFrame::new(Arc::clone(&self.scene), view).map_err(CommandError::failed)?;
+        let mut picture = RgbImage::new(view.width, view.height);
+        trace(&frame, &mut picture.pixels, self.threads, self.cancelled, done)
+            .map_err(|_| CommandError::Interrupted("no table was written".to_owned()))?;
+        Ok(picture)
+    }
+}
+
+/// The median and the least time, in milliseconds.
+pub(crate) fn summary(times: &[Duration]) -> (f64, f64) {
+    let mut sorted = times.to_vec();
+    sorted.sort_unstable();
+    (round_to_us(percentile(&sorted, 0.5)), round_to_us(percentile(&sorted, 0.0)))
+}
