@@ -6,17 +6,12 @@
 
 mod accounting;
 mod addresses;
+mod app;
 mod assets;
-mod camera_control;
 mod chains;
-mod cli;
-mod commands;
-mod control;
 mod delivered;
-mod dial;
 mod display;
 mod driver;
-mod error;
 pub mod farm;
 mod farm_control;
 mod framebuffer;
@@ -25,14 +20,8 @@ mod in_process;
 mod judge;
 mod lease_book;
 mod local_workers;
-mod logging;
-mod orbit;
-mod output;
 mod pace;
-mod plan;
 mod plot;
-mod progress;
-mod report;
 mod roster;
 pub mod scheduler;
 mod seals;
@@ -40,7 +29,7 @@ mod server;
 pub mod simulator;
 mod tradeoff;
 mod transfers;
-mod wanted;
+mod viewer;
 
 #[cfg(test)]
 mod fake_worker;
@@ -56,7 +45,8 @@ mod verify_tests;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use cli::Invocation;
+use app::cli::Invocation;
+use app::{commands, logging};
 
 /// The whole program: does what the command line (program name first) asks for and says how it went.
 ///

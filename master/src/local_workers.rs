@@ -16,7 +16,7 @@ use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-use crate::cli::LOCAL_WORKER;
+use crate::app::cli::LOCAL_WORKER;
 use crate::identity::{Tickets, local_name};
 
 /// A worker that dies before it has lived this long died young.

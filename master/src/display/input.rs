@@ -6,7 +6,7 @@ use std::rc::Rc;
 use minifb::{InputCallback, Key, MouseButton, MouseMode, Window};
 use raw_window_handle::{HasWindowHandle, RawWindowHandle};
 
-use crate::camera_control::{Held, Input};
+use crate::viewer::camera_control::{Held, Input};
 
 /// Keys that went down or up, in order, since they were last asked for.
 type Edges = Rc<RefCell<Vec<(Key, bool)>>>;

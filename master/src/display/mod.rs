@@ -1,16 +1,12 @@
 //! Pictures on a screen.
 //!
 //! The window and its input live on the main thread, as window systems want it; the farm lives on tokio's threads.
-//! Between them stand a [`feed`]: the newest camera goes one way, the newest picture the other, and neither side ever
+//! Between them stands the viewer's frame loop: the newest camera goes one way, the newest picture the other, and neither side ever
 //! waits for the other, so a slow farm does not freeze the window and a slow screen does not slow the farm.
 
 mod canvas;
-pub(crate) mod feed;
-pub(crate) mod frame_rate;
 mod input;
-mod latency;
 pub(crate) mod overlay;
-pub(crate) mod requests;
 mod screen;
 mod sight;
 mod steering;

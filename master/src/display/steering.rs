@@ -1,7 +1,7 @@
 //! Workers steered from the window: which one is selected, and what a key does to it.
 
 use super::input::Happened;
-use crate::control::KICKED;
+use crate::app::control::KICKED;
 use crate::farm::{FarmControl, FarmStatus, UnknownWorker, WorkerState, WorkerStatus};
 
 /// The panel of workers.

@@ -10,18 +10,18 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use super::canvas::{Canvas, Picture};
-use super::feed::{Arrival, NewsDesk};
 use super::input::{Controls, Happened};
 use super::overlay::accounts::AccountPanel;
 use super::overlay::{self, Figures, Overlay};
-use super::requests::WindowState;
 use super::screen;
 use super::steering::{self, Steering};
 use super::tint::Coloring;
 use super::watch::Watch;
-use crate::camera_control::CameraControl;
 use crate::farm::{FarmControl, FarmStatus, FinishedFrame};
-use crate::wanted::WantedPicture;
+use crate::viewer::camera_control::CameraControl;
+use crate::viewer::frame_loop::{Arrival, NewsDesk};
+use crate::viewer::requests::WindowState;
+use crate::viewer::view_request::WantedPicture;
 
 /// This often the figures are looked at, and drawn if they have changed.
 const FIGURES_EVERY: Duration = Duration::from_millis(200);

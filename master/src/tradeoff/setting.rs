@@ -7,7 +7,7 @@ use rayfarm_tracer::scene::{
     ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
 };
 
-use crate::wanted::WantedPicture;
+use crate::viewer::view_request::WantedPicture;
 
 /// What a scene asks for: whatever it does not, no knob needs to leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,86 @@
+//! The commands: each turns its arguments into work and tells how it went.
+
+mod bench;
+mod check_numerics;
+mod compile;
+mod explain;
+mod interrupt;
+mod ladder;
+mod observability;
+mod plot;
+mod render;
+mod simulate;
+mod source;
+mod tradeoff;
+mod view;
+
+use crate::app::cli::Command;
+use crate::app::error::CommandError;
+
+/// Does what the command line asks for.
+///
+/// # Errors
+/// Whatever kept it from being done, with the exit status that tells whose fault it was.
+pub(crate) fn run(command: Command) -> Result<(), CommandError> {
+    if let Some(threads) = threads(&command) {
+        limit_builds(threads);
+    }
+    match command {
+        Command::View(args) => view::run(args),
+        Command::Render(args) => render::run(args),
+        Command::Compile(args) => compile::run(&args),
+        Command::Bench(args) => bench::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Plot(args) => plot::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::CheckNumerics(args) => check_numerics::run(&args),
+        Command::Tradeoff(args) => tradeoff::run(&args),
+    }
+}
+
+/// What `--threads` says.
+fn threads(command: &Command) -> Option<usize> {
+    match command {
+        Command::View(args) => args.farm.options().threads,
+        Command::Render(args) => args.farm.options().threads,
+        Command::Bench(args) => args.threads,
+        Command::Tradeoff(args) => args.threads,
+        _ => None,
+    }
+}
+
+/// Lets models and scenes be compiled on that many threads. Without it, they are on all cores.
+fn limit_builds(threads: usize) {
+    if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global() {
+        tracing::debug!("models are compiled on all cores: {error}");
+    }
+}
+
+/// The runtime that the farm lives on: sockets and timers only, so two threads are plenty. Rendering never runs here.
+fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| CommandError::Failed(format!("cannot start the network threads: {error}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::cli::Invocation;
+
+    #[test]
+    fn builds_take_as_many_threads_as_the_command_line_says() {
+        let threads = |line: &str| match Invocation::parse(line.split(' ').map(Into::into)) {
+            Ok(Invocation::Command(command, _)) => threads(&command),
+            other => panic!("{line}: {other:?}"),
+        };
+        assert_eq!(threads("rayfarm-master render --threads 3 -o none a.obj"), Some(3));
+        assert_eq!(threads("rayfarm-master --threads 2 a.obj"), Some(2));
+        assert_eq!(threads("rayfarm-master bench --threads 1 a.toml"), Some(1));
+        assert_eq!(threads("rayfarm-master tradeoff a.toml -o b --threads 4"), Some(4));
+        assert_eq!(threads("rayfarm-master render -o none a.obj"), None);
+        assert_eq!(threads("rayfarm-master explain a.toml"), None);
+    }
+}

@@ -1,0 +1,173 @@
+//! `simulate`: the scheduler with simulated workers, in virtual time.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use rayfarm_tracer::files::read_within;
+use serde::Serialize;
+
+use crate::app::cli::{Profile, SimulateArgs};
+use crate::app::error::CommandError;
+use crate::simulator::{
+    CostProfile, Measured, Passed, PassingSetup, Schedule, Setup, Survivor, measure, pass, survive,
+};
+
+/// Bytes of a file of costs.
+const MAX_COSTS_BYTES: u64 = 16 << 20;
+
+/// A line of JSON: what was simulated, and what came of it.
+#[derive(Serialize)]
+struct Line<'a> {
+    workers: u32,
+    threads: u32,
+    segment: String,
+    pipeline: bool,
+    seed: u64,
+    #[serde(flatten)]
+    measured: &'a Measured,
+}
+
+/// A line of JSON about an asset that was sent to all workers.
+#[derive(Serialize)]
+struct PassedLine {
+    workers: u32,
+    seed: u64,
+    alone: Passed,
+    passed_on: Passed,
+}
+
+/// A line of JSON about fault schedules that were survived.
+#[derive(Serialize)]
+struct Survived {
+    first_seed: u64,
+    schedules: u64,
+    workers: u64,
+    frames_requested: u64,
+    frames_completed: u64,
+    hours: f64,
+}
+
+/// Simulates what is asked for and tells the figures on standard output.
+///
+/// # Errors
+/// Costs of rows that cannot be read; an invariant that does not hold, with the command that shows it again.
+pub(super) fn run(args: &SimulateArgs) -> Result<(), CommandError> {
+    match (args.faults, args.assets()) {
+        (true, _) => live_through(args),
+        (false, assets) if assets.is_empty() => measure_all(args),
+        (false, assets) => pass_all(args, assets),
+    }
+}
+
+/// How long an asset takes to all workers, and how often the master sends it.
+fn pass_all(args: &SimulateArgs, assets: Vec<[PassingSetup; 2]>) -> Result<(), CommandError> {
+    if !args.json {
+        tell("workers  from the master alone        passed on")?;
+    }
+    for setups in assets {
+        let workers = setups[0].workers;
+        let [alone, passed_on] = setups.map(|setup| pass(&setup));
+        if args.json {
+            tell_json(&PassedLine { workers, seed: args.seed, alone, passed_on })?;
+        } else {
+            let told = |p: Passed| format!("{:8.2} s, {:6.2} copies", p.seconds, p.master_copies);
+            tell(&format!("{workers:7}  {}   {}", told(alone), told(passed_on)))?;
+        }
+    }
+    Ok(())
+}
+
+fn measure_all(args: &SimulateArgs) -> Result<(), CommandError> {
+    let costs = match (&args.rows, args.costs) {
+        (Some(path), _) => read_costs(path)?,
+        (None, Profile::Flat) => CostProfile::Flat,
+        (None, Profile::Bust) => CostProfile::Bust,
+        (None, Profile::Corner) => CostProfile::Corner,
+    };
+    if !args.json {
+        tell(
+            "workers    FPS   ideal  efficiency  cutting  wasted  leases   idle   tail  frame ms  worst  latency",
+        )?;
+    }
+    for setup in args.setups() {
+        let setup = Setup { costs: costs.clone(), ..setup };
+        let measured = measure(&setup).ok_or_else(|| {
+            CommandError::Failed(format!("{} workers did not finish within an hour", setup.workers))
+        })?;
+        if args.json { tell_json(&line(&setup, &measured))? } else { tell(&row(&setup, &measured))? }
+    }
+    Ok(())
+}
+
+fn read_costs(path: &Path) -> Result<CostProfile, CommandError> {
+    let told = |what: String| CommandError::WrongInput(format!("{}: {what}", path.display()));
+    let bytes = read_within(path, MAX_COSTS_BYTES).map_err(|error| told(error.to_string()))?;
+    let bytes = bytes.ok_or_else(|| told(format!("has more than {MAX_COSTS_BYTES} bytes, the limit")))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| told("not UTF-8 text: numbers are expected".to_owned()))?;
+    CostProfile::from_text(&text).map_err(told)
+}
+
+fn line<'a>(setup: &Setup, measured: &'a Measured) -> Line<'a> {
+    let Setup { workers, threads, pipeline, seed, .. } = *setup;
+    Line { workers, threads, segment: setup.policy.to_string(), pipeline, seed, measured }
+}
+
+fn row(setup: &Setup, m: &Measured) -> String {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    format!(
+        "{:7} {:6.1} {:7.1}  {:>10}  {:>7}  {:>6}  {:>6} {:>6} {:>6}  {:8.2} {:6.2}  {:7.2}",
+        setup.workers,
+        m.fps,
+        m.ideal_fps,
+        percent(m.useful),
+        percent(m.cutting),
+        percent(m.wasted),
+        percent(m.leases),
+        percent(m.idle),
+        percent(m.idle_tail),
+        m.frame_ms,
+        m.worst_frame_ms,
+        m.latency_ms,
+    )
+}
+
+fn live_through(args: &SimulateArgs) -> Result<(), CommandError> {
+    let mut all = Survivor::default();
+    for seed in (args.seed..).take(usize::try_from(args.schedules).unwrap_or(usize::MAX)) {
+        let survivor = survive(Schedule { seed }).map_err(|what| {
+            CommandError::Failed(format!(
+                "schedule {seed}: {what}; to see it again: rayfarm-master simulate --faults --seed {seed}"
+            ))
+        })?;
+        all.completed += survivor.completed;
+        all.requested += survivor.requested;
+        all.workers += survivor.workers;
+        all.lived += survivor.lived;
+    }
+    let hours = all.lived as f64 / 3.6e12;
+    if args.json {
+        return tell_json(&Survived {
+            first_seed: args.seed,
+            schedules: args.schedules,
+            workers: all.workers,
+            frames_requested: all.requested,
+            frames_completed: all.completed,
+            hours,
+        });
+    }
+    tell(&format!(
+        "{} schedules survived: {} workers, {} frames asked for, {} completed, {hours:.1} hours of virtual time",
+        args.schedules, all.workers, all.requested, all.completed
+    ))
+}
+
+fn tell_json(line: &impl Serialize) -> Result<(), CommandError> {
+    let text = serde_json::to_string(line).map_err(|error| CommandError::Failed(error.to_string()))?;
+    tell(&text)
+}
+
+fn tell(line: &str) -> Result<(), CommandError> {
+    writeln!(io::stdout().lock(), "{line}")
+        .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}

@@ -1,0 +1,201 @@
+//! `tradeoff`: what each setting costs and how far its picture is from the best one, as table, plot and pictures in a folder.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rayfarm_tracer::files::write_whole;
+use rayfarm_tracer::image::{self, RgbImage};
+use rayfarm_tracer::reference::Oracle;
+use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::simd_level;
+
+use super::interrupt::cancelled_by_signals;
+use super::runtime;
+use super::source::Source;
+use crate::app::cli::{QualityArgs, TradeoffArgs};
+use crate::app::error::CommandError;
+use crate::app::output::check_writable;
+use crate::app::reports::print_json;
+use crate::in_process::all_cores;
+use crate::tradeoff::measure::{Studio, summary};
+use crate::tradeoff::oracle::{Verdict, affordable, chosen, judge};
+use crate::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
+use crate::tradeoff::setting::{Asked, Setting};
+use crate::tradeoff::steps::Steps;
+use crate::tradeoff::table::{Row, Table};
+
+/// What is written last, when all is measured.
+const TABLE: &str = "tradeoff.csv";
+const PAGE: &str = "tradeoff.md";
+const PLOTS: [&str; 2] = ["front.svg", "front.png"];
+const REFERENCE: &str = "reference.png";
+
+/// Measures a scene and writes the folder, or reads a table that was written before; tells the front on standard output.
+///
+/// # Errors
+/// A wrong scene, folder or table; Ctrl-C; a full disk.
+pub(super) fn run(args: &TradeoffArgs) -> Result<(), CommandError> {
+    match (&args.scene, &args.saved) {
+        (_, Some(table)) => show_saved(table, args.json),
+        (Some(scene), None) => measure_and_write(scene, args),
+        (None, None) => Err(CommandError::WrongInput("expected a scene, or --saved with a table".to_owned())),
+    }
+}
+
+fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
+    let table = Table::read(path).map_err(CommandError::wrong_input)?;
+    for row in table.rows.iter().filter(|row| Setting::named(&row.setting).is_none()) {
+        tracing::warn!("{}: this version of rayfarm has no setting {}", path.display(), row.setting);
+    }
+    if json { print_json(&table) } else { print(&front(&table)) }
+}
+
+fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
+    let source = Source::load(scene, args.models, args.size)?;
+    let view = source.wanted_still(args.size, None, &QualityArgs::default())?.view;
+    let scene = Arc::new(source.compiled()?);
+    let folder = Folder::open(&args.output)?;
+    let runtime = runtime()?;
+    let interrupted = runtime.block_on(async { cancelled_by_signals() });
+    let cancelled = || interrupted.is_cancelled();
+    let threads = args.threads.unwrap_or_else(all_cores);
+    let studio = Studio { scene, view, threads, cancelled: &cancelled };
+    let report = measure(args.repeats, &source, &studio, &folder)?;
+    folder.write_report(&report)?;
+    if args.json {
+        return print_json(&report);
+    }
+    print(&format!("{}the rest is in {}\n", front(&report.table), args.output.join(PAGE).display()))
+}
+
+fn measure(repeats: u32, source: &Source, studio: &Studio, folder: &Folder) -> Result<Report, CommandError> {
+    let steps = Steps::new();
+    let settings = Setting::worth_having(Asked::of(&studio.scene));
+    let reference_view = studio.reference_view();
+    steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
+    let reference = studio.reference(&|rows| steps.done(u64::from(rows)))?;
+    folder.save(REFERENCE, &reference)?;
+    let reference_check = check(source, studio, &reference_view, &reference, &steps)?;
+    let mut rows = compare(studio, &settings, &reference, folder, &steps)?;
+    for (row, times) in rows.iter_mut().zip(time(studio, &settings, repeats, &steps)?) {
+        (row.median_ms, row.min_ms) = summary(&times);
+    }
+    let table = Table {
+        scene: source.name.clone(),
+        width: studio.view.width,
+        height: studio.view.height,
+        threads: studio.threads,
+        simd_level: simd_level().to_owned(),
+        rows,
+    };
+    let front = table.front().into_iter().map(|index| table.rows[index].setting.clone()).collect();
+    let reference_samples = reference_view.samples;
+    Ok(Report { table, repeats, reference_samples, reference_check, front })
+}
+
+/// Asks the oracle about some pixels of the reference.
+fn check(
+    source: &Source,
+    studio: &Studio,
+    view: &FrameView,
+    reference: &RgbImage,
+    steps: &Steps,
+) -> Result<Verdict, CommandError> {
+    let pixels = chosen(view.width, view.height, affordable(&studio.scene, view.samples));
+    steps.part("reference against the oracle", pixels.len() as u64);
+    let oracle = Oracle::new(&source.scene, &source.meshes, &source.textures, view);
+    judge(&oracle, reference, &pixels, studio.threads, studio.cancelled, &|| steps.done(1))
+        .ok_or_else(stopped)
+}
+
+/// Renders and compares each setting, and writes its two pictures.
+fn compare(
+    studio: &Studio,
+    settings: &[Setting],
+    reference: &RgbImage,
+    folder: &Folder,
+    steps: &Steps,
+) -> Result<Vec<Row>, CommandError> {
+    steps.part("pictures", settings.len() as u64);
+    let one = |setting: &Setting| {
+        let compared = studio.compare(setting, reference)?;
+        folder.save(&picture_name(&compared.row.setting), &compared.picture)?;
+        folder.save(&difference_name(&compared.row.setting), &compared.errors.picture())?;
+        steps.done(1);
+        Ok(compared.row)
+    };
+    settings.iter().map(one).collect()
+}
+
+/// The times of each setting, `repeats` rounds over all of them.
+fn time(
+    studio: &Studio,
+    settings: &[Setting],
+    repeats: u32,
+    steps: &Steps,
+) -> Result<Vec<Vec<Duration>>, CommandError> {
+    steps.part("times", u64::from(repeats) * settings.len() as u64);
+    let mut times = vec![Vec::new(); settings.len()];
+    for round in 0..repeats {
+        studio.time_round(settings, &mut times, round % 2 == 1, &|| steps.done(1))?;
+    }
+    Ok(times)
+}
+
+fn stopped() -> CommandError {
+    CommandError::Interrupted("no table was written".to_owned())
+}
+
+/// Where all of it goes.
+struct Folder<'a>(&'a Path);
+
+impl<'a> Folder<'a> {
+    /// Makes it where it is not there, and sees that it can be written into.
+    fn open(path: &'a Path) -> Result<Self, CommandError> {
+        fs::create_dir_all(path).map_err(|error| {
+            CommandError::WrongInput(format!("{}: {error}; name a folder with -o", path.display()))
+        })?;
+        check_writable(&path.join(TABLE))?;
+        Ok(Self(path))
+    }
+
+    fn save(&self, name: &str, picture: &RgbImage) -> Result<(), CommandError> {
+        image::save(&self.0.join(name), picture).map_err(CommandError::failed)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) -> Result<(), CommandError> {
+        let path = self.0.join(name);
+        write_whole(&path, bytes)
+            .map_err(|error| CommandError::Failed(format!("{}: {error}", path.display())))
+    }
+
+    /// The table comes last: where it is, all else is.
+    fn write_report(&self, report: &Report) -> Result<(), CommandError> {
+        let chart = chart(report);
+        for plot in PLOTS {
+            chart.save(&self.0.join(plot)).map_err(CommandError::failed)?;
+        }
+        self.write(PAGE, markdown(report).as_bytes())?;
+        self.write(TABLE, &report.table.to_csv().map_err(CommandError::failed)?)
+    }
+}
+
+/// A line for each setting on the front.
+fn front(table: &Table) -> String {
+    let rows: Vec<&Row> = table.front().into_iter().filter_map(|index| table.rows.get(index)).collect();
+    let width = rows.iter().map(|row| row.setting.len()).max().unwrap_or(0);
+    let line =
+        |row: &&Row| format!("  {:width$} {:9.2} ms  FLIP {:.4}\n", row.setting, row.median_ms, row.flip);
+    let lines: String = rows.iter().map(line).collect();
+    format!("worth having, from the fastest to the best:\n{lines}")
+}
+
+fn print(text: &str) -> Result<(), CommandError> {
+    io::stdout()
+        .lock()
+        .write_all(text.as_bytes())
+        .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
+}
