@@ -21,7 +21,7 @@ use crate::farm::{FarmControl, FarmStatus, FinishedFrame};
 use crate::viewer::camera_control::CameraControl;
 use crate::viewer::frame_loop::{Arrival, NewsDesk};
 use crate::viewer::requests::WindowState;
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// This often the figures are looked at, and drawn if they have changed.
 const FIGURES_EVERY: Duration = Duration::from_millis(200);
@@ -63,8 +63,8 @@ pub(crate) struct Display {
     /// What is written over it on the screen.
     shown: Overlay,
     title: String,
-    /// What the dial says of it.
-    dial: Vec<String>,
+    /// What the quality controller says of it.
+    quality: Vec<String>,
     /// When the picture was asked for, until it is on the screen.
     asked_at: Option<Instant>,
     show_help: bool,
@@ -105,7 +105,7 @@ impl Display {
             picture: None,
             shown: Overlay::default(),
             title,
-            dial: Vec::new(),
+            quality: Vec::new(),
             asked_at: None,
             show_help: false,
             show_figures: true,
@@ -120,7 +120,7 @@ impl Display {
     /// A screen that takes no pictures any more.
     pub(crate) fn run(
         mut self,
-        wanted: WantedPicture,
+        wanted: ViewRequest,
         mut camera: CameraControl,
         link: &Link,
     ) -> Result<(), String> {
@@ -140,7 +140,7 @@ impl Display {
             camera.step(&happened.camera, last_step.elapsed().as_secs_f64());
             last_step = Instant::now();
             let view = FrameView { camera: camera.camera(), ..wanted.view };
-            self.ask_for(WantedPicture { view, ..wanted }, link);
+            self.ask_for(ViewRequest { view, ..wanted }, link);
 
             let fresh = self.take_news(&happened, link) | self.steer(&happened, link);
             let fresh = fresh | (self.window.get_size() != (self.canvas.width(), self.canvas.height()));
@@ -162,11 +162,11 @@ impl Display {
     }
 
     /// Wants a picture of the window's size; only a change of view is worth a message.
-    fn ask_for(&self, picture: WantedPicture, link: &Link) {
+    fn ask_for(&self, picture: ViewRequest, link: &Link) {
         let (width, height) = self.window.get_size();
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(MAX_SIDE).clamp(1, MAX_SIDE);
         let view = FrameView { width: side(width), height: side(height), ..picture.view };
-        let picture = WantedPicture { view, ..picture };
+        let picture = ViewRequest { view, ..picture };
         let state = WindowState { picture, hidden: self.watch.is_hidden() };
         link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, state) != state);
     }
@@ -187,10 +187,10 @@ impl Display {
         self.show_figures ^= happened.toggle_figures;
         (0..happened.next_coloring).for_each(|_| self.coloring = self.coloring.next());
         let mut fresh = happened.toggle_help || happened.toggle_figures || happened.next_coloring > 0;
-        if let Some(Arrival { frame, asked_at, dial }) = link.desk.take_picture() {
+        if let Some(Arrival { frame, asked_at, quality }) = link.desk.take_picture() {
             // What comes while the window is hidden is shown at some other time: that is no latency.
             let asked_at = (!self.watch.is_hidden()).then_some(asked_at);
-            (self.picture, self.asked_at, self.dial) = (Some(frame), asked_at, dial);
+            (self.picture, self.asked_at, self.quality) = (Some(frame), asked_at, quality);
             fresh = true;
         }
         fresh
@@ -291,7 +291,7 @@ impl Display {
             latency: link.desk.latency(),
             size: (view.width, view.height),
             samples: shown.view.samples,
-            dial: resting.clone().unwrap_or_else(|| self.dial.clone()),
+            quality: resting.clone().unwrap_or_else(|| self.quality.clone()),
             reductions: shown.reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),

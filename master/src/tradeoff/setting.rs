@@ -7,7 +7,7 @@ use rayfarm_tracer::scene::{
     ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
 };
 
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// What a scene asks for: whatever it does not, no knob needs to leave out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ struct Knob {
     name: &'static str,
     /// Whether the picture can change by it.
     matters: fn(Asked) -> bool,
-    turn: fn(&mut WantedPicture),
+    turn: fn(&mut ViewRequest),
 }
 
 /// A way to render: some knobs turned, the others left.
@@ -151,10 +151,10 @@ impl Setting {
     }
 
     /// The picture of that view under this setting. Whatever knobs were turned before are not; dither takes nothing away.
-    pub(crate) fn applied_to(&self, view: &FrameView) -> WantedPicture {
+    pub(crate) fn applied_to(&self, view: &FrameView) -> ViewRequest {
         let quality = Quality { dither: view.quality.dither, ..Quality::default() };
         let view = FrameView { samples: 1, quality, ..*view };
-        let mut picture = WantedPicture { view, scale: RenderScale::Full };
+        let mut picture = ViewRequest { view, scale: RenderScale::Full };
         for knob in self.knobs {
             (knob.turn)(&mut picture);
         }
@@ -209,8 +209,7 @@ mod tests {
         let view = crate::test_scene::view();
         let turned =
             FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
-        let pictures: Vec<WantedPicture> =
-            SETTINGS.iter().map(|setting| setting.applied_to(&turned)).collect();
+        let pictures: Vec<ViewRequest> = SETTINGS.iter().map(|setting| setting.applied_to(&turned)).collect();
         for (index, picture) in pictures.iter().enumerate() {
             assert!(picture.rendered().validate().is_ok() && picture.view.camera == view.camera);
             assert!(!pictures[..index].contains(picture), "{}", SETTINGS[index].name());

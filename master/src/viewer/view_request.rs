@@ -9,14 +9,14 @@ use serde::Serialize;
 
 /// A picture, and the scale at which the farm renders it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct WantedPicture {
+pub(crate) struct ViewRequest {
     /// What it shows, and the size in which it is wanted.
     pub(crate) view: FrameView,
     /// The part of width and height that is rendered.
     pub(crate) scale: RenderScale,
 }
 
-impl WantedPicture {
+impl ViewRequest {
     /// What the farm is asked for.
     pub(crate) fn rendered(&self) -> FrameView {
         let (width, height) = self.size();
@@ -104,8 +104,8 @@ mod tests {
     use super::*;
     use crate::test_scene;
 
-    fn full() -> WantedPicture {
-        WantedPicture { view: test_scene::view(), scale: RenderScale::Full }
+    fn full() -> ViewRequest {
+        ViewRequest { view: test_scene::view(), scale: RenderScale::Full }
     }
 
     #[test]
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn every_reduction_is_named_and_reported() {
-        let mut wanted = WantedPicture { scale: RenderScale::Half, ..full() };
+        let mut wanted = ViewRequest { scale: RenderScale::Half, ..full() };
         wanted.view.samples = 4;
         wanted.view.quality = Quality {
             adaptive: true,
@@ -157,7 +157,7 @@ mod tests {
         let now = full();
         for scale in RenderScale::ALL {
             let quality = Quality { shadows: false, ..Quality::default() };
-            let then = WantedPicture { view: FrameView { quality, ..now.view }, scale };
+            let then = ViewRequest { view: FrameView { quality, ..now.view }, scale };
             assert_eq!(now.shown_by(&then.rendered()), then);
         }
         // The window was larger.

@@ -15,20 +15,20 @@ use crate::app::control::Place;
 pub(crate) use values::Size;
 use values::{frame_count, frame_index, ray_count, sample_count, size, thread_count, worker_count};
 
-mod dial;
 mod farm;
 mod models;
 mod picture;
 mod plot;
+mod quality_control;
 mod simulate;
 mod tradeoff;
 mod values;
 
-pub(crate) use dial::{DialArgs, ErrorArgs};
 pub(crate) use farm::FarmArgs;
 pub(crate) use models::ModelArgs;
 pub(crate) use picture::{PictureArgs, QualityArgs};
 pub(crate) use plot::PlotArgs;
+pub(crate) use quality_control::{ErrorArgs, QualityControlArgs};
 pub(crate) use simulate::{Profile, SimulateArgs};
 pub(crate) use tradeoff::TradeoffArgs;
 
@@ -126,7 +126,7 @@ pub(crate) struct ViewArgs {
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
-    pub(crate) dial: DialArgs,
+    pub(crate) quality_control: QualityControlArgs,
     /// End after N frames; without it, the window stays until Esc. Frames are rendered although nothing changes.
     #[arg(long, value_name = "N", value_parser = frame_count)]
     pub(crate) frames: Option<u32>,
@@ -138,7 +138,7 @@ pub(crate) struct ViewArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) fps_log: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) oversight: OversightArgs,
+    pub(crate) observability: ObservabilityArgs,
 }
 
 /// `render`.
@@ -179,7 +179,7 @@ pub(crate) struct RenderArgs {
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
-    pub(crate) oversight: OversightArgs,
+    pub(crate) observability: ObservabilityArgs,
 }
 
 /// `compile`.
@@ -274,10 +274,10 @@ pub(crate) struct CheckNumericsArgs {
 
 /// What watches and steers a run.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct OversightArgs {
-    /// Write what every worker did when, for ui.perfetto.dev or chrome://tracing.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) trace: Option<PathBuf>,
+pub(crate) struct ObservabilityArgs {
+    /// Write a timeline of what every worker did, for ui.perfetto.dev or chrome://tracing.
+    #[arg(long, alias = "trace", value_name = "FILE")]
+    pub(crate) timeline: Option<PathBuf>,
     /// Take commands, one a line: from standard input (-), a port of this machine (127.0.0.1:PORT; its log names the
     /// token) or a Unix socket (a path with a slash in it). The command help lists them.
     #[arg(long, value_name = "PLACE", value_parser = Place::parse, allow_hyphen_values = true)]

@@ -236,10 +236,12 @@ fn the_definition_itself_is_sound() {
 
 #[test]
 fn a_run_is_watched_and_steered() {
-    let oversight = render("rayfarm-master render a.toml -o a.png --trace t.json --control -").oversight;
-    assert_eq!(oversight.trace, Some("t.json".into()));
-    assert_eq!(oversight.control, Some(Place::StandardInput));
-    assert!(view("rayfarm-master --control 127.0.0.1:7118").oversight.control.is_some());
+    let observability =
+        render("rayfarm-master render a.toml -o a.png --trace t.json --control -").observability;
+    assert_eq!(observability.timeline, Some("t.json".into()));
+    assert_eq!(view("rayfarm-master --timeline t.json").observability.timeline, Some("t.json".into()));
+    assert_eq!(observability.control, Some(Place::StandardInput));
+    assert!(view("rayfarm-master --control 127.0.0.1:7118").observability.control.is_some());
     assert!(refused("rayfarm-master --control 0.0.0.0:7118").contains("other machines"));
 }
 
@@ -282,7 +284,7 @@ fn knobs_are_read_and_win_over_the_scene() {
 
 #[test]
 fn a_rate_and_an_error_are_numbers_in_their_range() {
-    let args = view("rayfarm-master --target-fps 60 --max-error 0.05").dial;
+    let args = view("rayfarm-master --target-fps 60 --max-error 0.05").quality_control;
     assert_eq!((args.target_fps, args.error.max_error), (Some(60.0), Some(0.05)));
     assert_eq!(render("rayfarm-master render a.toml -o b.png --max-error 0").error.max_error, Some(0.0));
     for wrong in

@@ -14,7 +14,7 @@ use crate::app::error::CommandError;
 use crate::app::reports::{BenchReport, MsPerFrame, RaysPerFrame, print_json, round_to_us};
 use crate::display::overlay::{counted, grouped};
 use crate::in_process::{all_cores, trace};
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// Measures the frames of a scene and tells the figures on standard output.
 ///
@@ -42,7 +42,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
 
 struct Bench {
     scene: Arc<CompiledScene>,
-    wanted: WantedPicture,
+    wanted: ViewRequest,
     threads: usize,
     /// The newest frame, in the size in which it is wanted.
     picture: RgbImage,
@@ -51,7 +51,7 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(scene: Arc<CompiledScene>, wanted: WantedPicture, threads: usize) -> Self {
+    fn new(scene: Arc<CompiledScene>, wanted: ViewRequest, threads: usize) -> Self {
         let picture = RgbImage::new(0, 0);
         Self { scene, wanted, threads, picture, times: Vec::new(), rays: RayCounts::default() }
     }

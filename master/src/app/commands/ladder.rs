@@ -1,28 +1,30 @@
-//! The dial as a command line asks for it.
+//! The quality controller as a command line asks for it.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::source::Source;
-use crate::app::cli::{DialArgs, ErrorArgs};
+use crate::app::cli::{ErrorArgs, QualityControlArgs};
 use crate::app::error::CommandError;
 use crate::tradeoff::table::Table;
-use crate::viewer::quality_controller::{Dial, Ladder, measured_ladder, prior_ladder};
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::quality_controller::{Ladder, QualityController, measured_ladder, prior_ladder};
+use crate::viewer::view_request::ViewRequest;
 
-/// What a window shall show when it rests, and the dial for when it moves. With a rate to hold, the largest error is for
+/// What a window shall show when it rests, and the quality controller for when it moves. With a rate to hold, the largest error is for
 /// moving pictures; without one, for all.
 ///
 /// # Errors
 /// A table that cannot be used.
 pub(super) fn turned(
-    args: &DialArgs,
+    args: &QualityControlArgs,
     source: &Source,
-    wanted: WantedPicture,
+    wanted: ViewRequest,
     animated: bool,
-) -> Result<(WantedPicture, Option<Dial>), CommandError> {
+) -> Result<(ViewRequest, Option<QualityController>), CommandError> {
     Ok(match args.target_fps {
-        Some(rate) => (wanted, Some(Dial::new(ladder(&args.error, source, &wanted)?, rate, animated))),
+        Some(rate) => {
+            (wanted, Some(QualityController::new(ladder(&args.error, source, &wanted)?, rate, animated)))
+        }
         None => (within(&args.error, source, wanted)?, None),
     })
 }
@@ -34,8 +36,8 @@ pub(super) fn turned(
 pub(super) fn within(
     args: &ErrorArgs,
     source: &Source,
-    wanted: WantedPicture,
-) -> Result<WantedPicture, CommandError> {
+    wanted: ViewRequest,
+) -> Result<ViewRequest, CommandError> {
     Ok(match args.max_error {
         Some(_) => ladder(args, source, &wanted)?.cheapest().applied(&wanted),
         None if args.front.is_some() => {
@@ -46,7 +48,7 @@ pub(super) fn within(
     })
 }
 
-fn ladder(args: &ErrorArgs, source: &Source, wanted: &WantedPicture) -> Result<Ladder, CommandError> {
+fn ladder(args: &ErrorArgs, source: &Source, wanted: &ViewRequest) -> Result<Ladder, CommandError> {
     let ladder = match &args.front {
         Some(path) => {
             let table = Table::read(path).map_err(CommandError::wrong_input)?;
@@ -68,7 +70,7 @@ fn ladder(args: &ErrorArgs, source: &Source, wanted: &WantedPicture) -> Result<L
 }
 
 /// The ladder of the table that lies with the scene, if there is one that can be used; where it cannot, the log says why.
-fn own_ladder(source: &Source, wanted: &WantedPicture) -> Option<Ladder> {
+fn own_ladder(source: &Source, wanted: &ViewRequest) -> Option<Ladder> {
     let path = table_places(&source.path).into_iter().find(|path| path.is_file())?;
     let ladder = Table::read(&path).map_err(|error| error.to_string()).and_then(|table| {
         let ladder = if table.scene == source.name {
@@ -132,7 +134,7 @@ mod tests {
         }
         let source = Source::load(&folder.path().join(scene), ModelArgs::default(), None).unwrap();
         let view = FrameView { samples, ..FrameView::of(&source.scene) };
-        let wanted = WantedPicture { view, scale: RenderScale::Full };
+        let wanted = ViewRequest { view, scale: RenderScale::Full };
         let front = front.map(|name| folder.path().join(name));
         ladder(&ErrorArgs { max_error: None, front }, &source, &wanted).unwrap().origin()
     }

@@ -3,27 +3,27 @@
 use tokio_util::sync::CancellationToken;
 
 use crate::accounting::TraceFile;
-use crate::app::cli::OversightArgs;
+use crate::app::cli::ObservabilityArgs;
 use crate::app::control::{self, Console, Place};
 use crate::app::error::CommandError;
 use crate::farm::Farm;
 
 /// As asked for on the command line.
-pub(super) struct Oversight {
-    trace: Option<TraceFile>,
+pub(super) struct Observability {
+    timeline: Option<TraceFile>,
     control: Option<Place>,
     /// Cancelled when the run is over.
     over: CancellationToken,
 }
 
-impl Oversight {
+impl Observability {
     /// Creates the trace's file.
     ///
     /// # Errors
     /// A place that cannot be written.
-    pub(super) fn new(args: &OversightArgs) -> Result<Self, CommandError> {
-        let trace = args.trace.as_deref().map(TraceFile::create).transpose()?;
-        Ok(Self { trace, control: args.control.clone(), over: CancellationToken::new() })
+    pub(super) fn new(args: &ObservabilityArgs) -> Result<Self, CommandError> {
+        let timeline = args.timeline.as_deref().map(TraceFile::create).transpose()?;
+        Ok(Self { timeline, control: args.control.clone(), over: CancellationToken::new() })
     }
 
     /// Watches a farm from now on, and takes commands for it; `quit` is cancelled where they end the run. Call it inside
@@ -32,8 +32,8 @@ impl Oversight {
     /// # Errors
     /// A place that cannot be listened at.
     pub(super) fn begin(&self, farm: &Farm, quit: &CancellationToken) -> Result<(), CommandError> {
-        if let Some(trace) = &self.trace {
-            farm.trace_into(trace.sink());
+        if let Some(timeline) = &self.timeline {
+            farm.trace_into(timeline.sink());
         }
         match &self.control {
             Some(place) => {
@@ -50,11 +50,11 @@ impl Oversight {
     /// A trace that could not be written.
     pub(super) fn end(&mut self) -> Result<(), CommandError> {
         self.over.cancel();
-        self.trace.take().map_or(Ok(()), TraceFile::finish)
+        self.timeline.take().map_or(Ok(()), TraceFile::finish)
     }
 }
 
-impl Drop for Oversight {
+impl Drop for Observability {
     fn drop(&mut self) {
         self.over.cancel();
     }

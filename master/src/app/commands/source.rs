@@ -11,7 +11,7 @@ use rayfarm_tracer::texture::Texture;
 use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::app::error::CommandError;
 use crate::viewer::orbit::Animation;
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// The scene shown when none is named, inside a folder of models.
 const DEFAULT_SCENE: &str = "room.toml";
@@ -53,7 +53,7 @@ impl Source {
     ///
     /// # Errors
     /// A combination that cannot be rendered.
-    pub(super) fn wanted(&self, picture: &PictureArgs) -> Result<WantedPicture, CommandError> {
+    pub(super) fn wanted(&self, picture: &PictureArgs) -> Result<ViewRequest, CommandError> {
         self.wanted_still(picture.size, picture.samples, &picture.quality)
     }
 
@@ -66,7 +66,7 @@ impl Source {
         size: Option<Size>,
         samples: Option<u32>,
         quality: &QualityArgs,
-    ) -> Result<WantedPicture, CommandError> {
+    ) -> Result<ViewRequest, CommandError> {
         let mut view = FrameView::of(&self.scene);
         if let Some(size) = size {
             (view.width, view.height) = (size.width, size.height);
@@ -79,7 +79,7 @@ impl Source {
                            ask for more with --samples 4, 9, 16, ..., or leave --adaptive out";
             return Err(CommandError::WrongInput(message.into()));
         }
-        Ok(WantedPicture { view, scale: quality.scale_over(self.scene.render.scale) })
+        Ok(ViewRequest { view, scale: quality.scale_over(self.scene.render.scale) })
     }
 
     /// The scene as the tracer wants it: trees, bounds and counts.

@@ -6,7 +6,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::interrupt::cancelled_by_signals;
 use super::ladder::turned;
-use super::observability::Oversight;
+use super::observability::Observability;
 use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
 use crate::app::error::CommandError;
@@ -30,7 +30,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let source = Source::load(&path, args.models, args.picture.size)?;
     let asked = source.wanted(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
-    let (picture, dial) = turned(&args.dial, &source, asked, animation.is_moving())?;
+    let (picture, quality_controller) = turned(&args.quality_control, &source, asked, animation.is_moving())?;
     let view = picture.view;
     let compiled = source.compiled()?;
     let about = About {
@@ -41,7 +41,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let camera = CameraControl::new(view.camera, compiled.bounds());
     drop(compiled);
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
-    let mut oversight = Oversight::new(&args.oversight)?;
+    let mut observability = Observability::new(&args.observability)?;
     let display = Display::open(about, view.width, view.height).map_err(|problem| {
         CommandError::Failed(format!(
             "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
@@ -54,13 +54,13 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let limit = args.frames.map(u64::from);
     // A number of frames is for measuring: they are rendered although nothing changes.
     let pace = Pace { animation, limit, continuous: args.continuous || limit.is_some() };
-    let orders = Orders { wanted: wishes, pace, log, dial };
+    let orders = Orders { wanted: wishes, pace, log, controller: quality_controller };
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
-    let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, &oversight, stop))?;
+    let (link, farm) = runtime.block_on(start(&args, source, wanted, orders, &observability, stop))?;
     let shown = display.run(picture, camera, &link).map_err(CommandError::Failed);
     let ended = runtime.block_on(farm).map_err(CommandError::failed)?;
-    ended.and(shown).and(oversight.end()).and_then(|()| all_shown(&args, &link, &interrupted))
+    ended.and(shown).and(observability.end()).and_then(|()| all_shown(&args, &link, &interrupted))
 }
 
 /// Starts the farm and the task that keeps it busy.
@@ -69,7 +69,7 @@ async fn start(
     source: Source,
     wanted: watch::Sender<WindowState>,
     orders: Orders,
-    oversight: &Oversight,
+    observability: &Observability,
     stop: CancellationToken,
 ) -> Result<(Link, JoinHandle<Result<(), CommandError>>), CommandError> {
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
@@ -77,7 +77,7 @@ async fn start(
     if let Some(frames) = args.frames {
         farm.expect_frames(frames.into());
     }
-    oversight.begin(&farm, &stop)?;
+    observability.begin(&farm, &stop)?;
     let link = Link { wanted, desk: NewsDesk::new(), control: farm.control(), address: farm.address(), stop };
     let task = tokio::spawn(frame_loop::run(farm, orders, link.desk.clone(), link.stop.clone()));
     Ok((link, task))

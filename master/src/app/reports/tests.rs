@@ -2,7 +2,7 @@ use rayfarm_tracer::scene::RenderScale;
 
 use super::*;
 use crate::test_scene;
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 fn ms(values: &[u64]) -> Vec<Duration> {
     values.iter().copied().map(Duration::from_millis).collect()
@@ -47,7 +47,7 @@ fn claims_of_any_size_sum_up_and_have_a_mean() {
 
 #[test]
 fn the_json_line_has_the_documented_shape() {
-    let full = WantedPicture { view: test_scene::view(), scale: RenderScale::Full };
+    let full = ViewRequest { view: test_scene::view(), scale: RenderScale::Full };
     let report = RenderReport {
         frames: 2,
         skipped: 1,

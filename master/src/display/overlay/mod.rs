@@ -89,8 +89,8 @@ pub(super) struct Figures {
     pub(super) size: (u32, u32),
     /// Rays per pixel.
     pub(super) samples: u32,
-    /// What the dial says.
-    pub(super) dial: Vec<String>,
+    /// What the quality controller says.
+    pub(super) quality: Vec<String>,
     /// Each knob that is not at full quality.
     pub(super) reductions: Vec<String>,
     /// Workers connected.
@@ -109,7 +109,7 @@ impl Figures {
         let mut lines = vec![self.speed()];
         let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
-        lines.extend(self.dial.iter().chain(&self.reductions).cloned());
+        lines.extend(self.quality.iter().chain(&self.reductions).cloned());
         lines.push(format!(
             "{}, {}",
             counted(self.workers as u64, "worker"),

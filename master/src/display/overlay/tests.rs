@@ -14,7 +14,7 @@ fn figures() -> Figures {
         latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
         samples: 4,
-        dial: Vec::new(),
+        quality: Vec::new(),
         reductions: Vec::new(),
         workers: 2,
         threads: 4,
@@ -60,9 +60,9 @@ fn figures_can_be_read_off_the_canvas() {
 #[test]
 fn the_dial_and_every_knob_that_is_not_at_full_have_a_line() {
     let reductions = vec!["scale 1/2".to_owned(), "no shadows".to_owned()];
-    let dial = vec!["moving: loses FLIP 0.050".to_owned()];
-    let lines = Figures { dial: dial.clone(), reductions: reductions.clone(), ..figures() }.lines();
-    let expected = [&figures().lines()[..2], &dial, &reductions, &figures().lines()[2..]].concat();
+    let quality = vec!["moving: loses FLIP 0.050".to_owned()];
+    let lines = Figures { quality: quality.clone(), reductions: reductions.clone(), ..figures() }.lines();
+    let expected = [&figures().lines()[..2], &quality, &reductions, &figures().lines()[2..]].concat();
     assert_eq!(lines, expected);
 }
 

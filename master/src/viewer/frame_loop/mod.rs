@@ -19,7 +19,7 @@ use crate::accounting::Fading;
 use crate::app::error::CommandError;
 use crate::app::reports::{FpsLog, FrameLine};
 use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame};
-use crate::viewer::quality_controller::Dial;
+use crate::viewer::quality_controller::QualityController;
 
 /// How often the window learns of workers that come and go.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
@@ -36,7 +36,7 @@ pub(crate) struct Orders {
     /// Where each frame is noted.
     pub(crate) log: Option<FpsLog<BufWriter<File>>>,
     /// What holds a rate, if one is to be held.
-    pub(crate) dial: Option<Dial>,
+    pub(crate) controller: Option<QualityController>,
 }
 
 /// A picture for the window.
@@ -46,8 +46,8 @@ pub(crate) struct Arrival {
     pub(crate) frame: FinishedFrame,
     /// When what it shows was first wanted.
     pub(crate) asked_at: Instant,
-    /// What the dial says of it.
-    pub(crate) dial: Vec<String>,
+    /// What the quality controller says of it.
+    pub(crate) quality: Vec<String>,
 }
 
 /// What the window may know at any moment.
@@ -63,7 +63,7 @@ pub(crate) struct News {
     completed: u64,
     /// When a frame was completed, or frames were requested again after a rest.
     last_completed: Duration,
-    /// Since when nothing has been requested, and what the dial says of the picture.
+    /// Since when nothing has been requested, and what the quality controller says of the picture.
     quiet: Option<(Duration, Vec<String>)>,
     /// How long nothing was requested before the frame that is on the way.
     rest: Duration,
@@ -134,11 +134,11 @@ impl NewsDesk {
         news.started.elapsed().saturating_sub(news.last_completed)
     }
 
-    /// Whether the picture rests: nothing has been requested for a while. With a dial, what it says of the picture.
+    /// Whether the picture rests: nothing has been requested for a while. With a quality controller, what it says of the picture.
     pub(crate) fn resting(&self) -> Option<Vec<String>> {
         let news = self.lock();
-        let (since, dial) = news.quiet.as_ref()?;
-        (news.started.elapsed().saturating_sub(*since) >= QUIET).then(|| dial.clone())
+        let (since, controller) = news.quiet.as_ref()?;
+        (news.started.elapsed().saturating_sub(*since) >= QUIET).then(|| controller.clone())
     }
 
     /// Notes whether anything is requested. Figures of the time before a rest say nothing of the time after it.
@@ -146,7 +146,9 @@ impl NewsDesk {
         let mut news = self.lock();
         let now = news.started.elapsed();
         match (rests, news.quiet.take()) {
-            (Some(dial), before) => news.quiet = Some((before.map_or(now, |(since, _)| since), dial)),
+            (Some(controller), before) => {
+                news.quiet = Some((before.map_or(now, |(since, _)| since), controller))
+            }
             (None, Some((since, _))) if now.saturating_sub(since) >= QUIET => {
                 news.rate.rested();
                 news.last_completed = now;
@@ -188,8 +190,8 @@ impl NewsDesk {
         let line = FrameLine::of(&frame, news.completed, at, frame.elapsed, news.rate.fps(at));
         news.completed += 1;
         news.last_completed = at;
-        let Answered { asked_at, dial } = answered;
-        news.latest = Some(Arrival { frame, asked_at, dial });
+        let Answered { asked_at, quality } = answered;
+        news.latest = Some(Arrival { frame, asked_at, quality });
         line
     }
 
@@ -222,9 +224,9 @@ async fn drive(
     desk: &NewsDesk,
     stop: &CancellationToken,
 ) -> Result<(), CommandError> {
-    let Orders { mut wanted, pace, mut log, dial } = orders;
+    let Orders { mut wanted, pace, mut log, controller } = orders;
     let limit = pace.limit;
-    let mut requests = Requests::new(pace, dial);
+    let mut requests = Requests::new(pace, controller);
     let mut look = tokio::time::interval(STATUS_EVERY);
     let mut window_is_there = true;
     requests.fill(farm, &wanted.borrow_and_update().clone());

@@ -1,4 +1,4 @@
-//! The feed with a dial, over a farm with workers that follow a script.
+//! The feed with a quality controller, over a farm with workers that follow a script.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -15,9 +15,9 @@ use crate::fake_worker::{self, Script, is_picture};
 use crate::farm::{Farm, FarmOptions, FarmScene};
 use crate::test_scene::{scene, view};
 use crate::viewer::orbit::Animation;
-use crate::viewer::quality_controller::{Dial, Shown, prior_ladder};
+use crate::viewer::quality_controller::{QualityController, QualityMode, prior_ladder};
 use crate::viewer::requests::{Pace, WindowState};
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -33,7 +33,7 @@ struct Feed {
 }
 
 impl Feed {
-    async fn start(script: Script, animation: Animation, dial: Option<Dial>) -> Self {
+    async fn start(script: Script, animation: Animation, controller: Option<QualityController>) -> Self {
         let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
         let options = FarmOptions { listen, ..FarmOptions::default() };
         let scene = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
@@ -42,7 +42,7 @@ impl Feed {
         let (wanted, wishes) = watch::channel(seen(0));
         let (desk, stop) = (NewsDesk::new(), CancellationToken::new());
         let pace = Pace { animation, limit: None, continuous: false };
-        let orders = Orders { wanted: wishes, pace, log: None, dial };
+        let orders = Orders { wanted: wishes, pace, log: None, controller };
         let task = tokio::spawn(run(farm, orders, desk.clone(), stop.clone()));
         Self { wanted, desk, stop, task }
     }
@@ -67,8 +67,8 @@ impl Feed {
     }
 }
 
-fn turned(spin: u32) -> WantedPicture {
-    WantedPicture { view: FrameView { spin: f64::from(spin), ..view() }, scale: RenderScale::Full }
+fn turned(spin: u32) -> ViewRequest {
+    ViewRequest { view: FrameView { spin: f64::from(spin), ..view() }, scale: RenderScale::Full }
 }
 
 fn seen(spin: u32) -> WindowState {
@@ -76,17 +76,17 @@ fn seen(spin: u32) -> WindowState {
 }
 
 /// One that has seen what full pictures take.
-fn dial(animated: bool) -> Dial {
-    let mut dial = Dial::new(prior_ladder(&scene(), &turned(0)), TOO_FAST, animated);
+fn controller(animated: bool) -> QualityController {
+    let mut controller = QualityController::new(prior_ladder(&scene(), &turned(0)), TOO_FAST, animated);
     let (ms, account) = (|ms| Duration::from_millis(ms), FrameAccount::default());
     for frame in 1..20 {
-        dial.finished(ms(10 * frame), ms(10), Shown::Resting, Duration::ZERO, &account);
+        controller.finished(ms(10 * frame), ms(10), QualityMode::Resting, Duration::ZERO, &account);
     }
-    dial
+    controller
 }
 
 fn is_at_rest(arrival: &Arrival) -> bool {
-    arrival.dial.first().is_some_and(|line| line.starts_with("at rest"))
+    arrival.quality.first().is_some_and(|line| line.starts_with("at rest"))
 }
 
 fn is_reduced(arrival: &Arrival) -> bool {
@@ -96,7 +96,7 @@ fn is_reduced(arrival: &Arrival) -> bool {
 #[tokio::test]
 async fn what_moves_is_reduced_and_what_rests_is_the_full_picture_to_the_last_bit() {
     let plain = Feed::start(Script::Honest, STILL, None).await;
-    let feed = Feed::start(Script::Busy, STILL, Some(dial(false))).await;
+    let feed = Feed::start(Script::Busy, STILL, Some(controller(false))).await;
     let first = feed.picture(|| (), |_| true).await;
     assert!(is_at_rest(&first) && is_picture(&turned(0).view, &first.frame.pixels));
 
@@ -106,7 +106,7 @@ async fn what_moves_is_reduced_and_what_rests_is_the_full_picture_to_the_last_bi
         feed.wanted.send_replace(seen(spin));
     };
     let moving = feed.picture(turn, is_reduced).await;
-    assert!(moving.dial[0].starts_with("moving: loses about FLIP 0."), "{:?}", moving.dial);
+    assert!(moving.quality[0].starts_with("moving: loses about FLIP 0."), "{:?}", moving.quality);
     assert!(is_picture(&moving.frame.view, &moving.frame.pixels));
 
     let last = turned(spin).view;
@@ -116,14 +116,14 @@ async fn what_moves_is_reduced_and_what_rests_is_the_full_picture_to_the_last_bi
     plain.wanted.send_replace(seen(spin));
     let without = plain.picture(|| (), |arrival| arrival.frame.view.spin == last.spin).await;
     assert_eq!(*rests.frame.pixels, *without.frame.pixels);
-    assert!(without.dial.is_empty());
+    assert!(without.quality.is_empty());
     feed.end().await;
     plain.end().await;
 }
 
 #[tokio::test]
 async fn a_full_picture_on_the_way_gives_way_to_a_moving_one() {
-    let feed = Feed::start(Script::OnlyNarrowerThan(view().width), STILL, Some(dial(false))).await;
+    let feed = Feed::start(Script::OnlyNarrowerThan(view().width), STILL, Some(controller(false))).await;
     // Nobody finishes the full one.
     tokio::time::timeout(PATIENCE, async {
         while feed.desk.status().frame.is_none() {
@@ -142,7 +142,7 @@ async fn a_full_picture_on_the_way_gives_way_to_a_moving_one() {
 #[tokio::test]
 async fn an_animation_never_rests() {
     let spinning = Animation { spin: 1.0, ..STILL };
-    let feed = Feed::start(Script::Busy, spinning, Some(dial(true))).await;
+    let feed = Feed::start(Script::Busy, spinning, Some(controller(true))).await;
     for _ in 0..20 {
         let frame = feed.picture(|| (), |_| true).await;
         assert!(!is_at_rest(&frame) && is_reduced(&frame));
@@ -155,8 +155,8 @@ const A_WHILE: Duration = Duration::from_millis(1500);
 
 #[tokio::test]
 async fn at_rest_there_is_one_full_picture_and_then_silence_until_something_changes() {
-    for dial in [None, Some(dial(false))] {
-        let feed = Feed::start(Script::Honest, STILL, dial).await;
+    for controller in [None, Some(controller(false))] {
+        let feed = Feed::start(Script::Honest, STILL, controller).await;
         let first = feed.picture(|| (), |_| true).await;
         assert!(is_picture(&turned(0).view, &first.frame.pixels));
         tokio::time::sleep(A_WHILE).await;

@@ -1,4 +1,4 @@
-//! The dial over a simulated farm, whose frames wait for render threads or for the wire, whichever takes longer.
+//! The quality controller over a simulated farm, whose frames wait for render threads or for the wire, whichever takes longer.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -16,23 +16,23 @@ use crate::tradeoff::table::Table;
 const ROOM: &[u8] = include_bytes!("../../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;
 
-/// A farm that renders what a dial asks for, in an animation.
+/// A farm that renders what a quality controller asks for, in an animation.
 struct Simulation {
-    dial: Dial,
+    controller: QualityController,
     /// Seconds of the full picture: of the threads, and on the wire.
     threads: f64,
     wire: f64,
     noise: f64,
     dice: Dice,
     now: Duration,
-    in_flight: VecDeque<(Shown, Rung)>,
+    in_flight: VecDeque<(QualityMode, Rung)>,
 }
 
 impl Simulation {
     fn new(ladder: Ladder, target_fps: f64, threads: f64, wire: f64) -> Self {
-        let dial = Dial::new(ladder, target_fps, true);
+        let controller = QualityController::new(ladder, target_fps, true);
         let mut simulation = Self {
-            dial,
+            controller,
             threads,
             wire,
             noise: 0.0,
@@ -45,14 +45,14 @@ impl Simulation {
     }
 
     fn ask(&mut self) {
-        let shown = self.dial.next(self.now);
-        let rung = *self.dial.rung(shown).unwrap();
-        self.in_flight.push_back((shown, rung));
+        let mode = self.controller.next(self.now);
+        let rung = *self.controller.rung(mode).unwrap();
+        self.in_flight.push_back((mode, rung));
     }
 
     /// The setting of a frame, and what it took.
     fn frame(&mut self) -> (Rung, f64) {
-        let (shown, rung) = self.in_flight.pop_front().unwrap();
+        let (mode, rung) = self.in_flight.pop_front().unwrap();
         let noise = 1.0 + self.noise * (2.0 * self.dice.fraction() - 1.0);
         let busy = self.threads * rung.cost * noise;
         let took = busy.max(self.wire * rung.wire * noise);
@@ -62,7 +62,7 @@ impl Simulation {
         let account = FrameAccount { workers: vec![worker], segments: Vec::new() };
         let asked_at = self.now;
         self.now += Duration::from_secs_f64(took);
-        self.dial.finished(self.now, Duration::from_secs_f64(took), shown, asked_at, &account);
+        self.controller.finished(self.now, Duration::from_secs_f64(took), mode, asked_at, &account);
         self.ask();
         (rung, took)
     }
@@ -72,12 +72,12 @@ impl Simulation {
     }
 
     fn told(&self) -> Vec<String> {
-        self.dial.told(self.in_flight.back().unwrap().0)
+        self.controller.told(self.in_flight.back().unwrap().0)
     }
 }
 
-fn wanted(samples: u32) -> WantedPicture {
-    WantedPicture { view: FrameView { samples, ..test_scene::view() }, scale: RenderScale::Full }
+fn wanted(samples: u32) -> ViewRequest {
+    ViewRequest { view: FrameView { samples, ..test_scene::view() }, scale: RenderScale::Full }
 }
 
 /// The general ladder of a scene with shadows and highlights.

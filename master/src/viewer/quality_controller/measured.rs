@@ -7,7 +7,7 @@ use super::setting::{Setting, bytes};
 use super::small_scales::continued;
 use crate::tradeoff::setting::Setting as Measured;
 use crate::tradeoff::table::{Row, Table};
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// The front of a table, for pictures that rest as `wanted`. Costs are parts of that row's time, losses what the mean FLIP
 /// error is more than there.
@@ -15,7 +15,7 @@ use crate::viewer::view_request::WantedPicture;
 /// # Errors
 /// A table without a row for the picture at rest, or a picture at rest with a knob turned down: the table's errors are those
 /// beside all that a scene can ask for, and say nothing of what is lost beside less. In words.
-pub(crate) fn ladder(table: &Table, wanted: &WantedPicture) -> Result<Ladder, String> {
+pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, String> {
     let turned = wanted.reductions();
     if !turned.is_empty() {
         return Err(format!(
@@ -24,7 +24,7 @@ pub(crate) fn ladder(table: &Table, wanted: &WantedPicture) -> Result<Ladder, St
         ));
     }
     let known = |name: &str| Measured::named(name).map(|setting| setting.applied_to(&wanted.view));
-    let rests = |picture: &WantedPicture| picture == wanted;
+    let rests = |picture: &ViewRequest| picture == wanted;
     let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(rests));
     let Some(full) = full else {
         let names: Vec<&str> = table.rows.iter().map(|row| row.setting.as_str()).collect();
@@ -61,7 +61,7 @@ fn small_rows(table: &Table) -> Vec<Row> {
 }
 
 /// Whether a picture asks for nothing that the other one does not.
-fn is_below(picture: &WantedPicture, wanted: &WantedPicture) -> bool {
+fn is_below(picture: &ViewRequest, wanted: &ViewRequest) -> bool {
     Setting::of(picture).applied(wanted) == *picture && picture != wanted
 }
 
@@ -89,9 +89,9 @@ mod tests {
         Table { scene, width: 64, height: 48, threads: 1, simd_level, rows }
     }
 
-    fn resting(samples: u32) -> WantedPicture {
+    fn resting(samples: u32) -> ViewRequest {
         let view = FrameView { samples, ..crate::test_scene::view() };
-        WantedPicture { view, scale: RenderScale::Full }
+        ViewRequest { view, scale: RenderScale::Full }
     }
 
     #[test]

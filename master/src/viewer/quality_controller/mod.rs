@@ -1,11 +1,11 @@
-//! The dial: quality for speed while the picture moves, and full quality when it rests.
+//! The quality controller: quality for speed while the picture moves, and full quality when it rests.
 //!
 //! The [`governor`] decides on numbers only: it is told what frames took, and answers with a rung of the [`ladder`] of
 //! settings. Which settings are on the ladder depends on what frames wait for, threads or wire: [`balance`] estimates it
 //! from their accounts. [`stillness`] tells whether the picture moves. None of them knows a clock or a picture; times are since any
 //! fixed moment, and grow.
 //!
-//! A picture at rest is asked for exactly as it would be without a dial, so it is the same, bit for bit.
+//! A picture at rest is asked for exactly as it would be without a quality controller, so it is the same, bit for bit.
 
 mod balance;
 mod costs;
@@ -35,18 +35,18 @@ pub(crate) use prior::ladder as prior_ladder;
 use stillness::{Motion, Stillness};
 
 use crate::accounting::FrameAccount;
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// How a frame was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shown {
+pub(crate) enum QualityMode {
     /// At full quality: nothing moves.
     Resting,
     /// At a rung of the ladder.
     Moving(Step),
 }
 
-/// A rung of one of the ladders that a dial has had.
+/// A rung of one of the ladders that a quality controller has had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
     rung: usize,
@@ -54,7 +54,7 @@ pub(crate) struct Step {
     ladder: u32,
 }
 
-impl Shown {
+impl QualityMode {
     /// Whether such a frame, when it is on the way, is given up for one like `next`: it is the full picture of a camera that
     /// has moved on, and the other one is sooner there.
     pub(crate) fn gives_way_to(self, next: Self) -> bool {
@@ -71,7 +71,7 @@ impl Shown {
 
 /// Turns the knobs for one window.
 #[derive(Clone, Debug)]
-pub(crate) struct Dial {
+pub(crate) struct QualityController {
     ladder: Ladder,
     governor: Governor,
     balance: Balance,
@@ -81,11 +81,11 @@ pub(crate) struct Dial {
     target_fps: f64,
     last_finished: Duration,
     /// How the frame before was asked for.
-    last_shown: Option<Shown>,
+    last_shown: Option<QualityMode>,
     has_told: bool,
 }
 
-impl Dial {
+impl QualityController {
     /// Holds a rate as well as the ladder allows. `animated`: something moves without anybody's doing.
     pub(crate) fn new(ladder: Ladder, target_fps: f64, animated: bool) -> Self {
         let governor = Governor::new(ladder.rungs().iter().map(|rung| rung.cost), budget(target_fps));
@@ -113,25 +113,25 @@ impl Dial {
     }
 
     /// How to ask for the next frame.
-    pub(crate) fn next(&mut self, now: Duration) -> Shown {
+    pub(crate) fn next(&mut self, now: Duration) -> QualityMode {
         match self.stillness.motion(now) {
-            Motion::Resting => Shown::Resting,
-            Motion::Moving => Shown::Moving(Step { rung: self.governor.rung(), ladder: self.ladders }),
+            Motion::Resting => QualityMode::Resting,
+            Motion::Moving => QualityMode::Moving(Step { rung: self.governor.rung(), ladder: self.ladders }),
         }
     }
 
     /// The picture for a frame that is asked for like this.
-    pub(crate) fn picture(&self, wanted: &WantedPicture, shown: Shown) -> WantedPicture {
-        self.rung(shown).map_or(*wanted, |rung| rung.setting.applied(wanted))
+    pub(crate) fn picture(&self, wanted: &ViewRequest, mode: QualityMode) -> ViewRequest {
+        self.rung(mode).map_or(*wanted, |rung| rung.setting.applied(wanted))
     }
 
     /// What is known of a frame that was asked for like this; `None` where the ladder has been another one since then.
-    fn rung(&self, shown: Shown) -> Option<&Rung> {
-        let is_of_this = |shown| match shown {
-            Shown::Resting => true,
-            Shown::Moving(step) => step.rung == 0 || step.ladder == self.ladders,
+    fn rung(&self, mode: QualityMode) -> Option<&Rung> {
+        let is_of_this = |mode| match mode {
+            QualityMode::Resting => true,
+            QualityMode::Moving(step) => step.rung == 0 || step.ladder == self.ladders,
         };
-        self.ladder.rungs().get(shown.rung()).filter(|_| is_of_this(shown))
+        self.ladder.rungs().get(mode.rung()).filter(|_| is_of_this(mode))
     }
 
     /// A frame has come that was asked for like this, `asked_at`, and took `elapsed` from its beginning. Frames overlap: what
@@ -140,22 +140,22 @@ impl Dial {
         &mut self,
         now: Duration,
         elapsed: Duration,
-        shown: Shown,
+        mode: QualityMode,
         asked_at: Duration,
         account: &FrameAccount,
     ) {
         let took = elapsed.min(now.saturating_sub(self.last_finished));
         self.last_finished = now;
-        let is_mixed = self.last_shown.replace(shown).is_some_and(|before| before != shown);
-        if let Some(rung) = self.rung(shown).copied() {
+        let is_mixed = self.last_shown.replace(mode).is_some_and(|before| before != mode);
+        if let Some(rung) = self.rung(mode).copied() {
             let before = self.governor.rung();
-            self.governor.observe(shown.rung(), took);
+            self.governor.observe(mode.rung(), took);
             if !is_mixed {
                 self.balance.observe(rung.cost, rung.wire, account);
             }
             match self.balance.news() {
                 Some(ratio) => self.change_ladder(ratio, &rung, took),
-                None => self.log(before, shown),
+                None => self.log(before, mode),
             }
         }
         self.stillness.shown(asked_at);
@@ -171,17 +171,19 @@ impl Dial {
         self.governor = Governor::starting(times, budget(self.target_fps), full);
         let rungs = self.ladder.rungs().len();
         tracing::debug!(
-            "the wire takes {ratio:.2} times as long as the threads for full pictures: the dial has {rungs} rungs now"
+            "the wire takes {ratio:.2} times as long as the threads for full pictures: the quality controller has {rungs} rungs now"
         );
     }
 
-    fn log(&mut self, before: usize, shown: Shown) {
+    fn log(&mut self, before: usize, mode: QualityMode) {
         let rung = self.governor.rung();
         if rung != before {
             let (setting, cost) = (self.ladder.rungs().get(rung), self.governor.predicted(rung));
-            tracing::debug!("the dial goes from rung {before} to {rung}, {cost:.1?} a frame: {setting:?}");
+            tracing::debug!(
+                "the quality controller goes from rung {before} to {rung}, {cost:.1?} a frame: {setting:?}"
+            );
         }
-        let is_there = matches!(shown, Shown::Moving(_)) && shown.rung() == rung;
+        let is_there = matches!(mode, QualityMode::Moving(_)) && mode.rung() == rung;
         if self.governor.is_beaten() && is_there && !self.has_told {
             self.has_told = true;
             let cost = self.governor.predicted(rung).unwrap_or_default();
@@ -198,12 +200,14 @@ impl Dial {
     }
 
     /// What the overlay says of a frame.
-    pub(crate) fn told(&self, shown: Shown) -> Vec<String> {
-        let mut lines = match (shown, self.rung(shown)) {
-            (Shown::Resting, _) => return vec!["at rest: all that was asked for".to_owned()],
-            (Shown::Moving(Step { rung: 0, .. }), _) => vec!["moving: all that was asked for".to_owned()],
-            (Shown::Moving(_), None) => vec!["moving: turns other knobs".to_owned()],
-            (Shown::Moving(_), Some(rung)) => {
+    pub(crate) fn told(&self, mode: QualityMode) -> Vec<String> {
+        let mut lines = match (mode, self.rung(mode)) {
+            (QualityMode::Resting, _) => return vec!["at rest: all that was asked for".to_owned()],
+            (QualityMode::Moving(Step { rung: 0, .. }), _) => {
+                vec!["moving: all that was asked for".to_owned()]
+            }
+            (QualityMode::Moving(_), None) => vec!["moving: turns other knobs".to_owned()],
+            (QualityMode::Moving(_), Some(rung)) => {
                 let origin = match self.ladder.origin() {
                     Origin::Measured => "by the scene's table",
                     Origin::General => "by the general table",

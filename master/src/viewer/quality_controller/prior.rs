@@ -10,7 +10,7 @@ use rayfarm_tracer::scene::{ColorDepth, RenderScale, Scene, Shading};
 
 use super::ladder::{Ladder, Origin, Rung};
 use super::setting::{Setting, bytes};
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// What turning one knob leaves of the time, and the mean FLIP error that it adds.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +43,7 @@ const ADAPTIVE_PER_SAMPLE: f64 = 0.165;
 const ADAPTIVE_LOSS: f64 = 0.0011;
 
 /// The ladder for pictures of a scene.
-pub(crate) fn ladder(scene: &Scene, wanted: &WantedPicture) -> Ladder {
+pub(crate) fn ladder(scene: &Scene, wanted: &ViewRequest) -> Ladder {
     let mut rungs = Vec::new();
     for (scale, samples) in
         SCALES.iter().flat_map(|(scale, _)| sample_counts(wanted.view.samples).map(move |n| (*scale, n)))
@@ -68,10 +68,10 @@ fn sample_counts(most: u32) -> impl Iterator<Item = u32> + Clone {
 }
 
 /// What is expected of a setting. A knob that is turned down already makes no difference.
-fn rung(setting: Setting, wanted: &WantedPicture) -> Rung {
+fn rung(setting: Setting, wanted: &ViewRequest) -> Rung {
     let picture = setting.applied(wanted);
     let (full, quality) = (wanted.view.quality, picture.view.quality);
-    let scale = |wanted: &WantedPicture| {
+    let scale = |wanted: &ViewRequest| {
         SCALES.iter().find(|(scale, _)| *scale == wanted.scale).map_or(NONE, |(_, effect)| *effect)
     };
     let (before, after) = (scale(wanted), scale(&picture));
@@ -92,7 +92,7 @@ fn rung(setting: Setting, wanted: &WantedPicture) -> Rung {
 }
 
 /// What a pixel's samples cost, in samples, and their error beside very many.
-fn sampling(picture: &WantedPicture) -> Effect {
+fn sampling(picture: &ViewRequest) -> Effect {
     let samples = f64::from(picture.view.samples);
     let loss = ONE_SAMPLE / samples.sqrt();
     if picture.view.is_adaptive() {
@@ -119,9 +119,9 @@ mod tests {
         include_bytes!("../../../../models/tradeoff/ten-busts.csv"),
     ];
 
-    fn wanted(samples: u32) -> WantedPicture {
+    fn wanted(samples: u32) -> ViewRequest {
         let view = FrameView { samples, ..crate::test_scene::view() };
-        WantedPicture { view, scale: RenderScale::Full }
+        ViewRequest { view, scale: RenderScale::Full }
     }
 
     /// Cost and loss of a setting beside another one, in each table that has both, from the least to the greatest.

@@ -2,14 +2,14 @@
 
 use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Scene, Shading};
 
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// What reduced colours leave of the bytes: two of three, and less where both are compressed; in the mean of the figures in
 /// the project's README.
 const REDUCED_BYTES: f64 = 0.6;
 
 /// What a picture's pixels come to on the wire, in pixels of full colours.
-pub(super) fn bytes(picture: &WantedPicture) -> f64 {
+pub(super) fn bytes(picture: &ViewRequest) -> f64 {
     let colors = match picture.view.quality.colors {
         ColorDepth::Exact => 1.0,
         ColorDepth::Reduced => REDUCED_BYTES,
@@ -52,7 +52,7 @@ impl Setting {
     };
 
     /// The one that makes this of the full picture.
-    pub(crate) fn of(picture: &WantedPicture) -> Self {
+    pub(crate) fn of(picture: &ViewRequest) -> Self {
         let Quality { adaptive, shadows, shading, filter, exponent, colors, dither: _ } =
             picture.view.quality;
         let (samples, scale) = (picture.view.samples, picture.scale);
@@ -61,7 +61,7 @@ impl Setting {
     }
 
     /// The picture at this setting. No knob is turned up.
-    pub(crate) fn applied(&self, wanted: &WantedPicture) -> WantedPicture {
+    pub(crate) fn applied(&self, wanted: &ViewRequest) -> ViewRequest {
         let mut picture = *wanted;
         picture.scale = wanted.scale.min(self.scale);
         picture.view.samples = wanted.view.samples.min(self.samples);

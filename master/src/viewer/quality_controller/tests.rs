@@ -6,50 +6,57 @@ use crate::test_scene;
 
 const MS: Duration = Duration::from_millis(1);
 
-fn wanted(samples: u32) -> WantedPicture {
-    WantedPicture { view: FrameView { samples, ..test_scene::view() }, scale: RenderScale::Full }
+fn wanted(samples: u32) -> ViewRequest {
+    ViewRequest { view: FrameView { samples, ..test_scene::view() }, scale: RenderScale::Full }
 }
 
-fn dial(target_fps: f64) -> Dial {
+fn controller(target_fps: f64) -> QualityController {
     let rung =
         |cost, loss, scale| Rung { setting: Setting { scale, ..Setting::FULL }, cost, wire: cost, loss };
     let rungs = [rung(0.6, 0.03, RenderScale::ThreeQuarters), rung(0.3, 0.05, RenderScale::Half)];
     let ladder = Ladder::of(rungs, Origin::General);
-    Dial::new(ladder, target_fps, false)
+    QualityController::new(ladder, target_fps, false)
 }
 
-fn moving(rung: usize) -> Shown {
-    Shown::Moving(Step { rung, ladder: 0 })
+fn moving(rung: usize) -> QualityMode {
+    QualityMode::Moving(Step { rung, ladder: 0 })
 }
 
-fn finish(dial: &mut Dial, now: Duration, elapsed: Duration, shown: Shown, asked_at: Duration) {
-    dial.finished(now, elapsed, shown, asked_at, &FrameAccount::default());
+fn finish(
+    controller: &mut QualityController,
+    now: Duration,
+    elapsed: Duration,
+    mode: QualityMode,
+    asked_at: Duration,
+) {
+    controller.finished(now, elapsed, mode, asked_at, &FrameAccount::default());
 }
 
 /// Full frames of 20 ms, one after the other.
-fn rest(dial: &mut Dial, frames: u32) {
-    (1..=frames).for_each(|frame| finish(dial, MS * 20 * frame, MS * 20, Shown::Resting, Duration::ZERO));
+fn rest(controller: &mut QualityController, frames: u32) {
+    (1..=frames)
+        .for_each(|frame| finish(controller, MS * 20 * frame, MS * 20, QualityMode::Resting, Duration::ZERO));
 }
 
 #[test]
 fn the_picture_at_rest_is_the_one_that_is_wanted() {
-    let mut dial = dial(100.0);
-    assert_eq!(dial.next(MS), Shown::Resting);
-    assert_eq!(dial.picture(&wanted(4), Shown::Resting), wanted(4));
-    assert_eq!(dial.picture(&wanted(4), moving(0)), wanted(4));
-    assert_eq!(dial.told(Shown::Resting), ["at rest: all that was asked for"]);
+    let mut controller = controller(100.0);
+    assert_eq!(controller.next(MS), QualityMode::Resting);
+    assert_eq!(controller.picture(&wanted(4), QualityMode::Resting), wanted(4));
+    assert_eq!(controller.picture(&wanted(4), moving(0)), wanted(4));
+    assert_eq!(controller.told(QualityMode::Resting), ["at rest: all that was asked for"]);
 }
 
 #[test]
 fn a_moving_one_is_at_the_rung_that_holds() {
-    let mut dial = dial(100.0);
-    rest(&mut dial, 5);
-    dial.changed(MS * 101);
-    let shown = dial.next(MS * 101);
-    assert_eq!(shown, moving(2));
-    assert_eq!(dial.picture(&wanted(1), shown).scale, RenderScale::Half);
+    let mut controller = controller(100.0);
+    rest(&mut controller, 5);
+    controller.changed(MS * 101);
+    let mode = controller.next(MS * 101);
+    assert_eq!(mode, moving(2));
+    assert_eq!(controller.picture(&wanted(1), mode).scale, RenderScale::Half);
     assert_eq!(
-        dial.told(shown),
+        controller.told(mode),
         ["moving: loses about FLIP 0.050", "by the general table", "waits for render threads"]
     );
 }
@@ -57,33 +64,33 @@ fn a_moving_one_is_at_the_rung_that_holds() {
 #[test]
 fn only_the_full_picture_of_an_older_camera_is_given_up() {
     let (full, reduced) = (moving(0), moving(2));
-    assert!(Shown::Resting.gives_way_to(reduced) && !Shown::Resting.gives_way_to(full));
-    assert!(!full.gives_way_to(reduced) && !reduced.gives_way_to(Shown::Resting));
+    assert!(QualityMode::Resting.gives_way_to(reduced) && !QualityMode::Resting.gives_way_to(full));
+    assert!(!full.gives_way_to(reduced) && !reduced.gives_way_to(QualityMode::Resting));
 }
 
 #[test]
 fn it_comes_to_rest_when_its_last_camera_has_been_shown() {
-    let mut dial = dial(100.0);
-    rest(&mut dial, 5);
-    dial.changed(MS * 101);
-    assert_eq!(dial.rests_at(), None);
-    finish(&mut dial, MS * 107, MS * 6, moving(2), MS * 101);
-    assert_eq!(dial.rests_at(), Some(MS * 201));
-    assert_eq!((dial.next(MS * 200), dial.next(MS * 201)), (moving(2), Shown::Resting));
+    let mut controller = controller(100.0);
+    rest(&mut controller, 5);
+    controller.changed(MS * 101);
+    assert_eq!(controller.rests_at(), None);
+    finish(&mut controller, MS * 107, MS * 6, moving(2), MS * 101);
+    assert_eq!(controller.rests_at(), Some(MS * 201));
+    assert_eq!((controller.next(MS * 200), controller.next(MS * 201)), (moving(2), QualityMode::Resting));
 }
 
 #[test]
 fn a_rate_that_is_out_of_reach_is_told() {
-    let mut dial = dial(1000.0);
-    rest(&mut dial, 20);
+    let mut controller = controller(1000.0);
+    rest(&mut controller, 20);
     let told = [
         "moving: loses about FLIP 0.050",
         "by the general table",
         "1000 FPS: out of reach",
         "waits for render threads",
     ];
-    assert_eq!(dial.told(moving(2)), told);
-    assert_eq!(dial.told(Shown::Resting), ["at rest: all that was asked for"]);
+    assert_eq!(controller.told(moving(2)), told);
+    assert_eq!(controller.told(QualityMode::Resting), ["at rest: all that was asked for"]);
 }
 
 #[test]
@@ -103,7 +110,7 @@ fn no_knob_is_turned_up() {
         ..Setting::FULL
     };
     assert_eq!(lowest.applied(&wanted(4)).view.samples, 1);
-    assert_eq!(lowest.applied(&low), WantedPicture { view: FrameView { samples: 1, ..low.view }, ..low });
+    assert_eq!(lowest.applied(&low), ViewRequest { view: FrameView { samples: 1, ..low.view }, ..low });
 }
 
 #[test]

@@ -8,8 +8,8 @@ use rayfarm_tracer::scene::FrameView;
 use crate::accounting::FrameAccount;
 use crate::farm::{Farm, FrameId};
 use crate::viewer::orbit::Animation;
-use crate::viewer::quality_controller::{Dial, Shown};
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::quality_controller::{QualityController, QualityMode};
+use crate::viewer::view_request::ViewRequest;
 
 /// The frame being rendered and the one after it.
 const OPEN_REQUESTS: usize = 2;
@@ -36,7 +36,7 @@ impl Renderer for Farm {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WindowState {
     /// The picture in the window's size.
-    pub(crate) picture: WantedPicture,
+    pub(crate) picture: ViewRequest,
     /// Whether the window is minimised, unmapped or covered.
     pub(crate) hidden: bool,
 }
@@ -59,12 +59,12 @@ pub(super) struct Requests {
     next: u64,
     open: VecDeque<Open>,
     /// The picture that was wanted last.
-    wanted: Option<WantedPicture>,
+    wanted: Option<ViewRequest>,
     /// What was requested last, unless it was given up.
     requested: Option<Requested>,
     /// When the camera moved last, until a frame that shows it is finished.
     moved_at: Option<Instant>,
-    dial: Option<Dial>,
+    controller: Option<QualityController>,
     started: Instant,
 }
 
@@ -72,8 +72,8 @@ pub(super) struct Requests {
 struct Requested {
     view: FrameView,
     /// The picture that it was for, and how it was asked for.
-    wanted: WantedPicture,
-    shown: Option<Shown>,
+    wanted: ViewRequest,
+    mode: Option<QualityMode>,
 }
 
 /// A frame that was asked for.
@@ -82,13 +82,13 @@ struct Open {
     /// When what it shows was first wanted.
     asked_at: Instant,
     requested_at: Instant,
-    /// `None` without a dial.
-    shown: Option<Shown>,
+    /// `None` without a quality controller.
+    mode: Option<QualityMode>,
 }
 
 impl Open {
-    fn gives_way_to(&self, next: Shown) -> bool {
-        self.shown.is_some_and(|shown| shown.gives_way_to(next))
+    fn gives_way_to(&self, next: QualityMode) -> bool {
+        self.mode.is_some_and(|mode| mode.gives_way_to(next))
     }
 }
 
@@ -97,12 +97,12 @@ impl Open {
 pub(crate) struct Answered {
     /// When what it shows was first wanted.
     pub(crate) asked_at: Instant,
-    /// What the dial says of it.
-    pub(crate) dial: Vec<String>,
+    /// What the quality controller says of it.
+    pub(crate) quality: Vec<String>,
 }
 
 impl Requests {
-    pub(super) fn new(pace: Pace, dial: Option<Dial>) -> Self {
+    pub(super) fn new(pace: Pace, controller: Option<QualityController>) -> Self {
         Self {
             pace,
             next: 0,
@@ -110,7 +110,7 @@ impl Requests {
             wanted: None,
             requested: None,
             moved_at: None,
-            dial,
+            controller,
             started: Instant::now(),
         }
     }
@@ -124,18 +124,18 @@ impl Requests {
     pub(super) fn finished(&mut self, frame: FrameId, elapsed: Duration, account: &FrameAccount) -> Answered {
         let now = Instant::now();
         let open = self.open.iter().find(|open| open.frame == frame);
-        let (asked_at, requested_at, shown) =
-            open.map_or((now, now, None), |open| (open.asked_at, open.requested_at, open.shown));
+        let (asked_at, requested_at, mode) =
+            open.map_or((now, now, None), |open| (open.asked_at, open.requested_at, open.mode));
         self.open.retain(|open| open.frame > frame);
         self.moved_at = self.moved_at.filter(|&moved_at| moved_at > asked_at);
         let (now, requested_at) = (self.since_start(now), self.since_start(requested_at));
-        let dial = self.dial.as_mut().zip(shown).map(|(dial, shown)| {
+        let quality = self.controller.as_mut().zip(mode).map(|(controller, mode)| {
             // Afterwards the frame's rung may be gone.
-            let told = dial.told(shown);
-            dial.finished(now, elapsed, shown, requested_at, account);
+            let told = controller.told(mode);
+            controller.finished(now, elapsed, mode, requested_at, account);
             told
         });
-        Answered { asked_at, dial: dial.unwrap_or_default() }
+        Answered { asked_at, quality: quality.unwrap_or_default() }
     }
 
     /// The next one is due. Asking even when two seem open costs nothing: one of them was replaced, or this replaces
@@ -160,14 +160,16 @@ impl Requests {
 
     /// When it does, if it does not move any more.
     pub(super) fn rests_at(&self) -> Option<Instant> {
-        Some(self.started + self.dial.as_ref()?.rests_at()?)
+        Some(self.started + self.controller.as_ref()?.rests_at()?)
     }
 
-    /// Whether no frame is on the way and none will be requested before something changes. With a dial, what it says
+    /// Whether no frame is on the way and none will be requested before something changes. With a quality controller, what it says
     /// of the picture that is there: at rest that is the full one.
     pub(super) fn at_rest(&self) -> Option<Vec<String>> {
         let rests = self.open.is_empty() && self.rests_at().is_none();
-        rests.then(|| self.dial.as_ref().map_or_else(Vec::new, |dial| dial.told(Shown::Resting)))
+        rests.then(|| {
+            self.controller.as_ref().map_or_else(Vec::new, |controller| controller.told(QualityMode::Resting))
+        })
     }
 
     fn ask_instead(&mut self, farm: &impl Renderer, window: &WindowState) {
@@ -185,7 +187,7 @@ impl Requests {
         let since_start = self.since_start(now);
         let wanted = &window.picture;
         self.notice(farm, wanted, since_start);
-        let shown = self.dial.as_mut().map(|dial| dial.next(since_start));
+        let mode = self.controller.as_mut().map(|controller| controller.next(since_start));
         let Pace { animation, limit, continuous } = self.pace;
         if limit.is_some_and(|limit| self.next >= limit) && !self.open.is_empty() {
             return false;
@@ -194,41 +196,41 @@ impl Requests {
             return false;
         }
         let mut picture = *wanted;
-        if let Some((dial, shown)) = self.dial.as_ref().zip(shown) {
-            picture = dial.picture(wanted, shown);
+        if let Some((controller, mode)) = self.controller.as_ref().zip(mode) {
+            picture = controller.picture(wanted, mode);
         }
         let view = animation.view(&picture.rendered(), self.next);
-        if !continuous && self.is_requested(&view, wanted, shown) {
+        if !continuous && self.is_requested(&view, wanted, mode) {
             return false;
         }
-        if shown.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
+        if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
             self.give_up(farm);
         }
         // A request that is asked for again, because the one before was replaced, is as old as the camera it shows.
         let asked_at = self.moved_at.unwrap_or(now);
-        self.open.push_back(Open { frame: farm.request(view), asked_at, requested_at: now, shown });
-        self.requested = Some(Requested { view, wanted: *wanted, shown });
+        self.open.push_back(Open { frame: farm.request(view), asked_at, requested_at: now, mode });
+        self.requested = Some(Requested { view, wanted: *wanted, mode });
         self.next += 1;
         true
     }
 
-    /// Whether the last request does for this view: it is the same, or only the dial's rung differs since then and
+    /// Whether the last request does for this view: it is the same, or only the quality controller's rung differs since then and
     /// nothing moves any more.
-    fn is_requested(&self, view: &FrameView, wanted: &WantedPicture, shown: Option<Shown>) -> bool {
-        let is_moving = |shown: Option<Shown>| shown.is_some_and(|shown| shown != Shown::Resting);
+    fn is_requested(&self, view: &FrameView, wanted: &ViewRequest, mode: Option<QualityMode>) -> bool {
+        let is_moving = |mode: Option<QualityMode>| mode.is_some_and(|mode| mode != QualityMode::Resting);
         self.requested.as_ref().is_some_and(|last| {
             let stands = !self.pace.animation.is_moving() && last.wanted == *wanted;
-            last.view == *view || stands && is_moving(last.shown) && is_moving(shown)
+            last.view == *view || stands && is_moving(last.mode) && is_moving(mode)
         })
     }
 
     /// Something else may be wanted than before.
-    fn notice(&mut self, farm: &impl Renderer, wanted: &WantedPicture, now: Duration) {
+    fn notice(&mut self, farm: &impl Renderer, wanted: &ViewRequest, now: Duration) {
         let Some(before) = self.wanted.replace(*wanted).filter(|before| before != wanted) else { return };
-        if let Some(dial) = &mut self.dial {
-            dial.changed(now);
+        if let Some(controller) = &mut self.controller {
+            controller.changed(now);
         }
-        let size = |picture: &WantedPicture| (picture.view.width, picture.view.height);
+        let size = |picture: &ViewRequest| (picture.view.width, picture.view.height);
         if size(&before) != size(wanted) {
             // The window has another size: what is on the way was for the one before.
             self.give_up(farm);

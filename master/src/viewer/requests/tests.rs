@@ -37,9 +37,9 @@ struct Window {
 }
 
 impl Window {
-    fn new(animation: Animation, continuous: bool, dial: Option<Dial>) -> Self {
-        let picture = WantedPicture { view: test_scene::view(), scale: RenderScale::Full };
-        let requests = Requests::new(Pace { animation, limit: None, continuous }, dial);
+    fn new(animation: Animation, continuous: bool, controller: Option<QualityController>) -> Self {
+        let picture = ViewRequest { view: test_scene::view(), scale: RenderScale::Full };
+        let requests = Requests::new(Pace { animation, limit: None, continuous }, controller);
         let mut window =
             Self { requests, notes: Notes::default(), state: WindowState { picture, hidden: false } };
         window.requests.fill(&window.notes, &window.state);
@@ -150,7 +150,7 @@ fn a_window_of_another_size_drops_what_is_on_the_way() {
 #[test]
 fn with_a_dial_the_full_picture_at_rest_is_requested_once() {
     let ladder = Ladder::of([], Origin::General);
-    let mut window = Window::new(STILL, false, Some(Dial::new(ladder, 30.0, false)));
+    let mut window = Window::new(STILL, false, Some(QualityController::new(ladder, 30.0, false)));
     window.finish();
     let told = window.requests.at_rest().unwrap();
     assert_eq!(told, ["at rest: all that was asked for"]);

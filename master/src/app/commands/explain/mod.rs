@@ -20,7 +20,7 @@ use crate::app::cli::ExplainArgs;
 use crate::app::error::CommandError;
 use crate::app::reports::print_json;
 use crate::assets::Assets;
-use crate::viewer::view_request::{Knobs, WantedPicture};
+use crate::viewer::view_request::{Knobs, ViewRequest};
 
 /// What is told of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -140,7 +140,7 @@ pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
 }
 
-fn explain(source: &Source, wanted: &WantedPicture) -> Result<Explanation, CommandError> {
+fn explain(source: &Source, wanted: &ViewRequest) -> Result<Explanation, CommandError> {
     let view = &wanted.rendered();
     let compiled = source.compiled()?;
     let things = things(source);

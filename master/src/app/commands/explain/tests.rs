@@ -14,7 +14,7 @@ fn explained(scene: &str) -> Explanation {
 fn of_file(path: &Path) -> Explanation {
     let source = Source::load(path, ModelArgs::default(), None).unwrap();
     let scene = &source.scene;
-    explain(&source, &WantedPicture { view: FrameView::of(scene), scale: scene.render.scale }).unwrap()
+    explain(&source, &ViewRequest { view: FrameView::of(scene), scale: scene.render.scale }).unwrap()
 }
 
 const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";

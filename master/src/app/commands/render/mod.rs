@@ -13,7 +13,7 @@ use repair::{Taken, named};
 
 use super::interrupt::cancelled_by_signals;
 use super::ladder::within;
-use super::observability::Oversight;
+use super::observability::Observability;
 use super::source::{Source, animation};
 use crate::accounting::RunAccount;
 use crate::app::cli::RenderArgs;
@@ -29,7 +29,7 @@ use crate::display::overlay::three_digits;
 use crate::farm::{Farm, FarmOptions, FarmScene, FinishedFrame};
 use crate::viewer::frame_rate::FrameRate;
 use crate::viewer::orbit::Animation;
-use crate::viewer::view_request::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 mod repair;
 #[cfg(test)]
@@ -58,7 +58,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let plan = plan(&args, &pattern, &wanted)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FpsLog::create).transpose()?;
-    let oversight = Oversight::new(&args.oversight)?;
+    let observability = Observability::new(&args.observability)?;
     let run = Run {
         wanted,
         animation: animation(&args.picture, args.frames),
@@ -69,7 +69,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         taken: Taken::default(),
         writer: FrameWriter::new(pattern),
         totals: Totals::new(triangles, log),
-        oversight,
+        observability,
     };
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let report = match run.plan.frames.is_empty() {
@@ -90,7 +90,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
 }
 
 /// Which frames are rendered.
-fn plan(args: &RenderArgs, pattern: &OutputPattern, wanted: &WantedPicture) -> Result<Plan, CommandError> {
+fn plan(args: &RenderArgs, pattern: &OutputPattern, wanted: &ViewRequest) -> Result<Plan, CommandError> {
     let FrameView { width, height, .. } = wanted.view;
     let existing = match (args.resume, args.skip_existing) {
         (true, _) => Existing::Resume { width, height },
@@ -102,7 +102,7 @@ fn plan(args: &RenderArgs, pattern: &OutputPattern, wanted: &WantedPicture) -> R
 
 /// One run of `render`.
 struct Run {
-    wanted: WantedPicture,
+    wanted: ViewRequest,
     animation: Animation,
     plan: Plan,
     /// Frames of the plan that were requested.
@@ -114,7 +114,7 @@ struct Run {
     taken: Taken,
     writer: FrameWriter,
     totals: Totals,
-    oversight: Oversight,
+    observability: Observability,
 }
 
 impl Run {
@@ -127,7 +127,7 @@ impl Run {
         let interrupted = cancelled_by_signals();
         let local_workers = options.local_workers;
         let mut farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
-        if let Err(error) = self.oversight.begin(&farm, &interrupted) {
+        if let Err(error) = self.observability.begin(&farm, &interrupted) {
             farm.shut_down().await;
             return Err(error);
         }
@@ -144,7 +144,7 @@ impl Run {
         }
         self.totals.verification = self.verification(&farm);
         farm.shut_down().await;
-        let traced = self.oversight.end();
+        let traced = self.observability.end();
         match rendered.and(written).and(traced) {
             Err(CommandError::Interrupted(_)) => Err(CommandError::Interrupted(self.so_far())),
             result => result.map(|()| self.totals.report(&self.wanted, &self.plan)),
@@ -170,7 +170,7 @@ impl Run {
     /// Every file is there already.
     fn nothing_to_do(mut self) -> Result<RenderReport, CommandError> {
         tracing::info!("all {} frames are there already: nothing to render", self.plan.skipped);
-        self.oversight.end()?;
+        self.observability.end()?;
         Ok(self.totals.report(&self.wanted, &self.plan))
     }
 
@@ -372,7 +372,7 @@ impl Totals {
         }
     }
 
-    fn report(&self, wanted: &WantedPicture, plan: &Plan) -> RenderReport {
+    fn report(&self, wanted: &ViewRequest, plan: &Plan) -> RenderReport {
         let view = &wanted.view;
         let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
         RenderReport {

@@ -8,7 +8,7 @@ use super::values::{error_limit, frame_rate};
 
 /// How fast a window shall be.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct DialArgs {
+pub(crate) struct QualityControlArgs {
     /// Hold N frames a second while the picture moves, at the least loss of quality that this takes; a picture at rest is
     /// the full one.
     #[arg(long, value_name = "N", value_parser = frame_rate)]
