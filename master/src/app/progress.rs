@@ -68,7 +68,7 @@ impl Progress {
     }
 
     /// Shows what the farm is doing; several times a second.
-    pub(crate) fn look(&mut self, status: &FarmStatus) {
+    pub(crate) fn update(&mut self, status: &FarmStatus) {
         self.left = status.totals.left;
         let left = self.left.map_or(String::new(), |left| format!("{} left, ", spoken(left)));
         self.bar.set_message(format!("{left}{}", message(status, self.fps)));

@@ -1,24 +1,24 @@
-//! Frames per second as people want to read them: smoothed over about a second, never stale.
+//! Frames per second, smoothed over about a second.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// What is looked back upon.
+/// Time over which the rate is the mean.
 const WINDOW: Duration = Duration::from_secs(1);
 /// Frames remembered at most; at such rates half a second is smooth enough.
 const MAX_FRAMES: usize = 512;
 
-/// Counts completed frames. Times are since any fixed moment, and grow.
+/// Rate of completed frames. Times are since any fixed moment, and grow.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FrameRate {
-    /// When each frame completed and what it took; the first is the one before the window.
+    /// Time of completion and duration of each frame; the first one is the last before the window.
     frames: VecDeque<(Duration, Duration)>,
     /// Whether nothing has been requested since the last frame.
     rested: bool,
 }
 
 impl FrameRate {
-    /// A frame that took `elapsed` was completed `at`.
+    /// Adds a frame that took `elapsed` and was completed `at`.
     pub(crate) fn completed(&mut self, at: Duration, elapsed: Duration) {
         if std::mem::take(&mut self.rested) {
             self.frames.clear();
@@ -31,12 +31,12 @@ impl FrameRate {
         }
     }
 
-    /// Nothing was requested for a while: the rate counts anew from the beginning of the next frame.
+    /// Starts the rate anew with the next frame, because nothing was requested for a while.
     pub(crate) fn rested(&mut self) {
         self.rested = true;
     }
 
-    /// Frames per second at the moment `now`; zero before the second frame. Falls when frames stop coming.
+    /// Frames per second at the time `now`; zero before the second frame. Falls when no frame is completed any more.
     pub(crate) fn fps(&self, now: Duration) -> f64 {
         let (Some((first, _)), Some((last, _))) = (self.frames.front(), self.frames.back()) else {
             return 0.0;
@@ -47,7 +47,7 @@ impl FrameRate {
         if seconds > 0.0 { intervals as f64 / seconds } else { 0.0 }
     }
 
-    /// What a frame took, in the mean.
+    /// Mean duration of a frame.
     pub(crate) fn frame_time(&self) -> Duration {
         let count = u32::try_from(self.frames.len()).unwrap_or(u32::MAX).max(1);
         self.frames.iter().map(|(_, elapsed)| *elapsed).sum::<Duration>() / count
@@ -61,7 +61,7 @@ mod tests {
     const MS: Duration = Duration::from_millis(1);
 
     #[test]
-    fn a_steady_rate_is_told_as_it_is() {
+    fn a_steady_rate_is_exact() {
         let mut rate = FrameRate::default();
         for frame in 0..200 {
             rate.completed(MS * 20 * frame, MS * 15);
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_frames_are_counted_too() {
+    fn frames_longer_than_the_window_have_a_rate() {
         let mut rate = FrameRate::default();
         for frame in 0..5 {
             rate.completed(MS * 4000 * frame, MS * 4000);
@@ -92,18 +92,18 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_is_no_slow_frame() {
+    fn a_rest_does_not_count_as_a_slow_frame() {
         let mut rate = FrameRate::default();
         (0..50).for_each(|frame| rate.completed(MS * 20 * frame, MS * 15));
         rate.rested();
-        assert_eq!(rate.frame_time(), MS * 15, "what the last frames took is still known");
+        assert_eq!(rate.frame_time(), MS * 15, "the frame time before the rest is still known");
         rate.completed(MS * 60_000, MS * 25);
         assert!((rate.fps(MS * 60_000) - 40.0).abs() < 1e-9, "{}", rate.fps(MS * 60_000));
         assert_eq!(rate.frame_time(), MS * 25);
     }
 
     #[test]
-    fn nothing_is_told_of_nothing() {
+    fn the_rate_is_zero_before_the_second_frame() {
         let mut rate = FrameRate::default();
         assert_eq!((rate.fps(MS), rate.frame_time()), (0.0, Duration::ZERO));
         rate.completed(MS, MS);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_farm_that_stops_does_not_look_alive() {
+    fn the_rate_falls_when_no_frame_is_completed() {
         let mut rate = FrameRate::default();
         for frame in 0..50 {
             rate.completed(MS * 20 * frame, MS * 20);

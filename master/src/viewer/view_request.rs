@@ -36,16 +36,6 @@ impl ViewRequest {
         image::resize(rendered, self.view.width, self.view.height)
     }
 
-    /// This, as a finished frame shows it: the knobs may have been turned since it was asked for.
-    pub(crate) fn shown_by(&self, frame: &FrameView) -> Self {
-        let size = (frame.width, frame.height);
-        let fits = |scale: &RenderScale| Self { scale: *scale, ..*self }.size() == size;
-        // Its size is none of these while the window is being resized.
-        let scale = RenderScale::ALL.into_iter().rev().find(fits).unwrap_or_default();
-        let view = FrameView { samples: frame.samples, quality: frame.quality, ..self.view };
-        Self { view, scale }
-    }
-
     /// The positions of all knobs, for reports.
     pub(crate) fn knobs(&self) -> Knobs {
         let Quality { adaptive, shadows, shading, filter, exponent, colors, dither } = self.view.quality;
@@ -150,18 +140,5 @@ mod tests {
         assert_eq!(FrameView { width: view.width, height: view.height, ..rendered }, view);
         let picture = RgbImage::new(rendered.width, rendered.height);
         assert_eq!(wanted.delivered(picture).unwrap(), RgbImage::new(view.width, view.height));
-    }
-
-    #[test]
-    fn a_frame_tells_what_it_shows() {
-        let now = full();
-        for scale in RenderScale::ALL {
-            let quality = Quality { shadows: false, ..Quality::default() };
-            let then = ViewRequest { view: FrameView { quality, ..now.view }, scale };
-            assert_eq!(now.shown_by(&then.rendered()), then);
-        }
-        // The window was larger.
-        let then = FrameView { width: 1000, ..now.view };
-        assert_eq!(now.shown_by(&then), now);
     }
 }

@@ -11,9 +11,10 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
 use super::source::{Source, animation};
 use crate::app::cli::BenchArgs;
 use crate::app::error::CommandError;
-use crate::app::reports::{BenchReport, MsPerFrame, RaysPerFrame, print_json, round_to_us};
-use crate::display::overlay::{counted, grouped};
+use crate::app::reports::{BenchReport, MsPerFrame, print_json, round_to_us};
+use crate::display::numbers::{counted, grouped};
 use crate::in_process::{all_cores, trace};
+use crate::viewer::frame_counts::RaysPerFrame;
 use crate::viewer::view_request::ViewRequest;
 
 /// Measures the frames of a scene and tells the figures on standard output.

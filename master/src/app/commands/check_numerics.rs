@@ -11,7 +11,7 @@ use super::source::Source;
 use crate::app::cli::{CheckNumericsArgs, ModelArgs};
 use crate::app::error::CommandError;
 use crate::app::reports::print_json;
-use crate::display::overlay::grouped;
+use crate::display::numbers::grouped;
 
 /// What `--json` prints, as one line for each scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -11,7 +11,7 @@ use rayfarm_tracer::scene;
 use crate::app::cli::{CompileArgs, Quality};
 use crate::app::error::CommandError;
 use crate::app::output::check_writable;
-use crate::display::overlay::counted;
+use crate::display::numbers::counted;
 
 /// Reads a model, builds its tree and writes both; tells what came of it on standard output.
 ///

@@ -9,9 +9,7 @@ use tokio_util::sync::CancellationToken;
 use super::command::{COMMANDS, Command, Whom};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
 use crate::farm::{FarmControl, FarmStatus, KickedWorker, TransferStatus, UnknownWorker, WorkerStatus};
-
-/// What a kicked worker is told.
-pub(crate) const KICKED: &str = "it was kicked by the master's user";
+use crate::viewer::KICK_REASON;
 
 /// Somebody who may give commands.
 #[derive(Clone)]
@@ -78,7 +76,7 @@ impl Console {
             Command::Drain(whom) => self.to_each(&status, whom, FarmControl::drain)?,
             Command::Pause(whom) => self.to_each(&status, whom, FarmControl::pause)?,
             Command::Resume(whom) => self.to_each(&status, whom, FarmControl::resume)?,
-            Command::Kick(whom) => self.to_each(&status, whom, |farm, id| farm.kick(id, KICKED))?,
+            Command::Kick(whom) => self.to_each(&status, whom, |farm, id| farm.kick(id, KICK_REASON))?,
             Command::Allow(whom) => {
                 let worker = find_kicked(&status, whom)?;
                 json!({ "ok": true, "allowed": usize::from(self.farm.allow_worker(worker)) })

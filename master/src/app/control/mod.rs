@@ -18,7 +18,7 @@ mod token;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use console::{Console, KICKED};
+pub(crate) use console::Console;
 pub(crate) use place::Place;
 
 use tokio_util::sync::CancellationToken;

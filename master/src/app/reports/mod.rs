@@ -1,15 +1,14 @@
 //! What a run is told as: one line of JSON, and a CSV line per frame.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::io::{self, Write};
 use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::accounting::{AccountReport, PART_COUNT, PART_NAMES};
+use crate::accounting::AccountReport;
 use crate::app::error::CommandError;
-use crate::farm::{FinishedFrame, Verification};
+use crate::farm::Verification;
+use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame};
 use crate::viewer::view_request::Knobs;
 
 /// What a `render` run did; `--json` prints it as one line.
@@ -107,37 +106,6 @@ pub(crate) struct BenchReport {
     pub(crate) blake3: String,
 }
 
-/// Rays of one frame by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct RaysPerFrame {
-    /// From the camera.
-    pub(crate) primary: u64,
-    /// Towards lights.
-    pub(crate) shadow: u64,
-    /// Reflected and transmitted.
-    pub(crate) secondary: u64,
-}
-
-impl RaysPerFrame {
-    /// The mean of a total over `frames` frames, to the nearest ray.
-    pub(crate) fn mean(self, frames: u32) -> Self {
-        let mean = |total| mean(total, frames);
-        Self { primary: mean(self.primary), shadow: mean(self.shadow), secondary: mean(self.secondary) }
-    }
-
-    /// Adds another frame's. Workers count them, and may claim anything.
-    pub(crate) fn add(&mut self, other: Self) {
-        self.primary = self.primary.saturating_add(other.primary);
-        self.shadow = self.shadow.saturating_add(other.shadow);
-        self.secondary = self.secondary.saturating_add(other.secondary);
-    }
-
-    /// Of all kinds.
-    pub(crate) fn total(self) -> u64 {
-        self.primary.saturating_add(self.shadow).saturating_add(self.secondary)
-    }
-}
-
 /// How long frames took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct MsPerFrame {
@@ -159,29 +127,6 @@ impl MsPerFrame {
         let at = |share| round_to_us(percentile(&sorted, share));
         Self { min: at(0.0), median: at(0.5), p95: at(0.95), max: at(1.0) }
     }
-}
-
-/// Bytes on the wire.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct BytesPerFrame {
-    /// By the master.
-    pub(crate) sent: u64,
-    /// By the master.
-    pub(crate) received: u64,
-}
-
-impl BytesPerFrame {
-    /// Adds another frame's.
-    pub(crate) fn add(&mut self, other: Self) {
-        self.sent = self.sent.saturating_add(other.sent);
-        self.received = self.received.saturating_add(other.received);
-    }
-}
-
-/// `total / count`, rounded to the nearest.
-pub(crate) fn mean(total: u64, count: u32) -> u64 {
-    let count = u64::from(count.max(1));
-    total / count + u64::from(total % count >= count.div_ceil(2))
 }
 
 /// The value that `share` (0..=1) of `sorted` lie below, interpolated between neighbours; zero for an empty slice.
@@ -206,113 +151,6 @@ pub(crate) fn print_json(report: &impl Serialize) -> Result<(), CommandError> {
     let line = serde_json::to_string(report).map_err(CommandError::failed)?;
     writeln!(io::stdout().lock(), "{line}")
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
-}
-
-/// One line of the frame log.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct FrameLine {
-    /// From 0.
-    pub(crate) frame: u64,
-    /// Since the run began.
-    pub(crate) at: Duration,
-    /// What the frame took.
-    pub(crate) elapsed: Duration,
-    /// Frames a second, smoothed over about a second.
-    pub(crate) fps: f64,
-    /// Workers connected.
-    pub(crate) workers: u32,
-    /// Their render threads together.
-    pub(crate) threads: u32,
-    /// Rays of the frame.
-    pub(crate) rays: RaysPerFrame,
-    /// Bytes on the wire for the frame.
-    pub(crate) bytes: BytesPerFrame,
-    /// What became of all workers' time since the frame before, in per cent.
-    pub(crate) percent: [f64; PART_COUNT],
-    /// From the frame's request to its last row.
-    pub(crate) latency: Duration,
-}
-
-impl FrameLine {
-    /// Of a finished frame, the `index`th, that came `at` and is said to have taken `elapsed`.
-    pub(crate) fn of(frame: &FinishedFrame, index: u64, at: Duration, elapsed: Duration, fps: f64) -> Self {
-        let counts = &frame.counts;
-        Self {
-            frame: index,
-            at,
-            elapsed,
-            fps,
-            workers: frame.workers,
-            threads: frame.threads,
-            rays: RaysPerFrame {
-                primary: counts.primary,
-                shadow: counts.shadow,
-                secondary: counts.secondary,
-            },
-            bytes: BytesPerFrame { sent: frame.sent_bytes, received: frame.received_bytes },
-            percent: frame.account.sum().percent(),
-            latency: frame.latency,
-        }
-    }
-}
-
-/// `--fps-log`: a CSV file with a line per frame, each on the disk as soon as it is known.
-#[derive(Debug)]
-pub(crate) struct FpsLog<W: Write> {
-    out: W,
-    name: String,
-}
-
-/// What the columns are; those of [`PART_NAMES`] follow, in per cent of thread time, and milliseconds of latency.
-const CSV_HEADER: &str =
-    "frame,seconds,ms,fps,workers,threads,primary_rays,shadow_rays,secondary_rays,sent_bytes,received_bytes";
-
-impl FpsLog<BufWriter<File>> {
-    /// Creates the file and writes its first line.
-    ///
-    /// # Errors
-    /// A place that cannot be written.
-    pub(crate) fn create(path: &Path) -> Result<Self, CommandError> {
-        let file = File::create(path).map_err(|error| {
-            CommandError::WrongInput(format!("{}: cannot write the frame log: {error}", path.display()))
-        })?;
-        Self::new(BufWriter::new(file), path.display().to_string())
-    }
-}
-
-impl<W: Write> FpsLog<W> {
-    fn new(out: W, name: String) -> Result<Self, CommandError> {
-        let mut log = Self { out, name };
-        let parts: String = PART_NAMES.iter().map(|part| format!(",{part}_percent")).collect();
-        log.write_line(&format!("{CSV_HEADER}{parts},latency_ms"))?;
-        Ok(log)
-    }
-
-    /// Adds one frame.
-    ///
-    /// # Errors
-    /// A full disk, for one.
-    pub(crate) fn add(&mut self, line: &FrameLine) -> Result<(), CommandError> {
-        let FrameLine { frame, at, elapsed, fps, workers, threads, rays, bytes, percent, latency } = line;
-        let parts: String = percent.iter().map(|part| format!(",{part:.3}")).collect();
-        self.write_line(&format!(
-            "{frame},{:.6},{:.3},{fps:.3},{workers},{threads},{},{},{},{},{}{parts},{:.3}",
-            at.as_secs_f64(),
-            elapsed.as_secs_f64() * 1e3,
-            rays.primary,
-            rays.shadow,
-            rays.secondary,
-            bytes.sent,
-            bytes.received,
-            latency.as_secs_f64() * 1e3,
-        ))
-    }
-
-    fn write_line(&mut self, line: &str) -> Result<(), CommandError> {
-        writeln!(self.out, "{line}")
-            .and_then(|()| self.out.flush())
-            .map_err(|error| CommandError::Failed(format!("{}: {error}", self.name)))
-    }
 }
 
 #[cfg(test)]

@@ -28,24 +28,6 @@ fn the_order_of_frames_does_not_matter() {
 }
 
 #[test]
-fn means_round_to_the_nearest() {
-    assert_eq!([mean(10, 4), mean(9, 4), mean(0, 4), mean(7, 0)], [3, 2, 0, 7]);
-}
-
-#[test]
-fn claims_of_any_size_sum_up_and_have_a_mean() {
-    let claim = RaysPerFrame { primary: u64::MAX, shadow: u64::MAX - 1, secondary: 3 };
-    let mut sum = claim;
-    sum.add(claim);
-    assert_eq!(sum, RaysPerFrame { primary: u64::MAX, shadow: u64::MAX, secondary: 6 });
-    assert_eq!(sum.mean(2).primary, u64::MAX / 2 + 1);
-    assert_eq!((sum.mean(1).shadow, sum.mean(u32::MAX).secondary, sum.total()), (u64::MAX, 0, u64::MAX));
-    let mut bytes = BytesPerFrame { sent: u64::MAX, received: 1 };
-    bytes.add(bytes);
-    assert_eq!(bytes, BytesPerFrame { sent: u64::MAX, received: 2 });
-}
-
-#[test]
 fn the_json_line_has_the_documented_shape() {
     let full = ViewRequest { view: test_scene::view(), scale: RenderScale::Full };
     let report = RenderReport {
@@ -82,23 +64,4 @@ fn the_json_line_has_the_documented_shape() {
             r#""idle_tail":0.0,"scene":0.0},"workers":[]},"blake3":"00ff"}"#,
         )
     );
-}
-
-#[test]
-fn the_log_has_as_many_columns_as_its_first_line() {
-    let mut log = FpsLog::new(Vec::new(), "log".to_owned()).unwrap();
-    let line =
-        FrameLine { frame: 3, elapsed: Duration::from_micros(12_345), fps: 80.0, ..FrameLine::default() };
-    log.add(&line).unwrap();
-    let text = String::from_utf8(log.out).unwrap();
-    let lines: Vec<&str> = text.lines().collect();
-    assert_eq!(lines.len(), 2);
-    assert_eq!(
-        lines[1],
-        "3,0.000000,12.345,80.000,0,0,0,0,0,0,0,0.000,0.000,0.000,0.000,0.000,0.000,0.000,0.000"
-    );
-    let last = "received_bytes,trace_percent,wait_percent,encode_percent,send_percent,decode_percent,\
-                idle_tail_percent,scene_percent,latency_ms";
-    assert!(lines[0].ends_with(last));
-    assert_eq!(lines[0].split(',').count(), lines[1].split(',').count());
 }

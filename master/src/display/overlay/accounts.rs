@@ -1,8 +1,9 @@
 //! The panel of workers: what each does with its time, and which one is selected.
 
-use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, grouped, kicked};
+use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, kicked};
 use crate::accounting::{Fading, PART_COUNT, Smoothed};
 use crate::display::canvas::Canvas;
+use crate::display::numbers::grouped;
 use crate::farm::{FarmStatus, Verification, WorkerState};
 
 /// What the parts are called where there is room for words, and where there is not.

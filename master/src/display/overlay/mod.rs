@@ -7,6 +7,7 @@ use accounts::AccountPanel;
 use legend::Entry;
 
 use super::canvas::{Canvas, GLYPH, Rect};
+use super::numbers::{counted, three_digits};
 use crate::addresses::Reachable;
 use crate::farm::KickedWorker;
 
@@ -249,33 +250,6 @@ fn broken(line: &str, columns: usize) -> Vec<String> {
     }
     pieces.push(piece);
     pieces
-}
-
-/// `1 worker`, `2 workers`, `99,938 triangles`.
-pub(crate) fn counted(count: u64, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{} {what}{plural}", grouped(count))
-}
-
-/// `1234567` as `1,234,567`.
-pub(crate) fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
-pub(crate) fn three_digits(value: f64) -> String {
-    match value {
-        value if value < 10.0 => format!("{value:.2}"),
-        value if value < 100.0 => format!("{value:.1}"),
-        value => format!("{value:.0}"),
-    }
 }
 
 #[cfg(test)]

@@ -219,12 +219,6 @@ fn the_waiting_message_says_how_to_start_a_worker() {
     assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
 }
 
-#[test]
-fn numbers_are_short() {
-    assert_eq!([grouped(0), grouped(999), grouped(1000), grouped(99_938)], ["0", "999", "1,000", "99,938"]);
-    assert_eq!([three_digits(0.254), three_digits(31.25), three_digits(240.4)], ["0.25", "31.2", "240"]);
-}
-
 fn kicked(name: &str) -> crate::farm::KickedWorker {
     crate::farm::KickedWorker { id: 1, name: name.to_owned(), address: None }
 }

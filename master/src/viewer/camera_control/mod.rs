@@ -1,84 +1,46 @@
-//! Keys and mouse to a camera: pure, so it can be tested without a window.
+//! Control of the camera: movements to a camera, without a window.
 //!
-//! The camera is kept as a place, two angles and a distance to the point it looks at. A held key moves it by speed
-//! times elapsed time, so it goes as far on a slow farm as on a fast one; speeds follow from the scene's size.
+//! The camera is kept as a position, two angles and a distance to its look-at point. A movement goes as far as speed times
+//! time, so it is the same on a slow farm as on a fast one; speeds follow from the size of the scene.
 
 use glam::DVec3;
 use rayfarm_tracer::scene::Camera;
 
-use crate::viewer::orbit::upright_axis;
+use super::orbit::upright_axis;
 
-/// Keys that move the camera while they are held.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Held {
-    /// W.
-    pub(crate) forward: bool,
-    /// S.
-    pub(crate) back: bool,
-    /// A.
-    pub(crate) left: bool,
-    /// D.
-    pub(crate) right: bool,
-    /// E.
-    pub(crate) up: bool,
-    /// Q.
-    pub(crate) down: bool,
-    /// Left arrow.
-    pub(crate) look_left: bool,
-    /// Right arrow.
-    pub(crate) look_right: bool,
-    /// Up arrow.
-    pub(crate) look_up: bool,
-    /// Down arrow.
-    pub(crate) look_down: bool,
-}
-
-/// What the user did since the last step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Input {
-    /// Keys held.
-    pub(crate) held: Held,
-    /// How far the mouse was dragged, as shares of the window's height: right and down are positive.
-    pub(crate) drag: (f64, f64),
-    /// Notches of the wheel; away from the user is positive and goes nearer.
-    pub(crate) wheel: f64,
-    /// R was pressed.
-    pub(crate) reset: bool,
-}
-
-/// The share of the scene's size that a held key moves by in a second.
+/// Speed of movements, in scene sizes per second.
 const MOVE_PER_SECOND: f64 = 0.3;
 const LOOK_RADIANS_PER_SECOND: f64 = 1.0;
 /// A drag over the window's whole height turns by half a circle.
 const DRAG_RADIANS: f64 = std::f64::consts::PI;
-/// What one notch of the wheel leaves of the distance.
+/// Factor of the distance to the look-at point per notch of the wheel.
 const WHEEL_FACTOR: f64 = 0.88;
-/// A pause (a suspended machine, a moved window) must not throw the camera across the scene.
+/// Longest time of one step: a pause (a suspended machine, a moved window) must not throw the camera across the scene.
 const LONGEST_STEP_SECONDS: f64 = 0.1;
-/// The camera never looks steeper than this, so that it cannot flip over the pole.
+/// Steepest pitch, so that the camera cannot flip over the pole.
 const STEEPEST: f64 = 89.0 * std::f64::consts::PI / 180.0;
-/// How far from where it began the camera may go, in scene sizes: beyond it there is nothing to see.
+/// Largest distance from the scene's camera, in scene sizes: beyond it nothing can be seen.
 const LEASH: f64 = 1e4;
-/// The range of distances to the look-at point, in scene sizes.
+/// Range of distances to the look-at point, in scene sizes.
 const DISTANCES: (f64, f64) = (1e-4, 1e3);
 
-/// A camera that listens to keys and mouse.
+/// A camera under control of the displays.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraControl {
     home: Camera,
-    /// `None` until something moves it, so that the untouched camera is the scene's own, bit for bit.
+    /// `None` until a movement, so that the untouched camera is the scene's own, bit for bit.
     pose: Option<Pose>,
     frame: Frame,
     scene_size: f64,
 }
 
 impl CameraControl {
-    /// `bounds` are those of everything finite in the scene.
+    /// Control that starts at `home`. `bounds` are those of everything finite in the scene.
     pub(crate) fn new(home: Camera, bounds: Option<(DVec3, DVec3)>) -> Self {
         Self { home, pose: None, frame: Frame::of(&home), scene_size: scene_size(&home, bounds) }
     }
 
-    /// The camera as it stands now.
+    /// The current camera.
     pub(crate) fn camera(&self) -> Camera {
         match &self.pose {
             None => self.home,
@@ -91,33 +53,60 @@ impl CameraControl {
         }
     }
 
-    /// Moves the camera by what happened within the last `seconds`.
-    pub(crate) fn step(&mut self, input: &Input, seconds: f64) {
-        if input.reset {
-            self.pose = None;
+    /// Restores the scene's camera.
+    pub(crate) fn reset(&mut self) {
+        self.pose = None;
+    }
+
+    /// Moves camera and look-at point for `seconds`. `direction` is right, up and forward, each in -1..=1.
+    pub(crate) fn fly(&mut self, direction: DVec3, seconds: f64) {
+        let direction = DVec3::from_array(direction.to_array().map(finite));
+        if direction != DVec3::ZERO {
+            let distance = step_seconds(seconds) * MOVE_PER_SECOND * self.scene_size;
+            self.change(|pose, frame, _| pose.fly(direction, frame, distance));
         }
-        let still = Input { reset: input.reset, ..Input::default() };
-        if *input == still {
-            return;
+    }
+
+    /// Turns the camera in place for `seconds`. `right` and `up` are in -1..=1.
+    pub(crate) fn look(&mut self, right: f64, up: f64, seconds: f64) {
+        let (right, up) = (finite(right), finite(up));
+        if (right, up) != (0.0, 0.0) {
+            let radians = step_seconds(seconds) * LOOK_RADIANS_PER_SECOND;
+            self.change(|pose, _, _| pose.turn(right * radians, up * radians));
         }
-        let seconds = if seconds.is_finite() { seconds.clamp(0.0, LONGEST_STEP_SECONDS) } else { 0.0 };
+    }
+
+    /// Turns the camera about its look-at point by a drag, in heights of the display.
+    pub(crate) fn orbit(&mut self, right: f64, down: f64) {
+        let (right, down) = (finite(right), finite(down));
+        if (right, down) != (0.0, 0.0) {
+            self.change(|pose, frame, _| pose.orbit(right, down, frame));
+        }
+    }
+
+    /// Moves the camera towards its look-at point by notches of a wheel; negative ones move it away.
+    pub(crate) fn zoom(&mut self, notches: f64) {
+        let notches = finite(notches);
+        if notches != 0.0 {
+            self.change(|pose, frame, scene_size| pose.approach(notches, frame, scene_size));
+        }
+    }
+
+    fn change(&mut self, change: impl FnOnce(&mut Pose, &Frame, f64)) {
         let mut pose = self.pose.unwrap_or_else(|| Pose::of(&self.home, &self.frame));
-        pose.fly(&input.held, &self.frame, seconds * MOVE_PER_SECOND * self.scene_size);
-        pose.look(&input.held, seconds * LOOK_RADIANS_PER_SECOND);
-        pose.orbit(finite(input.drag.0), finite(input.drag.1), &self.frame);
-        pose.approach(finite(input.wheel), &self.frame, self.scene_size);
+        change(&mut pose, &self.frame, self.scene_size);
         pose.position = leashed(pose.position, self.home.position, LEASH * self.scene_size);
         self.pose = Some(pose);
     }
 }
 
-/// The fixed directions that the angles are measured from: orthonormal.
+/// Orthonormal directions from which the angles are measured.
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     up: DVec3,
-    /// Where a camera with yaw 0 and pitch 0 looks.
+    /// Viewing direction at yaw 0 and pitch 0.
     ahead: DVec3,
-    /// What is then to its right.
+    /// Direction to the right of `ahead`.
     right: DVec3,
 }
 
@@ -129,20 +118,20 @@ impl Frame {
         Self { up, ahead, right: ahead.cross(up) }
     }
 
-    /// The unit direction of two angles.
+    /// Unit direction of two angles in radians.
     fn direction(&self, yaw: f64, pitch: f64) -> DVec3 {
         let ((sin_yaw, cos_yaw), (sin_pitch, cos_pitch)) = (libm::sincos(yaw), libm::sincos(pitch));
         (self.ahead * cos_yaw + self.right * sin_yaw) * cos_pitch + self.up * sin_pitch
     }
 
-    /// What is to the right of a camera with this yaw.
+    /// Unit direction to the right of a camera with this yaw.
     fn rightwards(&self, yaw: f64) -> DVec3 {
         let (sin, cos) = libm::sincos(yaw);
         self.right * cos - self.ahead * sin
     }
 }
 
-/// Where the camera is and looks.
+/// Position and direction of the camera.
 #[derive(Clone, Copy, Debug)]
 struct Pose {
     position: DVec3,
@@ -150,7 +139,7 @@ struct Pose {
     yaw: f64,
     /// Radians above the horizon.
     pitch: f64,
-    /// To the look-at point.
+    /// Distance to the look-at point.
     distance: f64,
 }
 
@@ -175,35 +164,22 @@ impl Pose {
         self.position + self.direction(frame) * self.distance
     }
 
-    fn fly(&mut self, held: &Held, frame: &Frame, by: f64) {
-        let wish = self.direction(frame) * axis(held.forward, held.back)
-            + frame.rightwards(self.yaw) * axis(held.right, held.left)
-            + frame.up * axis(held.up, held.down);
-        self.position += wish.clamp_length_max(1.0) * by;
+    fn fly(&mut self, direction: DVec3, frame: &Frame, distance: f64) {
+        let movement = self.direction(frame) * direction.z
+            + frame.rightwards(self.yaw) * direction.x
+            + frame.up * direction.y;
+        self.position += movement.clamp_length_max(1.0) * distance;
     }
 
-    fn look(&mut self, held: &Held, radians: f64) {
-        self.turn(
-            axis(held.look_right, held.look_left) * radians,
-            axis(held.look_up, held.look_down) * radians,
-        );
-    }
-
-    /// Round the look-at point, which stays where it is: what is dragged follows the mouse.
+    /// Turns about the look-at point, which keeps its position: the scene follows the mouse.
     fn orbit(&mut self, right: f64, down: f64, frame: &Frame) {
-        if right == 0.0 && down == 0.0 {
-            return;
-        }
         let centre = self.look_at(frame);
         self.turn(right * DRAG_RADIANS, -down * DRAG_RADIANS);
         self.position = centre - self.direction(frame) * self.distance;
     }
 
-    /// Towards the look-at point, which stays where it is.
+    /// Moves towards the look-at point, which keeps its position.
     fn approach(&mut self, notches: f64, frame: &Frame, scene_size: f64) {
-        if notches == 0.0 {
-            return;
-        }
         let centre = self.look_at(frame);
         let (nearest, farthest) = (DISTANCES.0 * scene_size, DISTANCES.1 * scene_size);
         let wanted = self.distance * libm::pow(WHEEL_FACTOR, notches.clamp(-100.0, 100.0));
@@ -217,8 +193,8 @@ impl Pose {
     }
 }
 
-/// What one "scene" of movement is: the size of everything finite, held near what the camera shows, so that a close-up
-/// in a large scene and a scene that stands on a huge floor can both be steered.
+/// Unit of movements: the size of everything finite, held near what the camera shows, so that a close-up in a large scene
+/// and a scene on a huge floor can both be controlled.
 fn scene_size(home: &Camera, bounds: Option<(DVec3, DVec3)>) -> f64 {
     let in_view = 2.0 * home.position.distance(home.look_at);
     let size = bounds.map_or(in_view, |(low, high)| (high - low).length());
@@ -229,8 +205,9 @@ fn leashed(position: DVec3, home: DVec3, leash: f64) -> DVec3 {
     home + (position - home).clamp_length_max(leash)
 }
 
-fn axis(forth: bool, back: bool) -> f64 {
-    f64::from(i8::from(forth) - i8::from(back))
+/// Time that a step counts for.
+fn step_seconds(seconds: f64) -> f64 {
+    finite(seconds).clamp(0.0, LONGEST_STEP_SECONDS)
 }
 
 fn finite(value: f64) -> f64 {

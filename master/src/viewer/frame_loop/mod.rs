@@ -1,263 +1,228 @@
-//! Keeps the farm busy with what the window wants to see, and holds the newest picture for it.
+//! The viewer: owns camera, quality controller, requests and statistics, and runs the frame loop over the farm.
 //!
-//! While something moves, two frames are requested: the one being rendered and the one after it, so that workers which
-//! have nothing left to do in the first begin the second. A moved camera replaces the second as long as it has not begun.
-//! At rest the picture is requested once, and then nothing until something changes.
+//! Input of all displays arrives as actions. Snapshots of frames, farm and statistics go out, and no display is waited for.
+//! While something moves, [`OPEN_REQUESTS`](super::requests::OPEN_REQUESTS) frames are in flight, and a moved camera
+//! replaces the last one as long as it has not begun. At rest the picture is requested once; from then on the loop only
+//! looks at the farm ten times a second.
 
-use std::fs::File;
-use std::io::BufWriter;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use tokio::sync::watch;
+use rayfarm_tracer::image::MAX_SIDE;
+use rayfarm_tracer::scene::FrameView;
 use tokio_util::sync::CancellationToken;
 
-use super::frame_rate::FrameRate;
-use super::latency::Latency;
-use super::requests::{Answered, Pace, Requests, WindowState};
-use crate::accounting::Fading;
-use crate::app::error::CommandError;
-use crate::app::reports::{FpsLog, FrameLine};
-use crate::farm::{Farm, FarmError, FarmStatus, FinishedFrame};
-use crate::viewer::quality_controller::QualityController;
+use super::camera_control::CameraControl;
+use super::error::ViewerError;
+use super::frame_log::FrameLogFile;
+use super::handle::{Channels, PresentedFrame, ViewerHandle};
+use super::input_action::InputAction;
+use super::orbit::Animation;
+use super::quality_controller::QualityController;
+use super::requests::{Answered, RequestPolicy, Requests, ViewState};
+use super::sequence::{FrameSequence, SequenceFrame, SequencePlan, SequenceSender};
+use super::statistics::ViewerState;
+use super::view_request::ViewRequest;
+use crate::farm::{Farm, FarmError, FinishedFrame};
 
-/// How often the window learns of workers that come and go.
+/// Interval at which displays receive the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
-/// A picture is called at rest when nothing has been requested for this long: between two frames of a moving camera
-/// there may be a moment without a request.
-const QUIET: Duration = Duration::from_millis(300);
+/// Actions that are applied together at most, before the next request.
+const MAX_ACTIONS: usize = 64;
 
-/// What is asked of the farm.
-pub(crate) struct Orders {
-    /// What the window wants to see; the newest counts.
-    pub(crate) wanted: watch::Receiver<WindowState>,
-    /// How frames are requested.
-    pub(crate) pace: Pace,
-    /// Where each frame is noted.
-    pub(crate) log: Option<FpsLog<BufWriter<File>>>,
-    /// What holds a rate, if one is to be held.
+/// Configuration of an interactive viewer.
+pub(crate) struct ViewerConfig {
+    /// The first view.
+    pub(crate) request: ViewRequest,
+    /// Camera that input moves; at first, that of `request`.
+    pub(crate) camera: CameraControl,
+    /// Rules by which frames are requested.
+    pub(crate) policy: RequestPolicy,
+    /// Log with a line per frame.
+    pub(crate) log: Option<FrameLogFile>,
+    /// Controller that holds a frame rate.
     pub(crate) controller: Option<QualityController>,
 }
 
-/// A picture for the window.
-#[derive(Debug)]
-pub(crate) struct Arrival {
-    /// The picture and what it took.
-    pub(crate) frame: FinishedFrame,
-    /// When what it shows was first wanted.
-    pub(crate) asked_at: Instant,
-    /// What the quality controller says of it.
-    pub(crate) quality: Vec<String>,
-}
-
-/// What the window may know at any moment.
-#[derive(Debug)]
-pub(crate) struct News {
-    started: Instant,
-    /// The newest picture that the window has not taken yet.
-    latest: Option<Arrival>,
-    status: FarmStatus,
-    rate: FrameRate,
-    latency: Latency,
-    accounts: Fading,
-    completed: u64,
-    /// When a frame was completed, or frames were requested again after a rest.
-    last_completed: Duration,
-    /// Since when nothing has been requested, and what the quality controller says of the picture.
-    quiet: Option<(Duration, Vec<String>)>,
-    /// How long nothing was requested before the frame that is on the way.
-    rest: Duration,
-    trouble: Option<String>,
-}
-
-/// The window's end of [`News`].
-#[derive(Clone, Debug)]
-pub(crate) struct NewsDesk(Arc<Mutex<News>>);
-
-impl NewsDesk {
-    /// With no news yet.
-    pub(crate) fn new() -> Self {
-        Self(Arc::new(Mutex::new(News {
-            started: Instant::now(),
-            latest: None,
-            status: FarmStatus::default(),
-            rate: FrameRate::default(),
-            latency: Latency::default(),
-            accounts: Fading::default(),
-            completed: 0,
-            last_completed: Duration::ZERO,
-            quiet: None,
-            rest: Duration::ZERO,
-            trouble: None,
-        })))
-    }
-
-    /// The newest picture, once.
-    pub(crate) fn take_picture(&self) -> Option<Arrival> {
-        self.lock().latest.take()
-    }
-
-    /// A picture is on the screen, so long after it was asked for.
-    pub(crate) fn shown(&self, after: Duration) {
-        self.lock().latency.shown(after);
-    }
-
-    /// From an input to its picture on the screen, if that is known.
-    pub(crate) fn latency(&self) -> Option<Duration> {
-        self.lock().latency.median()
-    }
-
-    /// Where the workers' time went lately.
-    pub(crate) fn accounts(&self) -> Fading {
-        self.lock().accounts.clone()
-    }
-
-    /// The farm as last seen.
-    pub(crate) fn status(&self) -> FarmStatus {
-        self.lock().status.clone()
-    }
-
-    /// Frames per second and the time of one, now.
-    pub(crate) fn rate(&self) -> (f64, Duration) {
-        let news = self.lock();
-        (news.rate.fps(news.started.elapsed()), news.rate.frame_time())
-    }
-
-    /// Frames completed so far.
-    pub(crate) fn completed(&self) -> u64 {
-        self.lock().completed
-    }
-
-    /// How long no frame has been completed although one was requested.
-    pub(crate) fn since_last_frame(&self) -> Duration {
-        let news = self.lock();
-        news.started.elapsed().saturating_sub(news.last_completed)
-    }
-
-    /// Whether the picture rests: nothing has been requested for a while. With a quality controller, what it says of the picture.
-    pub(crate) fn resting(&self) -> Option<Vec<String>> {
-        let news = self.lock();
-        let (since, controller) = news.quiet.as_ref()?;
-        (news.started.elapsed().saturating_sub(*since) >= QUIET).then(|| controller.clone())
-    }
-
-    /// Notes whether anything is requested. Figures of the time before a rest say nothing of the time after it.
-    fn note_rest(&self, rests: Option<Vec<String>>) {
-        let mut news = self.lock();
-        let now = news.started.elapsed();
-        match (rests, news.quiet.take()) {
-            (Some(controller), before) => {
-                news.quiet = Some((before.map_or(now, |(since, _)| since), controller))
-            }
-            (None, Some((since, _))) if now.saturating_sub(since) >= QUIET => {
-                news.rate.rested();
-                news.last_completed = now;
-                news.rest = now.saturating_sub(since);
-            }
-            (None, _) => {}
-        }
-    }
-
-    /// What keeps frames from coming, if that is known.
-    pub(crate) fn trouble(&self) -> Option<String> {
-        self.lock().trouble.clone()
-    }
-
-    /// A farm without workers is no reason to close the window: it says so, and somebody may start one.
-    fn frame_or_trouble(
-        &self,
-        frame: Result<FinishedFrame, FarmError>,
-    ) -> Result<Option<FinishedFrame>, CommandError> {
-        let (frame, trouble) = match frame {
-            Ok(frame) => (Some(frame), None),
-            Err(FarmError::NoWorkers { reason, .. }) => (None, Some(reason)),
-            Err(error) => return Err(CommandError::failed(error)),
-        };
-        self.lock().trouble = trouble;
-        Ok(frame)
-    }
-
-    /// Notes a finished frame and returns its line for the log.
-    fn completed_frame(&self, frame: FinishedFrame, answered: Answered) -> FrameLine {
-        let mut news = self.lock();
-        let at = news.started.elapsed();
-        news.rate.completed(at, frame.elapsed);
-        let rest = std::mem::take(&mut news.rest);
-        match rest {
-            Duration::ZERO => news.accounts.add(at, &frame.account),
-            rest => news.accounts.add(at, &frame.account.without_rest(rest)),
-        }
-        let line = FrameLine::of(&frame, news.completed, at, frame.elapsed, news.rate.fps(at));
-        news.completed += 1;
-        news.last_completed = at;
-        let Answered { asked_at, quality } = answered;
-        news.latest = Some(Arrival { frame, asked_at, quality });
-        line
-    }
-
-    /// Nothing panics while it holds the lock, and news are whole after every statement: a poisoned lock is usable.
-    fn lock(&self) -> MutexGuard<'_, News> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Drives the farm until `stop` is cancelled, the limit is reached or the farm fails; cancels `stop` and shuts the
-/// farm down in every case.
+/// The owner of a view over a farm.
 ///
-/// # Errors
-/// What the farm could not do, or a frame log that could not be written.
-pub(crate) async fn run(
-    mut farm: Farm,
-    orders: Orders,
-    desk: NewsDesk,
-    stop: CancellationToken,
-) -> Result<(), CommandError> {
-    let result = drive(&mut farm, orders, &desk, &stop).await;
-    stop.cancel();
-    farm.shut_down().await;
-    result
+/// An interactive viewer publishes the newest frame, which replaces its predecessor (latest wins). A viewer of a sequence
+/// has a second delivery instead, bounded and lossless: each frame of a plan arrives once and in order, and as long as the
+/// display holds too many of them none is requested.
+pub(crate) struct Viewer {
+    farm: Farm,
+    state: ViewState,
+    camera: CameraControl,
+    requests: Requests,
+    figures: ViewerState,
+    log: Option<FrameLogFile>,
+    channels: Channels,
+    sequence: Option<SequenceSender>,
 }
 
-async fn drive(
-    farm: &mut Farm,
-    orders: Orders,
-    desk: &NewsDesk,
-    stop: &CancellationToken,
-) -> Result<(), CommandError> {
-    let Orders { mut wanted, pace, mut log, controller } = orders;
-    let limit = pace.limit;
-    let mut requests = Requests::new(pace, controller);
-    let mut look = tokio::time::interval(STATUS_EVERY);
-    let mut window_is_there = true;
-    requests.fill(farm, &wanted.borrow_and_update().clone());
-    loop {
-        desk.note_rest(requests.at_rest());
-        tokio::select! {
-            biased;
-            () = stop.cancelled() => return Ok(()),
-            frame = farm.finished() => {
-                let Some(frame) = desk.frame_or_trouble(frame)? else { continue };
-                let answered = requests.finished(frame.frame, frame.elapsed, &frame.account);
-                let line = desk.completed_frame(frame, answered);
-                if let Some(log) = &mut log {
-                    log.add(&line)?;
+impl Viewer {
+    /// A viewer of a view that input changes, and the handle for its displays.
+    pub(crate) fn interactive(farm: Farm, config: ViewerConfig) -> (Self, ViewerHandle) {
+        let ViewerConfig { request, camera, policy, log, controller } = config;
+        let (channels, handle) = Channels::new(farm.address());
+        let viewer = Self {
+            farm,
+            state: ViewState { request, hidden: false },
+            camera,
+            requests: Requests::new(policy, controller),
+            figures: ViewerState::new(),
+            log,
+            channels,
+            sequence: None,
+        };
+        (viewer, handle)
+    }
+
+    /// A viewer that renders the frames `numbers` of an animation, in order. Their display reads them from the sequence.
+    pub(crate) fn sequence(
+        farm: Farm,
+        request: ViewRequest,
+        animation: Animation,
+        numbers: &[u64],
+    ) -> (Self, ViewerHandle, FrameSequence) {
+        let (plan, sender, sequence) = SequencePlan::new(numbers);
+        let (channels, handle) = Channels::new(farm.address());
+        let viewer = Self {
+            farm,
+            state: ViewState { request, hidden: false },
+            camera: CameraControl::new(request.view.camera, None),
+            requests: Requests::of_sequence(animation, plan),
+            figures: ViewerState::new(),
+            log: None,
+            channels,
+            sequence: Some(sender),
+        };
+        (viewer, handle, sequence)
+    }
+
+    /// Renders until `stop` is cancelled, a display quits, no display is left, or the last frame is complete. Returns the
+    /// farm, still running.
+    ///
+    /// # Errors
+    /// A farm that cannot go on, or a frame log that cannot be written.
+    pub(crate) async fn run(mut self, stop: &CancellationToken) -> (Farm, Result<(), ViewerError>) {
+        let result = self.render(stop).await;
+        self.channels.publish_statistics(self.figures.snapshot());
+        (self.farm, result)
+    }
+
+    async fn render(&mut self, stop: &CancellationToken) -> Result<(), ViewerError> {
+        let mut tick = tokio::time::interval(STATUS_EVERY);
+        let mut actions = Vec::new();
+        self.requests.fill(&self.farm, &self.state);
+        loop {
+            self.figures.set_resting(self.requests.at_rest());
+            tokio::select! {
+                biased;
+                () = stop.cancelled() => return Ok(()),
+                frame = self.farm.finished() => {
+                    if self.finish(frame)?.is_break() {
+                        return Ok(());
+                    }
                 }
-                if limit == Some(desk.completed()) {
-                    return Ok(());
+                count = self.channels.input.recv_many(&mut actions, MAX_ACTIONS) => {
+                    if count == 0 || self.apply_all(actions.drain(..)).is_break() {
+                        return Ok(());
+                    }
                 }
-                requests.after_finish(farm, &wanted.borrow_and_update().clone());
+                () = until(self.requests.rests_at()) => self.requests.rest(&self.farm, &self.state),
+                () = self.requests.slot_is_free() => self.requests.fill(&self.farm, &self.state),
+                _ = tick.tick() => self.publish(),
             }
-            changed = wanted.changed(), if window_is_there => {
-                window_is_there = changed.is_ok();
-                requests.replace(farm, &wanted.borrow_and_update().clone());
-            }
-            () = until(requests.rests_at()) => requests.rest(farm, &wanted.borrow_and_update().clone()),
-            _ = look.tick() => desk.lock().status = farm.status(),
         }
+    }
+
+    fn publish(&mut self) {
+        self.figures.refresh_accounts();
+        self.channels.publish_status(self.farm.status());
+        self.channels.publish_statistics(self.figures.snapshot());
+    }
+
+    /// Delivers a finished frame and requests the next one. Breaks after the last frame.
+    fn finish(&mut self, frame: Result<FinishedFrame, FarmError>) -> Result<ControlFlow<()>, ViewerError> {
+        let frame = match frame {
+            Ok(frame) => frame,
+            // A worker may connect later; until then the displays show the reason.
+            Err(FarmError::NoWorkers { reason, .. }) if self.sequence.is_none() => {
+                self.figures.set_problem(Some(reason));
+                return Ok(ControlFlow::Continue(()));
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let answered = self.requests.finished(frame.frame, &frame.view, frame.elapsed, &frame.account);
+        let line = self.figures.add(&frame);
+        self.deliver(frame, answered);
+        if let Some(log) = &mut self.log {
+            log.add(&line)?;
+        }
+        if self.requests.limit() == Some(self.figures.completed()) {
+            return Ok(ControlFlow::Break(()));
+        }
+        self.requests.after_finish(&self.farm, &self.state);
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn deliver(&self, frame: FinishedFrame, answered: Answered) {
+        let Answered { request, input_at, number, slot, quality } = answered;
+        let presented = PresentedFrame { frame, request, input_at, completed_at: Instant::now(), quality };
+        // Statistics come first, so that a display which draws the frame has those that include it.
+        self.channels.publish_statistics(self.figures.snapshot());
+        match &self.sequence {
+            Some(sequence) => sequence.deliver(SequenceFrame { number, presented, slot }),
+            None => self.channels.publish_frame(presented),
+        }
+    }
+
+    /// Applies actions in order, then replaces the last request if they changed the view. Breaks at [`InputAction::Quit`].
+    fn apply_all(&mut self, actions: impl Iterator<Item = InputAction>) -> ControlFlow<()> {
+        let mut state = self.state;
+        for action in actions {
+            if apply(action, &mut self.camera, &mut state, &mut self.figures, &self.farm).is_break() {
+                return ControlFlow::Break(());
+            }
+        }
+        state.request.view = FrameView { camera: self.camera.camera(), ..state.request.view };
+        if self.state != state {
+            self.state = state;
+            self.requests.replace(&self.farm, &self.state);
+        }
+        ControlFlow::Continue(())
     }
 }
 
-/// Waits until then; for ever where there is no such moment.
+/// Applies one action to camera, view, statistics or workers.
+fn apply(
+    action: InputAction,
+    camera: &mut CameraControl,
+    state: &mut ViewState,
+    figures: &mut ViewerState,
+    farm: &Farm,
+) -> ControlFlow<()> {
+    match action {
+        InputAction::Move { direction, seconds } => camera.fly(direction, seconds),
+        InputAction::Look { right, up, seconds } => camera.look(right, up, seconds),
+        InputAction::Orbit { right, down } => camera.orbit(right, down),
+        InputAction::Zoom { notches } => camera.zoom(notches),
+        InputAction::ResetCamera => camera.reset(),
+        InputAction::Resize { width, height } => {
+            let side = |pixels: u32| pixels.clamp(1, MAX_SIDE);
+            let view = state.request.view;
+            state.request.view = FrameView { width: side(width), height: side(height), ..view };
+        }
+        InputAction::SetVisible(visible) => state.hidden = !visible,
+        InputAction::Presented { latency } => figures.presented(latency),
+        InputAction::Worker(command) => command.perform(&farm.control()),
+        InputAction::Quit => return ControlFlow::Break(()),
+    }
+    ControlFlow::Continue(())
+}
+
+/// Waits until a time; for ever where there is none.
 async fn until(at: Option<Instant>) {
     match at {
         Some(at) => tokio::time::sleep_until(at.into()).await,

@@ -71,8 +71,8 @@ impl Simulation {
         (0..count).map(|_| self.frame()).collect()
     }
 
-    fn told(&self) -> Vec<String> {
-        self.controller.told(self.in_flight.back().unwrap().0)
+    fn lines(&self) -> Vec<String> {
+        self.controller.lines(self.in_flight.back().unwrap().0)
     }
 }
 
@@ -129,13 +129,13 @@ fn the_limit_is_named_and_told_with_what_is_lost() {
     // Below the target the picture waits for the wire no longer than it may; out of reach, it does.
     slow_wire.wire = 5.0;
     slow_wire.frames(SETTLING);
-    let told = slow_wire.told();
+    let told = slow_wire.lines();
     assert!(told[0].starts_with("moving: loses about FLIP 0."), "{told:?}");
     assert_eq!(told[1..], ["by the general table", "30 FPS: out of reach", "waits for the wire"]);
 
     let mut slow_threads = Simulation::new(room(16), 30.0, 20.0, 0.01);
     slow_threads.frames(SETTLING);
-    let told = slow_threads.told();
+    let told = slow_threads.lines();
     assert_eq!(told[1..], ["by the scene's table", "30 FPS: out of reach", "waits for render threads"]);
 }
 

@@ -121,7 +121,7 @@ impl QualityController {
     }
 
     /// The picture for a frame that is asked for like this.
-    pub(crate) fn picture(&self, wanted: &ViewRequest, mode: QualityMode) -> ViewRequest {
+    pub(crate) fn apply(&self, wanted: &ViewRequest, mode: QualityMode) -> ViewRequest {
         self.rung(mode).map_or(*wanted, |rung| rung.setting.applied(wanted))
     }
 
@@ -200,7 +200,7 @@ impl QualityController {
     }
 
     /// What the overlay says of a frame.
-    pub(crate) fn told(&self, mode: QualityMode) -> Vec<String> {
+    pub(crate) fn lines(&self, mode: QualityMode) -> Vec<String> {
         let mut lines = match (mode, self.rung(mode)) {
             (QualityMode::Resting, _) => return vec!["at rest: all that was asked for".to_owned()],
             (QualityMode::Moving(Step { rung: 0, .. }), _) => {

@@ -42,9 +42,9 @@ fn rest(controller: &mut QualityController, frames: u32) {
 fn the_picture_at_rest_is_the_one_that_is_wanted() {
     let mut controller = controller(100.0);
     assert_eq!(controller.next(MS), QualityMode::Resting);
-    assert_eq!(controller.picture(&wanted(4), QualityMode::Resting), wanted(4));
-    assert_eq!(controller.picture(&wanted(4), moving(0)), wanted(4));
-    assert_eq!(controller.told(QualityMode::Resting), ["at rest: all that was asked for"]);
+    assert_eq!(controller.apply(&wanted(4), QualityMode::Resting), wanted(4));
+    assert_eq!(controller.apply(&wanted(4), moving(0)), wanted(4));
+    assert_eq!(controller.lines(QualityMode::Resting), ["at rest: all that was asked for"]);
 }
 
 #[test]
@@ -54,9 +54,9 @@ fn a_moving_one_is_at_the_rung_that_holds() {
     controller.changed(MS * 101);
     let mode = controller.next(MS * 101);
     assert_eq!(mode, moving(2));
-    assert_eq!(controller.picture(&wanted(1), mode).scale, RenderScale::Half);
+    assert_eq!(controller.apply(&wanted(1), mode).scale, RenderScale::Half);
     assert_eq!(
-        controller.told(mode),
+        controller.lines(mode),
         ["moving: loses about FLIP 0.050", "by the general table", "waits for render threads"]
     );
 }
@@ -89,8 +89,8 @@ fn a_rate_that_is_out_of_reach_is_told() {
         "1000 FPS: out of reach",
         "waits for render threads",
     ];
-    assert_eq!(controller.told(moving(2)), told);
-    assert_eq!(controller.told(QualityMode::Resting), ["at rest: all that was asked for"]);
+    assert_eq!(controller.lines(moving(2)), told);
+    assert_eq!(controller.lines(QualityMode::Resting), ["at rest: all that was asked for"]);
 }
 
 #[test]

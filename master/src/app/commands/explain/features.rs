@@ -6,7 +6,7 @@ use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Material, Shading};
 use serde::Serialize;
 
 use super::super::source::Source;
-use crate::display::overlay::counted;
+use crate::display::numbers::counted;
 
 /// What features add to the time of a frame, in per cent: medians of scenes that differ in the feature alone, one thread with
 /// AVX-512. Another scene has other shares; these say what is dear and what is not. `scripts/bench_tracer.sh` measures them.

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Explanation, MeshFacts, TextureFacts};
-use crate::display::overlay::{counted, grouped};
+use crate::display::numbers::{counted, grouped};
 
 /// Meshes and textures that are listed one by one; of more, the largest are.
 const LISTED: usize = 12;

@@ -15,7 +15,7 @@ use crate::viewer::view_request::ViewRequest;
 ///
 /// # Errors
 /// A table that cannot be used.
-pub(super) fn turned(
+pub(super) fn view_quality(
     args: &QualityControlArgs,
     source: &Source,
     wanted: ViewRequest,
@@ -25,7 +25,7 @@ pub(super) fn turned(
         Some(rate) => {
             (wanted, Some(QualityController::new(ladder(&args.error, source, &wanted)?, rate, animated)))
         }
-        None => (within(&args.error, source, wanted)?, None),
+        None => (within_error(&args.error, source, wanted)?, None),
     })
 }
 
@@ -33,7 +33,7 @@ pub(super) fn turned(
 ///
 /// # Errors
 /// A table that cannot be used.
-pub(super) fn within(
+pub(super) fn within_error(
     args: &ErrorArgs,
     source: &Source,
     wanted: ViewRequest,
