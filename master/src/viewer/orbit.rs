@@ -1,29 +1,29 @@
-//! Turning a camera about its look-at point, and the frames of an animation.
+//! Animations: orbits of the camera about its look-at point, and rotation of the models.
 //!
-//! Sines and cosines are the tracer's own: the same command line gives the same pictures on every platform.
+//! Sines and cosines are the tracer's own, so the same command line gives the same pictures on every platform.
 
 use glam::DVec3;
 use rayfarm_tracer::scene::rotation::sin_cos_degrees;
 use rayfarm_tracer::scene::{Camera, FrameView};
 
-/// The two smooth movements that the command line offers.
+/// Movements without input, as the command line offers them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Animation {
-    /// Degrees by which the camera goes round its look-at point over all frames.
+    /// Degrees by which the camera turns about its look-at point over all frames.
     pub(crate) orbit: f64,
     /// Degrees by which the models turn about y from each frame to the next.
     pub(crate) spin: f64,
-    /// The number of frames that `orbit` is spread over; at least 1.
+    /// Number of frames of the orbit; at least 1.
     pub(crate) frames: u32,
 }
 
 impl Animation {
-    /// Whether frames differ without anybody's doing.
+    /// Whether frames differ without input.
     pub(crate) fn is_moving(&self) -> bool {
         self.orbit != 0.0 || self.spin != 0.0
     }
 
-    /// What frame `index` (from 0) shows: frame 0 is `base` itself, bit for bit.
+    /// View of frame `index` (from 0). Frame 0 is `base` itself, bit for bit.
     pub(crate) fn view(&self, base: &FrameView, index: u64) -> FrameView {
         let frames = f64::from(self.frames.max(1));
         let angle = self.orbit * index as f64 / frames;
@@ -35,7 +35,7 @@ impl Animation {
     }
 }
 
-/// The camera after going round its look-at point by `degrees`, anticlockwise seen from above.
+/// The camera after a turn about its look-at point by `degrees`, anticlockwise seen from above.
 pub(crate) fn orbited(camera: &Camera, degrees: f64) -> Camera {
     if degrees == 0.0 {
         return *camera;
@@ -45,10 +45,10 @@ pub(crate) fn orbited(camera: &Camera, degrees: f64) -> Camera {
     Camera { position: camera.look_at + offset, up: rotated(camera.up, axis, degrees), ..*camera }
 }
 
-/// The unit axis that orbits go round: +Y wherever the camera stands level, its own `up` where it is rolled.
+/// Unit axis of orbits: +Y for a level camera, its own `up` for a rolled one.
 ///
-/// A camera given by `rotation` has an `up` that leans with its pitch; going round that would tilt the horizon,
-/// although the picture at rest cannot tell the two axes apart.
+/// A camera given by `rotation` has an `up` that tilts with its pitch. An orbit about that axis would tilt the horizon,
+/// although both axes give the same picture at rest.
 pub(crate) fn upright_axis(camera: &Camera) -> DVec3 {
     let forward = (camera.look_at - camera.position).normalize_or_zero();
     let upwards = |v: DVec3| v.reject_from_normalized(forward).try_normalize();
@@ -59,11 +59,10 @@ pub(crate) fn upright_axis(camera: &Camera) -> DVec3 {
     }
 }
 
-/// How far, in radians, a camera may be from level and still count as level: far below what a pixel shows, far above
-/// the rounding of a rotation's sines.
+/// Largest deviation of a level camera, in radians: far below a pixel, far above the rounding of a rotation's sines.
 const LEVEL_TOLERANCE: f64 = 1e-6;
 
-/// `v` turned about the unit `axis` (Rodrigues' formula).
+/// `v` rotated about the unit `axis` (Rodrigues' formula).
 fn rotated(v: DVec3, axis: DVec3, degrees: f64) -> DVec3 {
     let (sin, cos) = sin_cos_degrees(degrees);
     v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos))
@@ -86,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quarter_of_the_way_is_beside_the_look_at_point() {
+    fn a_quarter_of_an_orbit_is_to_the_side_of_the_look_at_point() {
         let animation = Animation { orbit: 360.0, spin: 0.0, frames: 4 };
         let quarter = animation.view(&base(), 1).camera;
         assert!(quarter.position.distance(DVec3::new(4.0, 1.0, 0.0)) < 1e-12, "{}", quarter.position);
@@ -94,27 +93,27 @@ mod tests {
     }
 
     #[test]
-    fn the_first_frame_is_the_scenes_own_and_spin_adds_up() {
+    fn the_first_frame_is_the_scenes_view_and_spin_accumulates() {
         let animation = Animation { orbit: 90.0, spin: 2.5, frames: 10 };
         assert_eq!(animation.view(&base(), 0), base());
         assert_eq!(animation.view(&base(), 7).spin, 17.5);
     }
 
     #[test]
-    fn a_pitched_camera_goes_round_the_vertical() {
+    fn a_pitched_camera_orbits_the_vertical() {
         let pitched = camera(DVec3::new(0.0, 3.0, 3.0), DVec3::ZERO, DVec3::new(0.0, 1.0, -1.0));
         assert_eq!(upright_axis(&pitched), DVec3::Y);
         assert!((orbited(&pitched, 77.0).position.y - 3.0).abs() < 1e-12);
     }
 
     #[test]
-    fn a_rolled_camera_goes_round_its_own_up() {
+    fn a_rolled_camera_orbits_its_own_up() {
         let rolled = camera(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::X);
         assert_eq!(upright_axis(&rolled), DVec3::X);
     }
 
     #[test]
-    fn a_camera_that_looks_straight_down_goes_round_its_own_up() {
+    fn a_camera_that_looks_straight_down_orbits_its_own_up() {
         let plan = camera(DVec3::new(0.0, 9.0, 0.0), DVec3::ZERO, DVec3::NEG_Z);
         assert_eq!(upright_axis(&plan), DVec3::NEG_Z);
         assert!(orbited(&plan, 45.0).position.is_finite());

@@ -1,4 +1,4 @@
-//! What is wanted to be seen, and how faithfully: the knobs as commands, window and reports know them.
+//! View requests: a view and the quality of its picture, with the knobs as commands, displays and reports name them.
 
 use rayfarm_tracer::image::{self, ImageError, RgbImage};
 use rayfarm_tracer::scene::quality::word_of;
@@ -7,36 +7,36 @@ use rayfarm_tracer::scene::{
 };
 use serde::Serialize;
 
-/// A picture, and the scale at which the farm renders it.
+/// A requested picture, and the scale at which the farm renders it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ViewRequest {
-    /// What it shows, and the size in which it is wanted.
+    /// Camera, knobs of the tracer, and the size in which the picture is delivered.
     pub(crate) view: FrameView,
-    /// The part of width and height that is rendered.
+    /// Rendered pixels per delivered pixel, along a side.
     pub(crate) scale: RenderScale,
 }
 
 impl ViewRequest {
-    /// What the farm is asked for.
+    /// The view that the farm renders.
     pub(crate) fn rendered(&self) -> FrameView {
         let (width, height) = self.size();
         FrameView { width, height, ..self.view }
     }
 
-    /// Of the rendered picture.
+    /// Width and height of the rendered picture, in pixels.
     fn size(&self) -> (u32, u32) {
         (self.scale.of(self.view.width), self.scale.of(self.view.height))
     }
 
-    /// A rendered picture in the size in which it is wanted.
+    /// Resizes a rendered picture to the size in which it is delivered.
     ///
     /// # Errors
-    /// One whose bytes do not fit its size.
+    /// A picture whose bytes do not fit its size.
     pub(crate) fn delivered(&self, rendered: RgbImage) -> Result<RgbImage, ImageError> {
         image::resize(rendered, self.view.width, self.view.height)
     }
 
-    /// The positions of all knobs, for reports.
+    /// Values of all knobs, for reports.
     pub(crate) fn knobs(&self) -> Knobs {
         let Quality { adaptive, shadows, shading, filter, exponent, colors, dither } = self.view.quality;
         Knobs {
@@ -51,9 +51,9 @@ impl ViewRequest {
         }
     }
 
-    /// Each knob that is not at full quality, in a few words.
+    /// A short text for each knob that is not at full quality.
     pub(crate) fn reductions(&self) -> Vec<String> {
-        // Dither takes nothing away.
+        // Dither is no reduction.
         let Quality { adaptive: _, shadows, shading, filter, exponent, colors, dither: _ } =
             self.view.quality;
         let mut reductions = Vec::new();
@@ -74,12 +74,12 @@ impl ViewRequest {
     }
 }
 
-/// Where each knob stands, in the words of the command line.
+/// Value of each knob, in the words of the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Knobs {
     shadows: bool,
     shading: &'static str,
-    /// `null` where each texture has its own.
+    /// `null` where each texture has its own filter.
     filter: Option<&'static str>,
     exponent: &'static str,
     colors: &'static str,
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn full_quality_has_nothing_to_name() {
+    fn full_quality_has_no_reductions() {
         assert_eq!(full().reductions(), Vec::<String>::new());
         assert_eq!(full().rendered(), test_scene::view());
         assert_eq!(

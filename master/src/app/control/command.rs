@@ -1,57 +1,57 @@
-//! What a line asks for.
+//! Commands and their syntax.
 
 use rayfarm_text::printable;
 
-/// A command.
+/// A command of one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Command {
-    /// List the workers.
+    /// Lists the workers.
     Workers,
-    /// How far the run is.
+    /// Reports the progress of the run.
     Status,
-    /// What can be said.
+    /// Lists the commands.
     Help,
-    /// End the run, as Ctrl-C does.
+    /// Ends the run, as Ctrl-C does.
     Quit,
-    /// Let a worker finish what it holds and leave.
-    Drain(Whom),
-    /// Send a worker away at once and keep it out.
-    Kick(Whom),
-    /// Give a worker no more leases.
-    Pause(Whom),
-    /// Give it leases again.
-    Resume(Whom),
-    /// Let a kicked worker come back, by number or by name.
+    /// Disconnects a worker after it has finished its leases.
+    Drain(WorkerSelector),
+    /// Disconnects a worker at once and refuses it from then on.
+    Kick(WorkerSelector),
+    /// Grants a worker no more leases.
+    Pause(WorkerSelector),
+    /// Grants a worker leases again.
+    Resume(WorkerSelector),
+    /// Admits a kicked worker again, by number or by name.
     Allow(String),
 }
 
-/// Which worker.
+/// Workers that a command applies to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Whom {
-    /// Every one that is connected.
+pub(super) enum WorkerSelector {
+    /// All connected workers.
     All,
-    /// By number or by name.
+    /// One worker, by number or by name.
     One(String),
 }
 
-/// What can be said, and what it does.
+/// Syntax and effect of each command.
 pub(super) const COMMANDS: [(&str, &str); 9] = [
-    ("workers", "the connected workers"),
-    ("status", "how far the run is"),
-    ("drain ID|NAME", "a worker finishes what it holds and leaves"),
-    ("kick ID|NAME", "a worker is sent away at once and kept out"),
-    ("allow ID|NAME", "a kicked worker may come back"),
-    ("pause [ID|NAME]", "a worker, or all, get no more work"),
-    ("resume [ID|NAME]", "a paused worker, or all, get work again"),
-    ("help", "this list"),
+    ("workers", "list the connected workers"),
+    ("status", "report the progress of the run"),
+    ("drain ID|NAME", "disconnect a worker after it has finished its leases"),
+    ("kick ID|NAME", "disconnect a worker at once and refuse it from then on"),
+    ("allow ID|NAME", "admit a kicked worker again"),
+    ("pause [ID|NAME]", "grant a worker, or all, no more leases"),
+    ("resume [ID|NAME]", "grant a paused worker, or all, leases again"),
+    ("help", "print this list"),
     ("quit", "end the run"),
 ];
 
 impl Command {
-    /// Reads a line. A name may have spaces in it.
+    /// Parses a line. A name may contain spaces.
     ///
     /// # Errors
-    /// What is wrong with it and what was expected.
+    /// The mistake in the line, and the expected syntax.
     pub(super) fn parse(line: &str) -> Result<Self, String> {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
@@ -69,13 +69,13 @@ impl Command {
             "" => return Err("an empty line; help lists the commands".to_owned()),
             other => {
                 let other = printable(other);
-                return Err(format!("there is no command \"{other}\"; help lists those there are"));
+                return Err(format!("there is no command \"{other}\"; help lists the commands"));
             }
         };
         if rest.is_empty() {
             Ok(command)
         } else {
-            Err(format!("{word} stands alone, without \"{}\"", printable(rest)))
+            Err(format!("{word} takes no argument, but \"{}\" follows it", printable(rest)))
         }
     }
 }
@@ -83,19 +83,19 @@ impl Command {
 fn kicked(word: &str, rest: &str) -> Result<String, String> {
     match rest {
         "" => Err(format!(
-            "{word} whom? expected a worker's number or name after it; status lists those kicked"
+            "{word} needs an argument: the number or name of a worker; status lists the kicked ones"
         )),
-        whom => Ok(whom.to_owned()),
+        worker => Ok(worker.to_owned()),
     }
 }
 
-fn one(word: &str, rest: &str) -> Result<Whom, String> {
+fn one(word: &str, rest: &str) -> Result<WorkerSelector, String> {
     match rest {
-        "" => Err(format!("{word} whom? expected a worker's number or name after it; workers lists them")),
-        whom => Ok(Whom::One(whom.to_owned())),
+        "" => Err(format!("{word} needs an argument: the number or name of a worker; workers lists them")),
+        worker => Ok(WorkerSelector::One(worker.to_owned())),
     }
 }
 
-fn one_or_all(rest: &str) -> Whom {
-    if rest.is_empty() { Whom::All } else { Whom::One(rest.to_owned()) }
+fn one_or_all(rest: &str) -> WorkerSelector {
+    if rest.is_empty() { WorkerSelector::All } else { WorkerSelector::One(rest.to_owned()) }
 }

@@ -1,4 +1,4 @@
-//! Commands performed, and their answers.
+//! Execution of commands, and their answers.
 
 use std::borrow::Cow;
 
@@ -6,54 +6,54 @@ use rayfarm_text::printable;
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
-use super::command::{COMMANDS, Command, Whom};
+use super::command::{COMMANDS, Command, WorkerSelector};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
 use crate::farm::{FarmControl, FarmStatus, KickedWorker, TransferStatus, UnknownWorker, WorkerStatus};
 use crate::viewer::KICK_REASON;
 
-/// Somebody who may give commands.
+/// Executor of the commands of one or more connections.
 #[derive(Clone)]
 pub(crate) struct Console {
     farm: FarmControl,
     quit: CancellationToken,
 }
 
-/// An answer, and what follows from it.
+/// An answer, and the action that follows it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Answer {
-    /// One line of JSON with its end.
+    /// One line of JSON, with its newline.
     pub(super) line: String,
     pub(super) then: Then,
 }
 
-/// What to do once the answer is on its way.
+/// Action after an answer has been written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Then {
-    /// Listen on.
+    /// Reads the next command.
     Listen,
-    /// Listen no more to whoever said that.
+    /// Closes the connection.
     Close,
-    /// End the run.
+    /// Ends the run.
     Quit,
 }
 
 impl Console {
-    /// Commands go to `farm`; `quit` is cancelled where the run shall end.
+    /// An executor for `farm`. Cancels `quit` at the command of that name.
     pub(crate) fn new(farm: FarmControl, quit: CancellationToken) -> Self {
         Self { farm, quit }
     }
 
-    /// Does what a line asks for.
+    /// Executes a line.
     pub(super) fn answer(&self, line: &Line) -> Answer {
         let text = match line {
             Line::Text(text) => text,
             Line::TooLong => {
-                return refused(&format!("a line has {MAX_LINE_BYTES} bytes at most"), Then::Close);
+                return refused(&format!("a line must not exceed {MAX_LINE_BYTES} bytes"), Then::Close);
             }
             Line::Binary => return refused("commands are text", Then::Close),
         };
         if is_foreign(text) {
-            return refused("this is no web server; commands are words, such as help", Then::Close);
+            return refused("this is not a web server; commands are words, such as help", Then::Close);
         }
         match Command::parse(text).and_then(|command| self.perform(&command)) {
             Ok((value, then)) => Answer { line: format!("{value}\n"), then },
@@ -73,12 +73,14 @@ impl Console {
             Command::Status => progress(&status),
             Command::Help => help(),
             Command::Quit => return Ok((json!({ "ok": true }), Then::Quit)),
-            Command::Drain(whom) => self.to_each(&status, whom, FarmControl::drain)?,
-            Command::Pause(whom) => self.to_each(&status, whom, FarmControl::pause)?,
-            Command::Resume(whom) => self.to_each(&status, whom, FarmControl::resume)?,
-            Command::Kick(whom) => self.to_each(&status, whom, |farm, id| farm.kick(id, KICK_REASON))?,
-            Command::Allow(whom) => {
-                let worker = find_kicked(&status, whom)?;
+            Command::Drain(workers) => self.to_each(&status, workers, FarmControl::drain)?,
+            Command::Pause(workers) => self.to_each(&status, workers, FarmControl::pause)?,
+            Command::Resume(workers) => self.to_each(&status, workers, FarmControl::resume)?,
+            Command::Kick(workers) => {
+                self.to_each(&status, workers, |farm, id| farm.kick(id, KICK_REASON))?
+            }
+            Command::Allow(worker) => {
+                let worker = find_kicked(&status, worker)?;
                 json!({ "ok": true, "allowed": usize::from(self.farm.allow_worker(worker)) })
             }
         };
@@ -88,46 +90,49 @@ impl Console {
     fn to_each(
         &self,
         status: &FarmStatus,
-        whom: &Whom,
+        selector: &WorkerSelector,
         act: impl Fn(&FarmControl, u64) -> Result<(), UnknownWorker>,
     ) -> Result<Value, String> {
-        let ids = match whom {
-            Whom::All => status.workers.iter().map(|worker| worker.id).collect(),
-            Whom::One(whom) => vec![find(status, whom)?],
+        let ids = match selector {
+            WorkerSelector::All => status.workers.iter().map(|worker| worker.id).collect(),
+            WorkerSelector::One(worker) => vec![find(status, worker)?],
         };
-        // One of many may have left meanwhile; the one that was named must be there.
+        // One of many may have disconnected meanwhile; a named one must be connected.
         let done: Vec<u64> = ids.iter().copied().filter(|&id| act(&self.farm, id).is_ok()).collect();
-        match (whom, done.is_empty()) {
-            (Whom::One(whom), true) => Err(format!("worker {} has just left", printable(whom))),
+        match (selector, done.is_empty()) {
+            (WorkerSelector::One(worker), true) => {
+                Err(format!("worker {} has just disconnected", printable(worker)))
+            }
             _ => Ok(json!({ "ok": true, "workers": done })),
         }
     }
 }
 
-/// The one connected worker of that number, or else of that name.
-fn find(status: &FarmStatus, whom: &str) -> Result<u64, String> {
+/// Number of the only connected worker of that number, or else of that name.
+fn find(status: &FarmStatus, text: &str) -> Result<u64, String> {
     let known = status.workers.iter().map(|worker| (worker.id, worker.name.as_str()));
-    let none = |whom: Cow<str>| format!("no worker \"{whom}\" is connected; workers lists those that are");
-    one_of(known, whom, none)
+    let none =
+        |text: Cow<str>| format!("no worker \"{text}\" is connected; workers lists the connected ones");
+    one_of(known, text, none)
 }
 
-/// The one kicked worker of that number, or else of that name.
-fn find_kicked(status: &FarmStatus, whom: &str) -> Result<u64, String> {
+/// Number of the only kicked worker of that number, or else of that name.
+fn find_kicked(status: &FarmStatus, text: &str) -> Result<u64, String> {
     let known = status.kicked.iter().map(|worker| (worker.id, worker.name.as_str()));
-    let none = |whom: Cow<str>| format!("no worker \"{whom}\" was kicked; status lists those that were");
-    one_of(known, whom, none)
+    let none = |text: Cow<str>| format!("no worker \"{text}\" was kicked; status lists the kicked ones");
+    one_of(known, text, none)
 }
 
 fn one_of<'a>(
     known: impl Iterator<Item = (u64, &'a str)> + Clone,
-    whom: &str,
+    text: &str,
     none: impl Fn(Cow<str>) -> String,
 ) -> Result<u64, String> {
-    if let Some((id, _)) = known.clone().find(|(id, _)| whom.parse() == Ok(*id)) {
+    if let Some((id, _)) = known.clone().find(|(id, _)| text.parse() == Ok(*id)) {
         return Ok(id);
     }
-    let named: Vec<u64> = known.filter(|(_, name)| *name == whom).map(|(id, _)| id).collect();
-    let shown = printable(whom);
+    let named: Vec<u64> = known.filter(|(_, name)| *name == text).map(|(id, _)| id).collect();
+    let shown = printable(text);
     match *named {
         [id] => Ok(id),
         [] => Err(none(shown)),
@@ -187,7 +192,7 @@ fn kicked(worker: &KickedWorker) -> Value {
     json!({ "id": worker.id, "name": worker.name, "address": worker.address.map(|address| address.to_string()) })
 }
 
-/// Three digits behind the point: what clocks can tell.
+/// Rounds to three decimals, the precision of the clocks.
 fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
@@ -197,6 +202,7 @@ fn help() -> Value {
     json!({ "ok": true, "commands": lines })
 }
 
+/// The answer to a line that is refused.
 pub(super) fn refused(error: &str, then: Then) -> Answer {
     Answer { line: format!("{}\n", json!({ "ok": false, "error": error })), then }
 }

@@ -1,36 +1,36 @@
-//! Bytes into lines of bounded length.
+//! Splitting of bytes into lines of bounded length.
 
-/// Bytes that a command line may have.
+/// Largest length of a command, in bytes.
 pub(super) const MAX_LINE_BYTES: usize = 1024;
 
-/// Cuts a stream into lines, however it arrives. Holds [`MAX_LINE_BYTES`] at most.
+/// Splitter of a stream into lines. Holds at most [`MAX_LINE_BYTES`].
 #[derive(Debug, Default)]
-pub(super) struct Lines {
+pub(super) struct LineSplitter {
     line: Vec<u8>,
-    /// The rest of the line is worth nothing.
+    /// Whether the rest of the line is skipped.
     skips: bool,
 }
 
-/// One line, without its end.
+/// One line, without its newline.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Line {
-    /// What it says; bytes that are no text are replaced.
+    /// Text; bytes that are not UTF-8 are replaced.
     Text(String),
-    /// It is longer than it may be. Known at once; the rest of it is skipped.
+    /// A line beyond the largest length. Returned at once; the rest of it is skipped.
     TooLong,
-    /// It has a byte that no text has: it is of another protocol. Likewise.
+    /// A line with a control character, of another protocol. Returned at once; the rest of it is skipped.
     Binary,
 }
 
-impl Lines {
-    /// Takes the next byte; the line that it ends or spoils, if it does. `\r\n` counts as `\n`.
+impl LineSplitter {
+    /// Takes the next byte. Returns the line that it completes or makes invalid. `\r\n` counts as `\n`.
     pub(super) fn push(&mut self, byte: u8) -> Option<Line> {
         match byte {
             b'\n' if std::mem::take(&mut self.skips) => None,
             b'\n' => Some(self.take()),
             _ if self.skips => None,
-            0..=8 | 11..=12 | 14..=31 | 127 => self.spoil(Line::Binary),
-            _ if self.line.len() == MAX_LINE_BYTES => self.spoil(Line::TooLong),
+            0..=8 | 11..=12 | 14..=31 | 127 => self.reject(Line::Binary),
+            _ if self.line.len() == MAX_LINE_BYTES => self.reject(Line::TooLong),
             _ => {
                 self.line.push(byte);
                 None
@@ -38,7 +38,7 @@ impl Lines {
         }
     }
 
-    /// The stream is over: the line that nothing has ended, if there is one.
+    /// Ends the stream. Returns the last line if it has no newline.
     pub(super) fn end(&mut self) -> Option<Line> {
         (!self.line.is_empty()).then(|| self.take())
     }
@@ -49,15 +49,15 @@ impl Lines {
         Line::Text(String::from_utf8_lossy(line).into_owned())
     }
 
-    fn spoil(&mut self, why: Line) -> Option<Line> {
+    fn reject(&mut self, reason: Line) -> Option<Line> {
         self.line.clear();
         self.skips = true;
-        Some(why)
+        Some(reason)
     }
 }
 
-/// Whether a line is of another protocol. A web page can have its visitor's browser talk to the ports of this machine: a
-/// request begins with a method and names HTTP, its fields have a colon after their first word. No command does.
+/// Whether a line is of another protocol. A web page can make its visitor's browser connect to the ports of this machine: a
+/// request begins with a method and names HTTP, and its fields have a colon after their first word. Commands have neither.
 pub(super) fn is_foreign(line: &str) -> bool {
     let word = line.split_whitespace().next().unwrap_or_default();
     let is_method = word.len() > 1 && word.bytes().all(|byte| byte.is_ascii_uppercase() || byte == b'-');

@@ -1,14 +1,15 @@
-//! Steering a run from outside: commands, one a line, each answered by one line of JSON.
+//! Remote control of a run: commands, one per line, each answered by one line of JSON.
 //!
-//! They come from standard input (`--control -`), from a TCP port of this machine, or from a Unix socket, which belongs to
-//! its user alone. All users of a machine, and web pages in their browsers, can reach its ports: there, the first
-//! line is a token from a file that belongs to the user alone, and what looks like HTTP ends the connection.
+//! They arrive on standard input (`--control -`), at a TCP port of this machine, or at a Unix socket with access for its user
+//! only. All users of a machine, and web pages in their browsers, can reach its ports. There, the first line must be a token
+//! from a file with access for the user only, and anything like HTTP ends the connection.
 
 mod command;
 mod console;
 mod lines;
 mod place;
-mod seats;
+mod slots;
+
 mod socket;
 #[cfg(unix)]
 mod socket_file;
@@ -25,10 +26,10 @@ use tokio_util::sync::CancellationToken;
 
 use crate::app::error::CommandError;
 
-/// Takes commands at a place until `stop`. Call it inside a runtime.
+/// Accepts commands at a place until `stop` is cancelled. Must be called inside a runtime.
 ///
 /// # Errors
-/// A place that cannot be listened at, and what to do about it.
+/// A place at which the process cannot listen, with a remedy.
 pub(crate) fn start(place: &Place, console: Console, stop: CancellationToken) -> Result<(), CommandError> {
     match place {
         Place::StandardInput => stdin::start(console),

@@ -1,4 +1,4 @@
-//! Where commands come from.
+//! Places at which commands are accepted.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -8,19 +8,19 @@ use rayfarm_protocol::address;
 /// The value of `--control`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// `-`.
+    /// `-`: standard input.
     StandardInput,
-    /// `ADDR:PORT`, a loopback address.
+    /// `ADDR:PORT`: a port of a loopback address.
     Tcp(SocketAddr),
-    /// A path: a Unix socket that is made there.
+    /// A path: a Unix socket, created there.
     Unix(PathBuf),
 }
 
 impl Place {
-    /// Reads the value of `--control`.
+    /// Parses the value of `--control`.
     ///
     /// # Errors
-    /// What was expected; an address that other machines could reach, and why that is refused.
+    /// The expected syntax; or an address that other machines can reach, with the reason for the refusal.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         if text == "-" {
             return Ok(Self::StandardInput);
@@ -28,8 +28,8 @@ impl Place {
         match address::parse(text)? {
             Some(address) if address.ip().is_loopback() => Ok(Self::Tcp(address)),
             Some(address) => Err(format!(
-                "{} can be reached by other machines, and whoever reaches it may give commands; expected an address of \
-                 this machine alone, such as 127.0.0.1:{}",
+                "{} can be reached by other machines, which could then command the run; expected a loopback address, such \
+                 as 127.0.0.1:{}",
                 address.ip(),
                 address.port()
             )),

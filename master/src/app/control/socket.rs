@@ -1,4 +1,4 @@
-//! Commands over a socket: a few connections at a time, each in its own pace.
+//! Commands over a socket: a few connections at a time, each with its own task.
 
 use std::future::Future;
 use std::io;
@@ -13,51 +13,51 @@ use tokio::time::{Instant, timeout, timeout_at};
 use tokio_util::sync::CancellationToken;
 
 use super::console::{Answer, Console, Then, refused};
-use super::lines::{Line, Lines};
-use super::seats::{Connection, MAX_CONNECTIONS, Seats};
+use super::lines::{Line, LineSplitter};
+use super::slots::{Connection, ConnectionSlots, MAX_CONNECTIONS};
 use super::token::TokenFile;
 use crate::app::error::CommandError;
 
-/// How long a connection may take to show its token.
-const FIRST_LINE: Duration = Duration::from_secs(10);
-/// How long a connection may give no command.
-const IDLE: Duration = Duration::from_secs(600);
-/// How long a connection may not read its answer.
-const UNREAD: Duration = Duration::from_secs(10);
+/// Time within which a connection must send the token.
+const TOKEN_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time without a command after which a connection ends.
+const IDLE_TIMEOUT: Duration = Duration::from_secs(600);
+/// Time within which a connection must read its answer.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How connections are let in.
+/// Server of the connections of one place.
 #[derive(Clone)]
-struct Door {
-    seats: Seats,
+struct Server {
+    slots: ConnectionSlots,
     token: Option<Arc<TokenFile>>,
     console: Console,
     stop: CancellationToken,
 }
 
-impl Door {
+impl Server {
     fn new(token: Option<TokenFile>, console: Console, stop: CancellationToken) -> Self {
-        Self { seats: Seats::default(), token: token.map(Arc::new), console, stop }
+        Self { slots: ConnectionSlots::default(), token: token.map(Arc::new), console, stop }
     }
 
-    /// Talks to a connection in the background.
-    fn admit(&self, mut stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static) {
-        let (door, connection) = (self.clone(), self.seats.take());
+    /// Serves a connection in a task of its own.
+    fn serve(&self, mut stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static) {
+        let (server, connection) = (self.clone(), self.slots.take());
         tokio::spawn(async move {
             let ended = tokio::select! {
-                () = door.stop.cancelled() => return,
-                () = connection.give_way.cancelled() => Some(format!(
-                    "{MAX_CONNECTIONS} connections may be open, and this one was idle for longest when another came"
+                () = server.stop.cancelled() => return,
+                () = connection.replaced.cancelled() => Some(format!(
+                    "{MAX_CONNECTIONS} connections may be open, and this one was idle for longest when another one arrived"
                 )),
-                ended = door.converse(&mut stream, &connection) => ended,
+                ended = server.converse(&mut stream, &connection) => ended,
             };
-            if let Some(why) = ended {
-                // Whoever does not want to know need not.
-                let _ = say(&mut stream, &refused(&why, Then::Close)).await;
+            if let Some(reason) = ended {
+                // The client may have closed its end already.
+                let _ = write(&mut stream, &refused(&reason, Then::Close)).await;
             }
         });
     }
 
-    /// Takes connections from `accept` until the run ends.
+    /// Accepts connections from `accept` until the run ends.
     async fn listen<S, A, F>(self, accept: A)
     where
         S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
@@ -67,7 +67,7 @@ impl Door {
         let listen = async {
             loop {
                 match accept().await {
-                    Ok(stream) => self.admit(stream),
+                    Ok(stream) => self.serve(stream),
                     Err(error) => pause_after(&error).await,
                 }
             }
@@ -75,24 +75,24 @@ impl Door {
         self.stop.run_until_cancelled(listen).await;
     }
 
-    /// Answers line by line. Returns what is to be said of the end, if anything is.
+    /// Answers line by line. Returns the reason of the end, where the client is to receive one.
     async fn converse(
         &self,
         stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
         connection: &Connection,
     ) -> Option<String> {
-        let mut lines = Lines::default();
+        let mut lines = LineSplitter::default();
         let mut is_trusted = self.token.is_none();
         if is_trusted {
             connection.touch();
         }
-        let mut deadline = Instant::now() + if is_trusted { IDLE } else { FIRST_LINE };
+        let mut deadline = Instant::now() + if is_trusted { IDLE_TIMEOUT } else { TOKEN_TIMEOUT };
         let mut chunk = [0; 1024];
         loop {
             let Ok(read) = timeout_at(deadline, stream.read(&mut chunk)).await else {
                 return Some(if is_trusted { idle() } else { self.wants_token() });
             };
-            // A connection that breaks is over, and that is all.
+            // A broken connection receives no reason.
             let count = read.ok()?;
             let bytes = chunk.get(..count).unwrap_or_default();
             for byte in bytes.iter().map(|&byte| Some(byte)).chain((count == 0).then_some(None)) {
@@ -105,9 +105,9 @@ impl Door {
                     Some(answer) => answer,
                     None => self.console.answer(&line),
                 };
-                let said = say(stream, &answer).await;
+                let written = write(stream, &answer).await;
                 match answer.then {
-                    Then::Listen => said.ok()?,
+                    Then::Listen => written.ok()?,
                     Then::Close => return None,
                     Then::Quit => {
                         self.console.quit();
@@ -116,7 +116,7 @@ impl Door {
                 }
                 is_trusted = true;
                 connection.touch();
-                deadline = Instant::now() + IDLE;
+                deadline = Instant::now() + IDLE_TIMEOUT;
             }
             if count == 0 {
                 return None;
@@ -124,7 +124,7 @@ impl Door {
         }
     }
 
-    /// The answer to the first line of a connection, where it has to show the token.
+    /// The answer to the first line of a connection, where that must be the token.
     fn opening(&self, is_trusted: bool, line: &Line) -> Option<Answer> {
         let token = self.token.as_ref().filter(|_| !is_trusted)?;
         let opens = matches!(line, Line::Text(text) if token.opens(text));
@@ -138,15 +138,15 @@ impl Door {
 }
 
 fn idle() -> String {
-    format!("no command has come for {} minutes", IDLE.as_secs() / 60)
+    format!("no command has arrived for {} minutes", IDLE_TIMEOUT.as_secs() / 60)
 }
 
-async fn say(stream: &mut (impl AsyncWrite + Unpin), answer: &Answer) -> io::Result<()> {
-    let written = timeout(UNREAD, stream.write_all(answer.line.as_bytes())).await;
+async fn write(stream: &mut (impl AsyncWrite + Unpin), answer: &Answer) -> io::Result<()> {
+    let written = timeout(WRITE_TIMEOUT, stream.write_all(answer.line.as_bytes())).await;
     written.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
 }
 
-/// Listens at a TCP port of this machine. The token that opens it is kept in one of `folders`.
+/// Listens at a TCP port of this machine. Its token is written to one of `folders`.
 pub(super) fn listen_tcp(
     address: SocketAddr,
     folders: &[PathBuf],
@@ -155,7 +155,7 @@ pub(super) fn listen_tcp(
 ) -> Result<(), CommandError> {
     let refuse = |error: io::Error| {
         CommandError::Failed(format!(
-            "cannot take commands at {address}: {error}; choose another port with --control 127.0.0.1:PORT"
+            "cannot accept commands at {address}: {error}; choose another port with --control 127.0.0.1:PORT"
         ))
     };
     let listener = std::net::TcpListener::bind(address).map_err(refuse)?;
@@ -164,23 +164,23 @@ pub(super) fn listen_tcp(
     let address = listener.local_addr().map_err(refuse)?;
     let token = TokenFile::create(folders, address).map_err(|problem| {
         CommandError::Failed(format!(
-            "cannot take commands at {address}: {problem}; use a Unix socket, such as --control ./control"
+            "cannot accept commands at {address}: {problem}; use a Unix socket, such as --control ./control"
         ))
     })?;
     let (file, ip, port) = (token.path().display(), address.ip(), address.port());
     tracing::info!(
-        "commands are taken at {address}; to give one: (cat '{file}'; echo status) | nc -q 1 {ip} {port}"
+        "commands are accepted at {address}; to send one: (cat '{file}'; echo status) | nc -q 1 {ip} {port}"
     );
-    let door = Door::new(Some(token), console, stop);
+    let server = Server::new(Some(token), console, stop);
     let listener = Arc::new(listener);
-    tokio::spawn(door.listen(move || {
+    tokio::spawn(server.listen(move || {
         let listener = listener.clone();
         async move { listener.accept().await.map(|(stream, _)| stream) }
     }));
     Ok(())
 }
 
-/// Listens at a Unix socket that is made for this run and removed after it.
+/// Listens at a Unix socket that is created for this run and removed after it.
 #[cfg(unix)]
 pub(super) fn listen_unix(
     path: &Path,
@@ -188,19 +188,19 @@ pub(super) fn listen_unix(
     stop: CancellationToken,
 ) -> Result<(), CommandError> {
     let socket = super::socket_file::SocketFile::bind(path).map_err(|problem| {
-        CommandError::Failed(format!("cannot take commands at {}: {problem}", path.display()))
+        CommandError::Failed(format!("cannot accept commands at {}: {problem}", path.display()))
     })?;
-    tracing::info!("commands are taken at {}", path.display());
-    let door = Door::new(None, console, stop);
+    tracing::info!("commands are accepted at {}", path.display());
+    let server = Server::new(None, console, stop);
     let socket = Arc::new(socket);
-    tokio::spawn(door.listen(move || {
+    tokio::spawn(server.listen(move || {
         let socket = socket.clone();
         async move { socket.listener.accept().await.map(|(stream, _)| stream) }
     }));
     Ok(())
 }
 
-/// There are none.
+/// Fails: this system has no Unix sockets.
 #[cfg(not(unix))]
 pub(super) fn listen_unix(path: &Path, _: Console, _: CancellationToken) -> Result<(), CommandError> {
     Err(CommandError::WrongInput(format!(
@@ -209,7 +209,7 @@ pub(super) fn listen_unix(path: &Path, _: Console, _: CancellationToken) -> Resu
     )))
 }
 
-/// Out of file descriptors, usually: not as fast as it can fail.
+/// Waits after a failed accept, usually for want of file descriptors, so that the loop does not spin.
 async fn pause_after(error: &std::io::Error) {
     tracing::warn!("a connection for commands was not accepted: {error}");
     tokio::time::sleep(std::time::Duration::from_millis(100)).await;

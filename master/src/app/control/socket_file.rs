@@ -1,4 +1,4 @@
-//! A Unix socket and its name among the files.
+//! A Unix socket and its file.
 
 use std::io::ErrorKind;
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
@@ -10,38 +10,38 @@ use socket2::{Domain, SockAddr, Socket, Type};
 /// Connections that wait to be accepted.
 const BACKLOG: i32 = 16;
 
-/// A socket that its owner alone can connect to. Its name is removed with it.
+/// A listening socket with access for its owner only. Its file is removed when it is dropped.
 #[derive(Debug)]
 pub(super) struct SocketFile {
     pub(super) listener: tokio::net::UnixListener,
     path: PathBuf,
-    /// Device and number of the file.
+    /// Device and inode of the file.
     file: (u64, u64),
 }
 
 impl SocketFile {
-    /// Makes it. The socket of a run that was killed is replaced; one that a run listens at, or any other file, is not.
+    /// Creates the socket. The file of a killed run is replaced; the socket of a running one, or any other file, is not.
     pub(super) fn bind(path: &Path) -> Result<Self, String> {
         remove_stale(path)?;
-        let told = |error: std::io::Error| match error.kind() {
-            ErrorKind::AddrInUse => "there is something of that name already; choose another".to_owned(),
+        let problem = |error: std::io::Error| match error.kind() {
+            ErrorKind::AddrInUse => "a file of that name exists already; choose another name".to_owned(),
             _ => error.to_string(),
         };
-        let socket = Socket::new(Domain::UNIX, Type::STREAM, None).map_err(told)?;
-        socket.bind(&SockAddr::unix(path).map_err(told)?).map_err(told)?;
-        // Until it listens, no client connects.
-        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600)).map_err(told)?;
-        let file = identity(path).ok_or("the socket has gone")?;
-        socket.listen(BACKLOG).map_err(told)?;
-        socket.set_nonblocking(true).map_err(told)?;
-        let listener = tokio::net::UnixListener::from_std(UnixListener::from(socket)).map_err(told)?;
+        let socket = Socket::new(Domain::UNIX, Type::STREAM, None).map_err(problem)?;
+        socket.bind(&SockAddr::unix(path).map_err(problem)?).map_err(problem)?;
+        // No client can connect before the socket listens.
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600)).map_err(problem)?;
+        let file = identity(path).ok_or("another process has removed the socket")?;
+        socket.listen(BACKLOG).map_err(problem)?;
+        socket.set_nonblocking(true).map_err(problem)?;
+        let listener = tokio::net::UnixListener::from_std(UnixListener::from(socket)).map_err(problem)?;
         Ok(Self { listener, path: path.to_owned(), file })
     }
 }
 
 impl Drop for SocketFile {
     fn drop(&mut self) {
-        // Another run may have put its own in the place.
+        // Another run may have replaced the file by its own.
         if identity(&self.path) == Some(self.file) {
             let _ = std::fs::remove_file(&self.path);
         }
@@ -58,9 +58,9 @@ fn remove_stale(path: &Path) -> Result<(), String> {
         return Ok(());
     }
     match UnixStream::connect(path) {
-        Ok(_) => Err("another run takes commands there; choose another name".to_owned()),
+        Ok(_) => Err("another run accepts commands there; choose another name".to_owned()),
         Err(error) if error.kind() == ErrorKind::ConnectionRefused => std::fs::remove_file(path)
-            .map_err(|error| format!("a socket of an earlier run is in the way: {error}")),
-        Err(error) => Err(format!("there is a socket already, and it cannot be reached: {error}")),
+            .map_err(|error| format!("the socket of an earlier run cannot be removed: {error}")),
+        Err(error) => Err(format!("a socket exists already, and it cannot be reached: {error}")),
     }
 }

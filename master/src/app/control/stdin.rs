@@ -3,18 +3,18 @@
 use std::io::{self, Read, Write};
 
 use super::console::{Console, Then};
-use super::lines::{Line, Lines};
+use super::lines::{Line, LineSplitter};
 use crate::app::error::CommandError;
 
-/// A thread of its own, that nobody waits for: reading standard input cannot be called off.
+/// Reads commands on a thread of its own. It is never joined, because reading standard input cannot be cancelled.
 pub(super) fn start(console: Console) -> Result<(), CommandError> {
     let thread = std::thread::Builder::new().name("control".to_owned());
     thread.spawn(move || listen(&console)).map(drop).map_err(CommandError::failed)
 }
 
-/// Until standard input ends: a run goes on without it.
+/// Answers commands until standard input ends; the run goes on after that.
 fn listen(console: &Console) {
-    let mut lines = Lines::default();
+    let mut lines = LineSplitter::default();
     let mut chunk = [0; 1024];
     loop {
         let count = match io::stdin().lock().read(&mut chunk) {
@@ -36,7 +36,7 @@ fn listen(console: &Console) {
     }
 }
 
-/// Whether to listen on: no other program speaks here, so a line that is no command ends nothing.
+/// Answers a line. Returns whether to go on; a wrong line is no reason to stop, because no other protocol arrives here.
 fn answered(console: &Console, line: &Line) -> bool {
     let answer = console.answer(line);
     let mut out = io::stdout().lock();

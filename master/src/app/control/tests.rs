@@ -7,9 +7,9 @@ use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 use tokio_util::sync::CancellationToken;
 
-use super::command::{Command, Whom};
+use super::command::{Command, WorkerSelector};
 use super::console::Then;
-use super::lines::{Line, Lines, MAX_LINE_BYTES};
+use super::lines::{Line, LineSplitter, MAX_LINE_BYTES};
 use super::*;
 use crate::fake_worker::{self, Script};
 use crate::farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
@@ -32,7 +32,7 @@ async fn until_workers(farm: &Farm, count: usize) {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     };
-    tokio::time::timeout(PATIENCE, wait).await.expect("they never come or go");
+    tokio::time::timeout(PATIENCE, wait).await.expect("the number of workers is never reached");
 }
 
 fn console(farm: &Farm) -> (Console, CancellationToken) {
@@ -47,14 +47,14 @@ fn ask(console: &Console, line: &str) -> Value {
 }
 
 #[test]
-fn lines_are_read_as_documented() {
-    let one = |name: &str| Whom::One(name.to_owned());
+fn lines_are_parsed_as_documented() {
+    let one = |name: &str| WorkerSelector::One(name.to_owned());
     for (line, command) in [
         ("workers", Command::Workers),
         ("  status \t", Command::Status),
         ("drain 3", Command::Drain(one("3"))),
         ("kick the old mill", Command::Kick(one("the old mill"))),
-        ("pause", Command::Pause(Whom::All)),
+        ("pause", Command::Pause(WorkerSelector::All)),
         ("resume\tmill", Command::Resume(one("mill"))),
         ("allow mill", Command::Allow("mill".to_owned())),
         ("help", Command::Help),
@@ -65,10 +65,10 @@ fn lines_are_read_as_documented() {
     for (line, words) in [
         ("", "help lists"),
         ("kik 3", "\"kik\""),
-        ("kick", "kick whom?"),
-        ("drain ", "drain whom?"),
-        ("allow", "expected a worker's number or name"),
-        ("quit now", "stands alone"),
+        ("kick", "kick needs an argument"),
+        ("drain ", "drain needs an argument"),
+        ("allow", "number or name of a worker"),
+        ("quit now", "takes no argument"),
     ] {
         let error = Command::parse(line).unwrap_err();
         assert!(error.contains(words), "{line}: {error}");
@@ -76,7 +76,7 @@ fn lines_are_read_as_documented() {
 }
 
 #[test]
-fn only_this_machine_may_give_commands() {
+fn only_loopback_addresses_accept_commands() {
     assert_eq!(Place::parse("-"), Ok(Place::StandardInput));
     assert_eq!(Place::parse("127.0.0.1:7118"), Ok(Place::Tcp(([127, 0, 0, 1], 7118).into())));
     assert!(matches!(Place::parse("[::1]:0"), Ok(Place::Tcp(_))));
@@ -92,19 +92,19 @@ proptest! {
     #[test]
     fn lines_do_not_depend_on_how_they_arrive(lines in prop::collection::vec("[^\\x00-\\x08\\x0a-\\x1f\\x7f]{0,40}", 0..10), open in "[a-z]{0,9}") {
         let text: String = lines.iter().map(|line| format!("{line}\r\n")).chain([open.clone()]).collect();
-        let mut cutter = Lines::default();
-        let mut said: Vec<Line> = text.bytes().filter_map(|byte| cutter.push(byte)).collect();
-        said.extend(cutter.end());
+        let mut splitter = LineSplitter::default();
+        let mut read: Vec<Line> = text.bytes().filter_map(|byte| splitter.push(byte)).collect();
+        read.extend(splitter.end());
         let expected = lines.into_iter().chain((!open.is_empty()).then_some(open));
-        prop_assert_eq!(said, expected.map(Line::Text).collect::<Vec<_>>());
+        prop_assert_eq!(read, expected.map(Line::Text).collect::<Vec<_>>());
     }
 
     #[test]
     fn no_bytes_make_a_line_longer_than_its_bound(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
-        let mut cutter = Lines::default();
+        let mut splitter = LineSplitter::default();
         for byte in bytes {
-            if let Some(Line::Text(text)) = cutter.push(byte) {
-                // A byte that is no text becomes a character of three bytes.
+            if let Some(Line::Text(text)) = splitter.push(byte) {
+                // A byte that is not UTF-8 becomes a character of three bytes.
                 prop_assert!(text.len() <= 3 * MAX_LINE_BYTES);
             }
         }
@@ -113,10 +113,10 @@ proptest! {
 
 #[test]
 fn an_endless_line_is_refused_and_the_next_one_is_not() {
-    let mut cutter = Lines::default();
+    let mut splitter = LineSplitter::default();
     let text = "x".repeat(MAX_LINE_BYTES + 1) + "\nhelp\n";
-    let said: Vec<Line> = text.bytes().filter_map(|byte| cutter.push(byte)).collect();
-    assert_eq!(said, [Line::TooLong, Line::Text("help".to_owned())]);
+    let read: Vec<Line> = text.bytes().filter_map(|byte| splitter.push(byte)).collect();
+    assert_eq!(read, [Line::TooLong, Line::Text("help".to_owned())]);
 }
 
 #[tokio::test]
@@ -144,12 +144,12 @@ async fn workers_are_listed_paused_resumed_kicked_and_allowed() {
     assert!(ask(&console, "kick fake")["error"].as_str().unwrap().contains("no worker \"fake\""));
     assert_eq!(ask(&console, "help")["ok"], true);
     assert_eq!(console.answer(&Line::Text("quit".to_owned())).then, Then::Quit);
-    assert!(!quit.is_cancelled(), "the answer goes first");
+    assert!(!quit.is_cancelled(), "the answer is written first");
     farm.shut_down().await;
 }
 
 #[tokio::test]
-async fn a_name_that_two_workers_have_is_not_guessed_at() {
+async fn a_name_of_two_workers_is_refused() {
     let farm = farm().await;
     let _workers = [
         fake_worker::start(farm.address(), Script::Honest).await,
@@ -164,7 +164,7 @@ async fn a_name_that_two_workers_have_is_not_guessed_at() {
     farm.shut_down().await;
 }
 
-/// A port for commands, and how it is opened.
+/// A port for commands, and its token.
 struct Port {
     address: SocketAddr,
     folder: tempfile::TempDir,
@@ -184,7 +184,7 @@ impl Port {
         self.folder.path().join(format!("rayfarm/control-127.0.0.1-{}", self.address.port()))
     }
 
-    /// A connection that may give commands.
+    /// A connection that has sent the token.
     async fn connect(&self) -> BufReader<TcpStream> {
         let mut stream = BufReader::new(TcpStream::connect(self.address).await.unwrap());
         stream.write_all(&std::fs::read(self.file()).unwrap()).await.unwrap();
@@ -192,13 +192,15 @@ impl Port {
         stream
     }
 
-    /// What is answered until the end, to something other than the token.
-    async fn heard_by(&self, says: &[u8]) -> String {
+    /// Answers, until the end of the connection, to something other than the token.
+    async fn answer_to(&self, says: &[u8]) -> String {
         let mut stream = TcpStream::connect(self.address).await.unwrap();
         // Closing over unread bytes may reset the connection.
         let _ = stream.write_all(says).await;
         let mut heard = Vec::new();
-        let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut heard)).await.expect("it stays open");
+        let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut heard))
+            .await
+            .expect("the connection stays open");
         String::from_utf8(heard).unwrap()
     }
 }
@@ -206,13 +208,13 @@ impl Port {
 async fn read_line(stream: &mut (impl tokio::io::AsyncBufRead + Unpin)) -> String {
     let mut line = String::new();
     let read = tokio::time::timeout(PATIENCE, stream.read_line(&mut line)).await;
-    // The other side may have closed over what it has not read.
-    let _ = read.expect("no answer comes");
+    // The server may have closed with unread bytes.
+    let _ = read.expect("no answer arrives");
     line
 }
 
 #[tokio::test]
-async fn a_port_is_opened_by_the_token_in_its_owners_file() {
+async fn a_port_requires_the_token_in_its_owners_file() {
     let farm = farm().await;
     let (console, quit) = console(&farm);
     let port = Port::open(console);
@@ -223,7 +225,7 @@ async fn a_port_is_opened_by_the_token_in_its_owners_file() {
         assert_eq!((mode(&port.file()), mode(port.file().parent().unwrap())), (0o600, 0o700));
     }
     for says in ["quit\n", "status\n", "token 00\nquit\n", "token\nquit\n", "\nquit\n"] {
-        let heard = port.heard_by(says.as_bytes()).await;
+        let heard = port.answer_to(says.as_bytes()).await;
         assert!(heard.matches('\n').count() <= 1 && !heard.contains("true"), "{says:?}: {heard}");
     }
     let mut stream = port.connect().await;
@@ -241,12 +243,12 @@ async fn a_port_is_opened_by_the_token_in_its_owners_file() {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     };
-    tokio::time::timeout(PATIENCE, gone).await.expect("the token outlives its run");
+    tokio::time::timeout(PATIENCE, gone).await.expect("the token remains after its run");
     farm.shut_down().await;
 }
 
-/// What browsers, and others that have come to the wrong port, say.
-fn strangers() -> Vec<Vec<u8>> {
+/// First bytes of browsers and other clients of the wrong protocol.
+fn foreign_requests() -> Vec<Vec<u8>> {
     let long = "x".repeat(3 * MAX_LINE_BYTES);
     let mut all: Vec<Vec<u8>> = [
         "POST / HTTP/1.1\r\nHost: 127.0.0.1:7118\r\n\r\nquit\r\n",
@@ -269,13 +271,13 @@ fn strangers() -> Vec<Vec<u8>> {
 }
 
 #[tokio::test]
-async fn a_web_page_ends_no_run() {
+async fn a_web_page_cannot_end_a_run() {
     let farm = farm().await;
     let (console, quit) = console(&farm);
     let port = Port::open(console.clone());
-    for says in strangers() {
-        port.heard_by(&says).await;
-        // The same behind a token: even then, nothing after it is a command.
+    for says in foreign_requests() {
+        port.answer_to(&says).await;
+        // The same after a token: even then, none of it is a command.
         let mut stream = port.connect().await;
         let _ = stream.write_all(&says).await;
         let refusal = read_line(&mut stream).await;
@@ -288,13 +290,13 @@ async fn a_web_page_ends_no_run() {
 
 #[cfg(unix)]
 #[tokio::test]
-async fn a_unix_socket_takes_no_http_either() {
+async fn a_unix_socket_refuses_http_too() {
     let farm = farm().await;
     let (console, quit) = console(&farm);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("control");
     start(&Place::Unix(path.clone()), console, CancellationToken::new()).unwrap();
-    for says in strangers() {
+    for says in foreign_requests() {
         let mut stream = BufReader::new(tokio::net::UnixStream::connect(&path).await.unwrap());
         let _ = stream.write_all(&says).await;
         let refusal = read_line(&mut stream).await;
@@ -306,21 +308,21 @@ async fn a_unix_socket_takes_no_http_either() {
 }
 
 #[tokio::test]
-async fn idle_connections_give_way_to_new_ones() {
+async fn new_connections_replace_idle_ones() {
     let farm = farm().await;
     let port = Port::open(console(&farm).0);
     let mut streams = Vec::new();
     for _ in 0..8 {
         streams.push(port.connect().await);
     }
-    // The first one is not the idlest any more.
+    // The first one is no longer idle for longest.
     streams[0].write_all(b"help\n").await.unwrap();
     assert!(read_line(&mut streams[0]).await.contains("true"));
     let mut ninth = port.connect().await;
-    let farewell = read_line(&mut streams[1]).await;
-    assert!(farewell.contains("8 connections"), "{farewell}");
+    let reason = read_line(&mut streams[1]).await;
+    assert!(reason.contains("8 connections"), "{reason}");
     assert_eq!(read_line(&mut streams[1]).await, "");
-    // Those without a token give way first, however many come.
+    // Connections without a token are replaced first, however many arrive.
     for _ in 0..20 {
         drop(TcpStream::connect(port.address).await.unwrap());
     }
@@ -330,18 +332,21 @@ async fn idle_connections_give_way_to_new_ones() {
     }
     for stream in [&mut streams[0], &mut ninth] {
         stream.write_all(b"help\n").await.unwrap();
-        assert!(read_line(stream).await.contains("true"), "a stranger took the place of an operator");
+        assert!(
+            read_line(stream).await.contains("true"),
+            "a connection without a token replaced one with a token"
+        );
     }
     farm.shut_down().await;
 }
 
 #[tokio::test]
-async fn a_connection_that_says_nothing_ends() {
+async fn a_silent_connection_ends() {
     let farm = farm().await;
     let port = Port::open(console(&farm).0);
     let mut trusted = port.connect().await;
     let mut silent = BufReader::new(TcpStream::connect(port.address).await.unwrap());
-    // A byte now and then is no command.
+    // Single bytes are no command.
     silent.write_all(b"t").await.unwrap();
     tokio::time::pause();
     assert!(read_line(&mut silent).await.contains("token"));
@@ -354,13 +359,13 @@ async fn a_connection_that_says_nothing_ends() {
 
 #[cfg(unix)]
 #[tokio::test]
-async fn a_unix_socket_is_the_owners_alone_and_gone_after_the_run() {
+async fn a_unix_socket_is_private_and_removed_after_the_run() {
     use std::os::unix::fs::PermissionsExt;
     let farm = farm().await;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("control");
     let place = Place::Unix(path.clone());
-    // One that a killed run has left behind does not stand in the way.
+    // The socket of a killed run is replaced.
     drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
     let stop = CancellationToken::new();
     start(&place, console(&farm).0, stop.clone()).unwrap();
@@ -380,7 +385,7 @@ async fn a_unix_socket_is_the_owners_alone_and_gone_after_the_run() {
     };
     tokio::time::timeout(PATIENCE, gone).await.unwrap();
     std::fs::write(&path, b"a file").unwrap();
-    assert!(start(&place, console(&farm).0, stop).is_err(), "a file of somebody else stays");
+    assert!(start(&place, console(&farm).0, stop).is_err(), "another file is not replaced");
     assert_eq!(std::fs::read(&path).unwrap(), b"a file");
     farm.shut_down().await;
 }

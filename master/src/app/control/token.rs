@@ -1,4 +1,4 @@
-//! What opens the port for commands: a word in a file that only its owner can read.
+//! The token for the command port: a word in a file that only its owner can read.
 
 use std::fs::{self, DirBuilder, OpenOptions};
 use std::io::Write;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use blake3::Hash;
 
-/// The token of one run, and its file, which goes with it.
+/// The token of one run. Its file is removed when it is dropped.
 #[derive(Debug)]
 pub(super) struct TokenFile {
     path: PathBuf,
@@ -15,10 +15,10 @@ pub(super) struct TokenFile {
 }
 
 impl TokenFile {
-    /// Makes up a token and writes it into the first of these folders that takes it, as the line that opens the port.
+    /// Draws a token and writes it, as the first line of a connection, to the first of these folders that is writable.
     ///
     /// # Errors
-    /// No random numbers, or no folder that takes it.
+    /// No random numbers, or no writable folder.
     pub(super) fn create(folders: &[PathBuf], address: SocketAddr) -> Result<Self, String> {
         let mut secret = [0; 32];
         getrandom::fill(&mut secret).map_err(|error| format!("no random numbers for its token: {error}"))?;
@@ -34,11 +34,12 @@ impl TokenFile {
         Err(problem)
     }
 
+    /// Path of the file.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether a line is the token's. Takes the same time for every wrong token of a length.
+    /// Whether a line has the token. Takes the same time for all wrong tokens of a length.
     pub(super) fn opens(&self, line: &str) -> bool {
         let token = line.trim().strip_prefix("token ").map(str::trim);
         token.is_some_and(|token| blake3::hash(token.as_bytes()) == self.hash)
@@ -47,17 +48,17 @@ impl TokenFile {
 
 impl Drop for TokenFile {
     fn drop(&mut self) {
-        // It may be gone already.
+        // The file may have been removed already.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// `control-127.0.0.1-7118`.
+/// Name of the file of an address: `control-127.0.0.1-7118`.
 fn file_name(address: SocketAddr) -> String {
     format!("control-{}-{}", address.ip().to_string().replace(':', "_"), address.port())
 }
 
-/// Writes a file anew: one that is there is a killed run's, because this run has the port.
+/// Creates the file. An existing one belongs to a killed run, because this run has the port, and is replaced.
 fn write(folder: &Path, path: &Path, text: &str) -> std::io::Result<()> {
     let (mut builder, mut options) = (DirBuilder::new(), OpenOptions::new());
     builder.recursive(true);
@@ -75,7 +76,7 @@ fn write(folder: &Path, path: &Path, text: &str) -> std::io::Result<()> {
     options.open(path)?.write_all(text.as_bytes())
 }
 
-/// Where tokens are kept: the user's folder for what lasts as long as a login, or else the one for state.
+/// Folders for tokens: the user's runtime folder, or else the state folder.
 pub(super) fn folders() -> Vec<PathBuf> {
     let named = |name| std::env::var_os(name).map(PathBuf::from).filter(|folder| folder.is_absolute());
     let state = named("XDG_STATE_HOME").or_else(|| Some(named("HOME")?.join(".local/state")));

@@ -1,52 +1,51 @@
-//! What a frame waits for: the render threads, or the wire that its pixels come over. Pure; fed with the accounts of frames.
+//! Bottleneck of frames: the render threads, or the wire that carries the pixels. Pure; reads the accounts of frames.
 //!
-//! The two work side by side, so a frame takes the longer of both. How much longer the wire takes than the threads is
-//! known only where threads wait for it: then their idle time is what the wire takes beyond their own. Where they do not,
-//! the wire takes no longer than they do, and nothing more is known.
+//! Threads and wire work in parallel, so a frame takes the longer of both times. The time of the wire is known only where
+//! threads wait for it: it is then their working time plus their waiting time. Where they do not wait, the wire takes at most
+//! the time of the threads.
 
 use crate::accounting::FrameAccount;
 
-/// What keeps frames from being faster.
+/// Bottleneck of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Limit {
     /// The render threads.
     Threads,
-    /// The way of the pixels to the master.
+    /// The connection that carries pixels to the master.
     Wire,
 }
 
-/// The wire counts as the limit where threads wait for it by this part of the time that they work: short waits are
-/// there with any wire.
+/// Waiting time, as a part of the working time, above which the wire counts as the limit: short waits occur with any wire.
 const WAITING: f64 = 0.25;
-/// What is believed of the wire before anything is known: it takes half as long as the threads.
+/// Ratio before the first frame: the wire takes half the time of the threads.
 const AT_FIRST: f64 = 0.5;
-/// How much of the logarithm the newest frame decides.
+/// Weight of the newest frame in the logarithm of the ratio.
 const GAIN: f64 = 0.25;
-/// Frames whose estimate changes by less than this factor make it settled.
+/// Factor of change per frame below which the estimate counts as settled.
 const SETTLED: f64 = 1.1;
-/// Another ladder is worth it when the estimate has moved away from the one in use by this factor.
+/// Factor between the estimate and the one in use from which the ladder is replaced.
 const NOTABLY: f64 = 1.3;
-/// No wire is taken to be slower than this.
-const MOST: f64 = 1e3;
+/// Largest ratio.
+const MAX_RATIO: f64 = 1e3;
 
-/// How long the wire takes for the full picture, as a part of what the threads take for it.
+/// Time of the wire for the full picture, as a part of the threads' time for it.
 #[derive(Clone, Debug)]
 pub(super) struct Balance {
     ratio: f64,
-    /// The estimate that the ladder was made for.
+    /// Estimate for which the ladder was made.
     used: f64,
     settled: bool,
-    /// How long threads have lately waited for the wire, as a part of the time that they worked.
+    /// Recent waiting time of threads for the wire, as a part of their working time.
     waiting: f64,
 }
 
 impl Balance {
-    /// Before the first frame.
+    /// The estimate before the first frame.
     pub(super) fn new() -> Self {
         Self { ratio: AT_FIRST, used: AT_FIRST, settled: true, waiting: 0.0 }
     }
 
-    /// A frame came whose work was `cost` of the full one's, and whose bytes `wire` of the full one's.
+    /// Adds a frame with `cost` times the work of the full picture, and `wire` times its bytes.
     pub(super) fn observe(&mut self, cost: f64, wire: f64, account: &FrameAccount) {
         let sum = |part: fn(&crate::accounting::Parts) -> u64| {
             account.workers.iter().map(|worker| part(&worker.parts) as f64).sum::<f64>()
@@ -56,21 +55,21 @@ impl Balance {
         if busy <= 0.0 || !here.is_finite() || here <= 0.0 {
             return;
         }
-        self.waiting += GAIN * ((waited / busy).min(MOST) - self.waiting);
+        self.waiting += GAIN * ((waited / busy).min(MAX_RATIO) - self.waiting);
         let seen = if waited > WAITING * busy {
             (1.0 + waited / busy) * here
         } else {
-            // It takes no longer than that; it may take any less.
+            // This is an upper bound of the ratio.
             self.ratio.min((1.0 + WAITING) * here)
         };
-        let step = GAIN * (seen.clamp(1.0 / MOST, MOST) / self.ratio).ln();
+        let step = GAIN * (seen.clamp(1.0 / MAX_RATIO, MAX_RATIO) / self.ratio).ln();
         self.ratio *= step.exp();
         self.settled = step.abs() < SETTLED.ln();
     }
 
-    /// The estimate, where it has become notably another than the one that was returned last.
-    pub(super) fn news(&mut self) -> Option<f64> {
-        // Below one the wire is no limit of any full picture: nothing changes before it comes near.
+    /// The estimate, if it differs notably from the last returned one.
+    pub(super) fn take_change(&mut self) -> Option<f64> {
+        // Below one the wire never limits the full picture: smaller ratios make no difference.
         let relevant = |ratio: f64| ratio.max(AT_FIRST);
         let apart = (relevant(self.ratio) / relevant(self.used)).ln().abs();
         (self.settled && apart > NOTABLY.ln()).then(|| {
@@ -79,14 +78,14 @@ impl Balance {
         })
     }
 
-    /// What limits the frames of late.
+    /// Bottleneck of the recent frames.
     pub(super) fn limit(&self) -> Limit {
         if self.waiting > WAITING { Limit::Wire } else { Limit::Threads }
     }
 }
 
 impl Limit {
-    /// What limits, in a few words.
+    /// Name of the bottleneck, for people.
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Threads => "render threads",
@@ -94,7 +93,7 @@ impl Limit {
         }
     }
 
-    /// What would help.
+    /// Advice on the bottleneck, for people.
     pub(super) fn remedy(self) -> &'static str {
         match self {
             Self::Threads => "more workers or a smaller window would help",
@@ -115,17 +114,17 @@ mod tests {
     }
 
     #[test]
-    fn threads_that_wait_for_the_wire_tell_how_slow_it_is() {
+    fn waiting_threads_measure_the_wire() {
         let mut balance = Balance::new();
         (0..20).for_each(|_| balance.observe(1.0, 1.0, &account(100, 300)));
-        let ratio = balance.news().unwrap();
+        let ratio = balance.take_change().unwrap();
         assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
         assert_eq!(balance.limit(), Limit::Wire);
-        assert_eq!(balance.news(), None, "it is no news twice");
+        assert_eq!(balance.take_change(), None, "each change is returned once");
     }
 
     #[test]
-    fn a_frame_with_fewer_bytes_tells_the_same_of_the_full_one() {
+    fn a_frame_with_fewer_bytes_gives_the_same_ratio_of_the_full_one() {
         let mut balance = Balance::new();
         // A fifth of the work, a quarter of the bytes, and still twice the time on the wire.
         (0..30).for_each(|_| balance.observe(0.2, 0.25, &account(100, 100)));
@@ -133,24 +132,24 @@ mod tests {
     }
 
     #[test]
-    fn busy_threads_say_only_that_the_wire_is_no_slower() {
+    fn busy_threads_bound_the_wire_from_above() {
         let mut balance = Balance::new();
         (0..30).for_each(|_| balance.observe(1.0, 1.0, &account(100, 300)));
         let known = balance.ratio;
-        // With a quarter of the bytes the threads are the limit, as was to be expected: the full picture's wire is as it was.
+        // With a quarter of the bytes the threads are the limit, as expected: the full picture's wire has not changed.
         (0..30).for_each(|_| balance.observe(1.0, 0.25, &account(100, 5)));
         assert!(balance.ratio > 0.95 * known, "{} for {known}", balance.ratio);
         assert_eq!(balance.limit(), Limit::Threads);
-        // With all bytes they would not be, if it were still so slow.
+        // With all bytes they would not be if the wire were still slow.
         (0..30).for_each(|_| balance.observe(1.0, 1.0, &account(100, 5)));
         assert!(balance.ratio < 1.3, "{}", balance.ratio);
     }
 
     #[test]
-    fn short_waits_and_empty_accounts_are_no_news() {
+    fn short_waits_and_empty_accounts_change_nothing() {
         let mut balance = Balance::new();
         balance.observe(1.0, 1.0, &FrameAccount::default());
         (0..50).for_each(|_| balance.observe(1.0, 1.0, &account(100, 15)));
-        assert_eq!((balance.news(), balance.limit()), (None, Limit::Threads));
+        assert_eq!((balance.take_change(), balance.limit()), (None, Limit::Threads));
     }
 }

@@ -1,35 +1,35 @@
-//! What frames cost: the load as it is now, and how much cheaper each rung of the ladder really is.
+//! Costs of frames: the current load, and the measured cost of each rung of the ladder.
 //!
-//! A frame at rung r takes `load * ratio(r)`, and noise. All three are kept as logarithms, so that factors are sums. What a
-//! frame took beyond what was expected is put down to load and ratio in proportion to how uncertain each is: a Kalman
-//! filter (1960) that neglects what the two have to do with each other. The load may jump: a cumulative sum of surprises
-//! (Page, "Continuous Inspection Schemes", 1954) tells that within a few frames, and is not misled by single slow ones.
+//! A frame at rung r takes `load * ratio(r)`, times noise. All three are kept as logarithms, so that factors are sums. The
+//! difference between measured and predicted time, the innovation, is attributed to load and ratio in proportion to their
+//! variances: a Kalman filter (1960) that neglects their covariance. The load may jump: a cumulative sum of innovations
+//! (Page, "Continuous Inspection Schemes", 1954) detects that within a few frames, and ignores single slow ones.
 
 use std::time::Duration;
 
-/// The variance of a ratio that only a table tells: a factor of 1.35 either way.
+/// Variance of a ratio from a table: a factor of 1.35 either way.
 const UNTRIED: f64 = 0.3 * 0.3;
-/// What coming back to a rung adds to it: the camera looks elsewhere since.
+/// Variance added on return to a rung: the view has changed since.
 const REVISITED: f64 = 0.1 * 0.1;
-/// The variance of the noise that is reckoned with at first, at least and at most.
+/// Variance of the noise: initial, smallest and largest.
 const FIRST_NOISE: f64 = 0.1 * 0.1;
 const LEAST_NOISE: f64 = 0.03 * 0.03;
 const MOST_NOISE: f64 = 0.4 * 0.4;
-/// How much of the noise's variance the newest frame decides.
+/// Weight of the newest frame in the variance of the noise.
 const NOISE_GAIN: f64 = 1.0 / 64.0;
-/// By how much of the noise's variance the load becomes uncertain from frame to frame: it follows the mean of about fifty.
+/// Variance that the load gains per frame, as a part of the noise's: the load follows the mean of about fifty frames.
 const LOAD_DRIFT: f64 = 1.0 / 2500.0;
-/// A surprise counts for so many standard deviations at most.
+/// Largest innovation, in standard deviations.
 const CLIP: f64 = 3.0;
-/// Of each surprise, what is no sign of a jump, and how much of the rest together is one: in standard deviations.
+/// Slack of the cumulative sum per frame, and its threshold for a jump, in standard deviations.
 const SLACK: f64 = 0.75;
 const ALARM: f64 = 5.0;
-/// No frame takes less, in seconds: a clock may not have moved.
+/// Shortest frame, in seconds: a clock may not have moved.
 const SHORTEST: f64 = 1e-6;
-/// No rung is taken to cost less or more than these parts of the full one.
+/// Smallest and largest cost of a rung, as parts of the full one's.
 const RATIOS: (f64, f64) = (1e-4, 1e2);
 
-/// A value that is not known exactly.
+/// A normally distributed value.
 #[derive(Clone, Copy, Debug)]
 struct Estimate {
     mean: f64,
@@ -37,32 +37,32 @@ struct Estimate {
 }
 
 impl Estimate {
-    /// Takes its part of a surprise whose variance is `spread`.
-    fn learn(&mut self, surprise: f64, spread: f64) {
+    /// Takes its part of an innovation whose variance is `spread`.
+    fn update(&mut self, innovation: f64, spread: f64) {
         let gain = self.variance / spread;
-        self.mean += gain * surprise;
+        self.mean += gain * innovation;
         self.variance *= 1.0 - gain;
     }
 }
 
-/// What is known of the costs of frames.
+/// Estimates of the costs of frames.
 #[derive(Clone, Debug)]
 pub(super) struct Costs {
-    /// Of the logarithm of the full frame's seconds; `None` before the first frame.
+    /// Logarithm of the full frame's seconds; `None` before the first frame.
     load: Option<Estimate>,
-    /// Of the logarithm of a rung's cost as a part of the full one's. The first rung is the full one.
+    /// Logarithm of each rung's cost as a part of the full one's. The first rung is the full one.
     ratios: Vec<Estimate>,
     noise: f64,
-    /// Surprises either way, added up, in standard deviations.
+    /// Cumulative sums of innovations in either direction, in standard deviations.
     slower: f64,
-    quicker: f64,
-    /// What the load would be by each of the last frames alone.
+    faster: f64,
+    /// Load according to each of the last frames alone.
     last_loads: [f64; 3],
     last_rung: usize,
 }
 
 impl Costs {
-    /// `ratios`: what a table says of each rung, the first being 1.
+    /// Costs before the first frame. `ratios`: costs of the rungs by a table, the first being 1.
     pub(super) fn new(ratios: impl IntoIterator<Item = f64>) -> Self {
         let untried = |(rung, ratio): (usize, f64)| Estimate {
             mean: ratio.max(RATIOS.0).min(RATIOS.1).ln(),
@@ -73,29 +73,29 @@ impl Costs {
             ratios: ratios.into_iter().enumerate().map(untried).collect(),
             noise: FIRST_NOISE,
             slower: 0.0,
-            quicker: 0.0,
+            faster: 0.0,
             last_loads: [0.0; 3],
             last_rung: 0,
         }
     }
 
-    /// The full frame takes about so long, as frames of another ladder tell.
+    /// Sets the expected time of the full frame, known from frames of another ladder.
     pub(super) fn expect(&mut self, full: Duration) {
         let mean = full.as_secs_f64().max(SHORTEST).ln();
         self.load = Some(Estimate { mean, variance: self.noise + UNTRIED });
     }
 
-    /// Rungs of the ladder.
+    /// Number of rungs.
     pub(super) fn len(&self) -> usize {
         self.ratios.len()
     }
 
-    /// What a frame at a rung takes, in seconds; `None` before the first frame.
+    /// Predicted time of a frame at a rung, in seconds; `None` before the first frame.
     pub(super) fn predicted(&self, rung: usize) -> Option<f64> {
         Some((self.load?.mean + self.ratios.get(rung)?.mean).exp())
     }
 
-    /// A frame at a rung took so long. Returns whether the load has jumped.
+    /// Adds the time of a frame at a rung. Returns whether the load has jumped.
     pub(super) fn observe(&mut self, rung: usize, took: Duration) -> bool {
         let Some(ratio) = self.ratios.get_mut(rung) else { return false };
         let seen = took.as_secs_f64().max(SHORTEST).ln();
@@ -110,19 +110,19 @@ impl Costs {
         let known = load.variance + ratio.variance;
         let spread = known + self.noise;
         let deviation = spread.sqrt();
-        let surprise = (seen - load.mean - ratio.mean).clamp(-CLIP * deviation, CLIP * deviation);
+        let innovation = (seen - load.mean - ratio.mean).clamp(-CLIP * deviation, CLIP * deviation);
         self.last_loads = [self.last_loads[1], self.last_loads[2], seen - ratio.mean];
-        self.slower = (self.slower + surprise / deviation - SLACK).max(0.0);
-        self.quicker = (self.quicker - surprise / deviation - SLACK).max(0.0);
-        if self.slower > ALARM || self.quicker > ALARM {
-            (self.slower, self.quicker) = (0.0, 0.0);
-            // Two of three frames at least are of the new load.
+        self.slower = (self.slower + innovation / deviation - SLACK).max(0.0);
+        self.faster = (self.faster - innovation / deviation - SLACK).max(0.0);
+        if self.slower > ALARM || self.faster > ALARM {
+            (self.slower, self.faster) = (0.0, 0.0);
+            // At least two of the three frames are of the new load.
             *load = Estimate { mean: median(self.last_loads), variance: self.noise };
             return true;
         }
-        load.learn(surprise, spread);
-        ratio.learn(surprise, spread);
-        let noise = self.noise + NOISE_GAIN * (surprise * surprise - known - self.noise);
+        load.update(innovation, spread);
+        ratio.update(innovation, spread);
+        let noise = self.noise + NOISE_GAIN * (innovation * innovation - known - self.noise);
         self.noise = noise.clamp(LEAST_NOISE, MOST_NOISE);
         false
     }
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_tells_what_all_rungs_take() {
+    fn one_frame_predicts_all_rungs() {
         let mut costs = Costs::new([1.0, 0.5, 0.25]);
         assert_eq!(costs.predicted(0), None);
         see(&mut costs, 1, 0.1, 1);
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_new_rung_takes_is_put_down_to_the_rung() {
+    fn a_new_rung_changes_the_estimate_of_that_rung() {
         let mut costs = Costs::new([1.0, 0.5, 0.25]);
         see(&mut costs, 0, 0.1, 50);
         see(&mut costs, 1, 0.09, 10);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_becomes_of_the_load_is_not_put_down_to_a_rung_that_is_known() {
+    fn a_change_of_the_load_does_not_change_a_known_rung() {
         let mut costs = Costs::new([1.0, 0.5, 0.25]);
         see(&mut costs, 0, 0.1, 50);
         see(&mut costs, 1, 0.05, 50);

@@ -1,4 +1,4 @@
-//! The quality controller over a simulated farm, whose frames wait for render threads or for the wire, whichever takes longer.
+//! The quality controller over a simulated farm, whose frames take the longer of render threads and wire.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -16,10 +16,10 @@ use crate::tradeoff::table::Table;
 const ROOM: &[u8] = include_bytes!("../../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;
 
-/// A farm that renders what a quality controller asks for, in an animation.
+/// A farm that renders the requests of a quality controller, in an animation.
 struct Simulation {
     controller: QualityController,
-    /// Seconds of the full picture: of the threads, and on the wire.
+    /// Seconds of the full picture: of the threads and of the wire.
     threads: f64,
     wire: f64,
     noise: f64,
@@ -40,17 +40,17 @@ impl Simulation {
             now: Duration::ZERO,
             in_flight: VecDeque::new(),
         };
-        (0..2).for_each(|_| simulation.ask());
+        (0..2).for_each(|_| simulation.request());
         simulation
     }
 
-    fn ask(&mut self) {
+    fn request(&mut self) {
         let mode = self.controller.next(self.now);
         let rung = *self.controller.rung(mode).unwrap();
         self.in_flight.push_back((mode, rung));
     }
 
-    /// The setting of a frame, and what it took.
+    /// Renders a frame. Returns its setting and its time in seconds.
     fn frame(&mut self) -> (Rung, f64) {
         let (mode, rung) = self.in_flight.pop_front().unwrap();
         let noise = 1.0 + self.noise * (2.0 * self.dice.fraction() - 1.0);
@@ -60,10 +60,10 @@ impl Simulation {
         let parts = Parts { trace: nanos(busy), send: nanos(took - busy), ..Parts::default() };
         let worker = WorkerAccount { parts, ..WorkerAccount::default() };
         let account = FrameAccount { workers: vec![worker], segments: Vec::new() };
-        let asked_at = self.now;
+        let requested_at = self.now;
         self.now += Duration::from_secs_f64(took);
-        self.controller.finished(self.now, Duration::from_secs_f64(took), mode, asked_at, &account);
-        self.ask();
+        self.controller.finished(self.now, Duration::from_secs_f64(took), mode, requested_at, &account);
+        self.request();
         (rung, took)
     }
 
@@ -98,7 +98,7 @@ fn changes(frames: &[(Rung, f64)]) -> usize {
 }
 
 #[test]
-fn a_slow_wire_turns_knobs_that_make_fewer_bytes_and_no_others() {
+fn a_slow_wire_reduces_only_knobs_that_save_bytes() {
     for (wire, seed) in
         [0.06, 0.1, 0.2, 0.4].into_iter().flat_map(|wire| (0..5).map(move |seed| (wire, seed)))
     {
@@ -123,24 +123,24 @@ fn where_the_smallest_scale_is_not_enough_colours_are_reduced_before_shadows_are
 }
 
 #[test]
-fn the_limit_is_named_and_told_with_what_is_lost() {
+fn the_bottleneck_is_named_with_the_loss() {
     let mut slow_wire = Simulation::new(general(1), 30.0, 0.01, 0.2);
     slow_wire.frames(SETTLING);
-    // Below the target the picture waits for the wire no longer than it may; out of reach, it does.
+    // Within the target the wait for the wire is within the budget; out of reach, it is not.
     slow_wire.wire = 5.0;
     slow_wire.frames(SETTLING);
-    let told = slow_wire.lines();
-    assert!(told[0].starts_with("moving: loses about FLIP 0."), "{told:?}");
-    assert_eq!(told[1..], ["by the general table", "30 FPS: out of reach", "waits for the wire"]);
+    let lines = slow_wire.lines();
+    assert!(lines[0].starts_with("moving: loses about FLIP 0."), "{lines:?}");
+    assert_eq!(lines[1..], ["by the general table", "30 FPS: out of reach", "waits for the wire"]);
 
     let mut slow_threads = Simulation::new(room(16), 30.0, 20.0, 0.01);
     slow_threads.frames(SETTLING);
-    let told = slow_threads.lines();
-    assert_eq!(told[1..], ["by the scene's table", "30 FPS: out of reach", "waits for render threads"]);
+    let lines = slow_threads.lines();
+    assert_eq!(lines[1..], ["by the scene's table", "30 FPS: out of reach", "waits for render threads"]);
 }
 
 #[test]
-fn a_wire_that_becomes_slow_and_quick_again_is_followed() {
+fn the_controller_follows_a_wire_that_becomes_slow_and_fast_again() {
     let mut simulation = Simulation::new(general(1), 30.0, 0.04, 0.005);
     simulation.frames(SETTLING);
     let before = simulation.frame().0;
@@ -154,8 +154,8 @@ fn a_wire_that_becomes_slow_and_quick_again_is_followed() {
     assert!(last.1 < 1.05 / 30.0, "{last:?}");
 }
 
-/// Without shadows the room is another room. At 60 frames a second its walls keep their colours as long as any setting
-/// with shadows holds.
+/// Without shadows the room looks very different, so at 60 frames a second they stay as long as any setting with shadows
+/// holds.
 #[test]
 fn the_room_keeps_its_shadows_while_a_setting_with_shadows_holds_the_rate() {
     let target = 1.0 / 60.0;

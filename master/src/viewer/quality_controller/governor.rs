@@ -1,62 +1,62 @@
-//! Which rung of the ladder a moving picture is rendered at. Pure: no clock, no picture; it is told what frames took.
+//! Choice of the rung at which a moving picture is rendered. Pure: no clock, no picture; its input is the time of frames.
 
 use std::time::Duration;
 
 use super::costs::Costs;
 
-/// A rung is gone to when it is predicted to take at most this part of the time that a frame has, and left when it is
-/// predicted to take more than that part: what lies between keeps a steady load from swinging to and fro.
+/// Hysteresis: a rung is entered when its predicted time is at most one part of a frame's budget, and left when it is more
+/// than another part, so that a steady load does not oscillate.
 const FRESH: Band = Band { enter: 0.87, leave: 1.0 };
-/// The same once a rung has stood for [`SETTLE`] frames: what is predicted wavers a little for as long as it stands.
+/// Hysteresis after [`SETTLE`] frames at a rung: predictions vary a little from frame to frame.
 const SETTLED: Band = Band { enter: 0.83, leave: 1.03 };
 const SETTLE: u32 = 60;
-/// A better rung must be predicted to hold in so many frames in a row, and so many after the last change.
+/// Consecutive frames in which a better rung must be predicted to hold, and frames since the last change, before a climb.
 const PATIENCE: u32 = 3;
 const DWELL: u32 = 8;
-/// Where no rung holds, another is worth a change when it is quicker by this factor.
+/// Where no rung holds, factor of time below which another rung is worth a change.
 const NOTABLY: f64 = 0.95;
-/// So many frames in a row in which no rung is predicted to hold: then that is told.
+/// Consecutive frames in which no rung is predicted to hold before that is reported.
 const BEATEN_FOR: u32 = 10;
 
-/// The load has jumped up by this factor, and since then a rung that takes no more than this part of the time has stood for so
-/// many frames: then the next better one is tried, whatever is predicted of it. What jumped may have been the cost of the rung
-/// before alone, and nothing else would tell.
+/// Trial of a better rung whatever its prediction, after the load has jumped up by the factor `JUMP` and a rung that takes at
+/// most `ROOM` of the budget has been in use for `TRY_AFTER` frames. The jump may have been of the former rung's cost alone,
+/// which only a trial can show.
 const JUMP: f64 = 1.2;
 const ROOM: f64 = 0.6;
 const TRY_AFTER: u32 = 40;
-/// So many frames are given to it, the first of which are still those of the rung before.
+/// Frames of a trial, the first of which are still of the previous rung.
 const TRIAL: u32 = 8;
 
-/// Parts of the time that a frame has.
+/// Parts of a frame's budget.
 #[derive(Clone, Copy, Debug)]
 struct Band {
     enter: f64,
     leave: f64,
 }
 
-/// Picks the rung of least loss that is predicted to hold the target.
+/// Governor: picks the rung of least loss that is predicted to hold the target rate.
 #[derive(Clone, Debug)]
 pub(crate) struct Governor {
     costs: Costs,
-    /// The time that a frame has, in seconds.
+    /// Time budget of a frame, in seconds.
     budget: f64,
     rung: usize,
-    /// Of the frame before.
+    /// Rung of the previous frame.
     last_seen: usize,
     since_change: u32,
     better_for: u32,
     beaten_for: u32,
-    /// Rungs that no frame has had since the load jumped.
+    /// Rungs without a frame since the load jumped.
     doubtful: Vec<bool>,
-    /// The load before it did, in seconds of a full frame.
+    /// Load before it jumped, in seconds of a full frame.
     calm: f64,
-    /// Frames that a doubtful rung is still given.
+    /// Remaining frames of the trial of a doubtful rung.
     trial: u32,
 }
 
 impl Governor {
-    /// For rungs in the order of their loss, the first being full quality. `ratios`: what a table says of their cost, as
-    /// a part of the first one's. `budget`: the time that a frame has.
+    /// A governor of rungs in the order of their loss, the first being full quality. `ratios`: their costs by a table, as parts
+    /// of the first one's. `budget`: time of a frame at the target rate.
     pub(crate) fn new(ratios: impl IntoIterator<Item = f64>, budget: Duration) -> Self {
         let budget = budget.as_secs_f64();
         let costs = Costs::new(ratios);
@@ -75,7 +75,7 @@ impl Governor {
         }
     }
 
-    /// Likewise, where the full frame is known to take `full`.
+    /// As [`Governor::new`], with the time of the full frame known to be `full`.
     pub(crate) fn starting(ratios: impl IntoIterator<Item = f64>, budget: Duration, full: Duration) -> Self {
         let mut governor = Self::new(ratios, budget);
         governor.costs.expect(full);
@@ -83,7 +83,7 @@ impl Governor {
         governor
     }
 
-    /// The rung for the next frame.
+    /// Rung of the next frame.
     pub(crate) fn rung(&self) -> usize {
         self.rung
     }
@@ -93,16 +93,16 @@ impl Governor {
         self.beaten_for >= BEATEN_FOR
     }
 
-    /// What a frame at a rung is expected to take; `None` before the first frame.
+    /// Predicted time of a frame at a rung; `None` before the first frame.
     pub(crate) fn predicted(&self, rung: usize) -> Option<Duration> {
         Duration::try_from_secs_f64(self.costs.predicted(rung)?).ok()
     }
 
-    /// A frame at a rung took so long. Frames need not have the rung that is wanted now: those in flight have an earlier
-    /// one, and those of a picture at rest the first.
+    /// Adds the time of a frame at a rung. It need not be the current rung: frames in flight have an earlier one, and those of a
+    /// picture at rest the first.
     pub(crate) fn observe(&mut self, rung: usize, took: Duration) {
         let is_first = self.costs.predicted(0).is_none();
-        // Workers began it while they were busy with one of another rung: what it took says little of either.
+        // Workers began it while they were busy with a frame of another rung: its time measures neither.
         let is_mixed = std::mem::replace(&mut self.last_seen, rung) != rung && !is_first;
         let before = self.costs.predicted(0);
         if !is_mixed && self.costs.observe(rung, took) {
@@ -126,7 +126,7 @@ impl Governor {
         self.beaten_for = if holds { 0 } else { self.beaten_for.saturating_add(1) };
     }
 
-    /// A better rung holds, if it goes on like this.
+    /// Climbs to a better rung if it has been predicted to hold for long enough.
     fn climb(&mut self, best: usize) {
         self.better_for += 1;
         if self.better_for >= PATIENCE && self.since_change >= DWELL {
@@ -134,7 +134,7 @@ impl Governor {
         }
     }
 
-    /// The rung holds, and is predicted to be the best that does. If that is doubtful, it is put to the test.
+    /// Keeps the rung, which is predicted to be the best that holds, or starts a trial of a doubtful better one.
     fn stay(&mut self) {
         self.better_for = 0;
         let Some(better) = self.rung.checked_sub(1) else { return };
@@ -147,15 +147,15 @@ impl Governor {
         }
     }
 
-    /// The rung does not hold: on to the next one that does, or else to the one that is the quickest.
+    /// Leaves a rung that does not hold for the best one that does, or else for the fastest.
     fn descend(&mut self, best: Option<usize>) {
         self.better_for = 0;
-        let quickest = || {
+        let fastest = || {
             let seconds = |rung: &usize| self.costs.predicted(*rung).unwrap_or(f64::MAX);
-            let quickest = (0..self.costs.len()).min_by(|a, b| seconds(a).total_cmp(&seconds(b)))?;
-            (seconds(&quickest) < NOTABLY * seconds(&self.rung)).then_some(quickest)
+            let fastest = (0..self.costs.len()).min_by(|a, b| seconds(a).total_cmp(&seconds(b)))?;
+            (seconds(&fastest) < NOTABLY * seconds(&self.rung)).then_some(fastest)
         };
-        if let Some(rung) = best.or_else(quickest).filter(|&rung| rung != self.rung) {
+        if let Some(rung) = best.or_else(fastest).filter(|&rung| rung != self.rung) {
             self.change(rung);
         }
     }
@@ -165,7 +165,7 @@ impl Governor {
         (self.since_change, self.better_for) = (0, 0);
     }
 
-    /// Whether a rung is predicted to take at most this part of the time that there is.
+    /// Whether a rung is predicted to take at most this part of the budget.
     fn fits(&self, rung: usize, part: f64) -> bool {
         self.costs.predicted(rung).is_none_or(|seconds| seconds <= self.budget * part)
     }

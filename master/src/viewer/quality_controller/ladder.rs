@@ -1,59 +1,58 @@
-//! The ladder: settings in the order of what they lose, each cheaper than all before it.
+//! The ladder: settings in the order of their loss, each cheaper than all earlier ones.
 
 use std::fmt;
 
 use super::setting::Setting;
 
-/// A setting with what is known of it.
+/// A setting with its cost and its loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rung {
-    /// What it does to a picture.
+    /// Effect on the request.
     pub(crate) setting: Setting,
-    /// The work of a frame, as a part of the full one's.
+    /// Work of a frame, as a part of the full one's.
     pub(crate) cost: f64,
-    /// The bytes of its pixels, as a part of the full one's.
+    /// Bytes of its pixels, as a part of the full one's.
     pub(crate) wire: f64,
-    /// The mean FLIP error, 0..=1.
+    /// Mean FLIP error, 0..=1.
     pub(crate) loss: f64,
 }
 
 impl Rung {
     const FULL: Self = Self { setting: Setting::FULL, cost: 1.0, wire: 1.0, loss: 0.0 };
 
-    /// The time of a frame as a part of the full one's, where the wire takes `balance` of the time of the threads for
-    /// the full one: the longer of both.
+    /// Time of a frame as a part of the full one's: the longer of threads and wire, where the wire takes `balance` times the
+    /// time of the threads for the full frame.
     pub(crate) fn time(&self, balance: f64) -> f64 {
         self.cost.max(balance * self.wire) / balance.max(1.0)
     }
 }
 
-/// Where costs and losses are from.
+/// Source of costs and losses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Origin {
-    /// A table of the scene.
+    /// A table measured on the scene.
     Measured,
-    /// What other scenes had in common.
+    /// Medians over other scenes.
     General,
 }
 
-/// Rungs that are nearer to each other in time than this factor are one: a step that changes the rate by less than its
-/// noise is no use.
+/// Largest factor of time between neighbouring rungs: a step that changes the rate by less than its noise is useless.
 const LEAST_STEP: f64 = 0.93;
-/// Rungs at most: so many steps go down to a ten-thousandth of the time.
+/// Largest number of rungs: as many steps lead to a ten-thousandth of the time.
 const MAX_RUNGS: usize = 128;
 
-/// The Pareto front of settings, the full one first.
+/// Pareto front of settings, the full one first.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Ladder {
-    /// All that is known, in the order of their losses.
+    /// All known rungs, in the order of their losses.
     known: Vec<Rung>,
     rungs: Vec<Rung>,
     origin: Origin,
 }
 
 impl Ladder {
-    /// The front of what is measured, where threads are the limit. What is not finite, or cheaper than nothing, was not
-    /// measured.
+    /// Front of measured rungs, where threads are the limit. Rungs with figures that are not finite, or not positive costs, are
+    /// left out.
     pub(crate) fn of(measured: impl IntoIterator<Item = Rung>, origin: Origin) -> Self {
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
         let is_sound =
@@ -64,13 +63,13 @@ impl Ladder {
         Self { known, rungs, origin }
     }
 
-    /// The front where the wire takes `balance` of the time of the threads for the full picture: knobs that make
-    /// nothing shorter of what a frame waits for are not on it.
+    /// Front where the wire takes `balance` times the time of the threads for the full picture. Knobs that do not relieve the
+    /// bottleneck are not on it.
     pub(crate) fn balanced(&self, balance: f64) -> Self {
         Self { rungs: front(&self.known, balance), ..self.clone() }
     }
 
-    /// Without the rungs that lose more than `most`.
+    /// The ladder without the rungs that lose more than `most`.
     #[must_use]
     pub(crate) fn up_to(mut self, most: f64) -> Self {
         for rungs in [&mut self.known, &mut self.rungs] {
@@ -79,23 +78,23 @@ impl Ladder {
         self
     }
 
-    /// All rungs; the first is the full one.
+    /// All rungs; the first one has full quality.
     pub(crate) fn rungs(&self) -> &[Rung] {
         &self.rungs
     }
 
-    /// Where its figures are from.
+    /// Source of the figures.
     pub(crate) fn origin(&self) -> Origin {
         self.origin
     }
 
-    /// The fastest one.
+    /// The fastest setting.
     pub(crate) fn cheapest(&self) -> Setting {
         self.rungs.last().map_or(Setting::FULL, |rung| rung.setting)
     }
 }
 
-/// Of rungs in the order of their losses, the full one and those that are notably faster than all before them.
+/// The full rung, and those rungs, in the order of their losses, that are notably faster than all earlier ones.
 fn front(known: &[Rung], balance: f64) -> Vec<Rung> {
     let mut front = vec![Rung::FULL];
     let mut fastest = 1.0;
@@ -109,7 +108,7 @@ fn front(known: &[Rung], balance: f64) -> Vec<Rung> {
     front
 }
 
-/// How a loss is told: it is an estimate.
+/// Text of a loss, which is an estimate.
 pub(crate) struct Loss(pub(crate) f64);
 
 impl fmt::Display for Loss {
@@ -137,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_another_beats_in_both_is_left_out() {
+    fn dominated_rungs_are_left_out() {
         let ladder = of([rung(0.3, 0.1), rung(0.5, 0.02), rung(0.6, 0.05), rung(0.2, 0.1)]);
         assert_eq!(figures(&ladder), [(1.0, 0.0), (0.5, 0.02), (0.2, 0.1)]);
         assert_eq!(figures(&ladder.clone().up_to(0.05)), [(1.0, 0.0), (0.5, 0.02)]);
@@ -145,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn without_any_measurement_there_is_the_full_one() {
+    fn without_any_measurement_the_ladder_has_the_full_rung() {
         let ladder = of([rung(f64::NAN, 0.1), rung(0.5, f64::INFINITY), rung(0.0, 0.1), rung(-1.0, 0.1)]);
         assert_eq!(figures(&ladder), [(1.0, 0.0)]);
         assert_eq!(ladder.cheapest(), Setting::FULL);
     }
 
     #[test]
-    fn where_the_wire_is_the_limit_only_what_makes_fewer_bytes_is_a_rung() {
+    fn where_the_wire_is_the_limit_only_settings_with_fewer_bytes_are_rungs() {
         let dark = Rung { wire: 1.0, ..rung(0.5, 0.01) };
         let coarse = Rung { wire: 0.25, ..rung(0.4, 0.02) };
         let pale = Rung { wire: 0.6, ..rung(1.0, 0.015) };

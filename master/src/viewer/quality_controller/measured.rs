@@ -1,4 +1,4 @@
-//! The ladder of a scene that was measured: a table of `tradeoff`.
+//! The ladder of a measured scene: from a table of `tradeoff`.
 
 use rayfarm_tracer::scene::RenderScale;
 
@@ -9,23 +9,24 @@ use crate::tradeoff::setting::Setting as Measured;
 use crate::tradeoff::table::{Row, Table};
 use crate::viewer::view_request::ViewRequest;
 
-/// The front of a table, for pictures that rest as `wanted`. Costs are parts of that row's time, losses what the mean FLIP
-/// error is more than there.
+/// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
+/// losses are differences to its mean FLIP error.
 ///
 /// # Errors
-/// A table without a row for the picture at rest, or a picture at rest with a knob turned down: the table's errors are those
-/// beside all that a scene can ask for, and say nothing of what is lost beside less. In words.
+/// In words: a table without a row for the picture at rest, or a picture at rest with a reduced knob. The table's errors are
+/// differences to the picture with every knob at full quality, not to a reduced one.
 pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, String> {
     let turned = wanted.reductions();
     if !turned.is_empty() {
         return Err(format!(
-            "was measured beside pictures with every knob at full quality, and this one rests with {}: leave that out, or the table",
+            "was measured against pictures with every knob at full quality, and this one is at rest with {}: leave that out, or \
+             the table",
             turned.join(", ")
         ));
     }
     let known = |name: &str| Measured::named(name).map(|setting| setting.applied_to(&wanted.view));
-    let rests = |picture: &ViewRequest| picture == wanted;
-    let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(rests));
+    let is_at_rest = |request: &ViewRequest| request == wanted;
+    let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(is_at_rest));
     let Some(full) = full else {
         let names: Vec<&str> = table.rows.iter().map(|row| row.setting.as_str()).collect();
         return Err(format!(
@@ -36,15 +37,15 @@ pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, Stri
     };
     let small = small_rows(table);
     let rungs = table.rows.iter().chain(&small).filter_map(|row| {
-        let picture = known(&row.setting).filter(|picture| is_below(picture, wanted))?;
+        let request = known(&row.setting).filter(|request| is_below(request, wanted))?;
         let cost = row.median_ms / full.median_ms;
-        let (setting, wire) = (Setting::of(&picture), bytes(&picture) / bytes(wanted));
+        let (setting, wire) = (Setting::of(&request), bytes(&request) / bytes(wanted));
         Some(Rung { setting, cost, wire, loss: (row.flip - full.flip).max(0.0) })
     });
     Ok(Ladder::of(rungs, Origin::Measured))
 }
 
-/// What a table that was written before there were scales of a third and a quarter would say of them.
+/// Rows for the scales of a third and a quarter, for a table that has none: versions before these scales wrote such tables.
 fn small_rows(table: &Table) -> Vec<Row> {
     let row = |name: &str| table.rows.iter().find(|row| row.setting == name);
     let larger = ["samples-1", "scale-3-4", "scale-1-2"].map(row);
@@ -60,9 +61,9 @@ fn small_rows(table: &Table) -> Vec<Row> {
         .collect()
 }
 
-/// Whether a picture asks for nothing that the other one does not.
-fn is_below(picture: &ViewRequest, wanted: &ViewRequest) -> bool {
-    Setting::of(picture).applied(wanted) == *picture && picture != wanted
+/// Whether a request is the other one with some knobs reduced and none raised.
+fn is_below(request: &ViewRequest, wanted: &ViewRequest) -> bool {
+    Setting::of(request).applied(wanted) == *request && request != wanted
 }
 
 #[cfg(test)]
@@ -95,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn the_front_of_a_table_leads_down_from_the_picture_at_rest() {
+    fn the_front_of_a_table_starts_at_the_picture_at_rest() {
         let wanted = resting(4);
         let ladder = ladder(&table(), &wanted).unwrap();
         let figures: Vec<(f64, f64)> = ladder.rungs().iter().map(|rung| (rung.cost, rung.loss)).collect();
@@ -121,7 +122,7 @@ mod tests {
         let (scale, cost) = smallest(&table);
         assert!(scale == RenderScale::Quarter && (cost - 0.09).abs() < 1e-9, "{scale:?} {cost}");
         table.rows.push(row("scale-1-4", 1.0, 0.2));
-        assert_eq!(smallest(&table), (RenderScale::Quarter, 0.05), "what was measured wins");
+        assert_eq!(smallest(&table), (RenderScale::Quarter, 0.05), "a measured row has priority");
     }
 
     #[test]
@@ -131,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_rests_with_a_knob_turned_down_has_no_ladder() {
+    fn a_picture_at_rest_with_a_reduced_knob_has_no_ladder() {
         let mut wanted = resting(4);
         wanted.view.quality.shadows = false;
         let message = ladder(&table(), &wanted).unwrap_err();

@@ -1,11 +1,11 @@
-//! The quality controller: quality for speed while the picture moves, and full quality when it rests.
+//! The quality controller: trades quality for speed while the picture moves, and restores full quality at rest.
 //!
-//! The [`governor`] decides on numbers only: it is told what frames took, and answers with a rung of the [`ladder`] of
-//! settings. Which settings are on the ladder depends on what frames wait for, threads or wire: [`balance`] estimates it
-//! from their accounts. [`stillness`] tells whether the picture moves. None of them knows a clock or a picture; times are since any
+//! The [`governor`] decides on numbers only: it receives the times of frames and chooses a rung of the [`ladder`] of
+//! settings. The ladder depends on the bottleneck of frames, threads or wire, which [`balance`] estimates from their
+//! accounts. [`stillness`] detects whether the picture moves. None of them knows a clock or a picture; times are since any
 //! fixed moment, and grow.
 //!
-//! A picture at rest is asked for exactly as it would be without a quality controller, so it is the same, bit for bit.
+//! The request for a picture at rest is the same as without a quality controller, so its pixels are the same, bit for bit.
 
 mod balance;
 mod costs;
@@ -37,26 +37,26 @@ use stillness::{Motion, Stillness};
 use crate::accounting::FrameAccount;
 use crate::viewer::view_request::ViewRequest;
 
-/// How a frame was asked for.
+/// Quality at which a frame is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum QualityMode {
-    /// At full quality: nothing moves.
+    /// Full quality: nothing moves.
     Resting,
-    /// At a rung of the ladder.
+    /// A rung of the ladder.
     Moving(Step),
 }
 
-/// A rung of one of the ladders that a quality controller has had.
+/// A rung of one of the ladders of a quality controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
     rung: usize,
-    /// How many ladders there were before.
+    /// Number of the ladder, from 0.
     ladder: u32,
 }
 
 impl QualityMode {
-    /// Whether such a frame, when it is on the way, is given up for one like `next`: it is the full picture of a camera that
-    /// has moved on, and the other one is sooner there.
+    /// Whether such a frame in flight is dropped for one of `next`: it is the full picture of a camera that has moved on, and
+    /// the other one is complete sooner.
     pub(crate) fn gives_way_to(self, next: Self) -> bool {
         self == Self::Resting && next.rung() > 0
     }
@@ -69,24 +69,25 @@ impl QualityMode {
     }
 }
 
-/// Turns the knobs for one window.
+/// Controller of the knobs of one view.
 #[derive(Clone, Debug)]
 pub(crate) struct QualityController {
     ladder: Ladder,
     governor: Governor,
     balance: Balance,
-    /// How many ladders there were before this one.
+    /// Number of the current ladder, from 0.
     ladders: u32,
     stillness: Stillness,
     target_fps: f64,
     last_finished: Duration,
-    /// How the frame before was asked for.
-    last_shown: Option<QualityMode>,
-    has_told: bool,
+    /// Mode of the previous frame.
+    last_mode: Option<QualityMode>,
+    /// Whether the log has the warning that the rate is out of reach.
+    has_warned: bool,
 }
 
 impl QualityController {
-    /// Holds a rate as well as the ladder allows. `animated`: something moves without anybody's doing.
+    /// A controller that holds a rate as well as the ladder allows. `animated`: something moves without input.
     pub(crate) fn new(ladder: Ladder, target_fps: f64, animated: bool) -> Self {
         let governor = Governor::new(ladder.rungs().iter().map(|rung| rung.cost), budget(target_fps));
         Self {
@@ -97,22 +98,22 @@ impl QualityController {
             stillness: Stillness::new(animated),
             target_fps,
             last_finished: Duration::ZERO,
-            last_shown: None,
-            has_told: false,
+            last_mode: None,
+            has_warned: false,
         }
     }
 
-    /// What is wanted has changed.
+    /// Records a change of the view.
     pub(crate) fn changed(&mut self, now: Duration) {
         self.stillness.changed(now);
     }
 
-    /// When the picture comes to rest, if nothing changes any more.
+    /// Time at which the picture comes to rest, if nothing changes any more.
     pub(crate) fn rests_at(&self) -> Option<Duration> {
         self.stillness.rests_at()
     }
 
-    /// How to ask for the next frame.
+    /// Mode of the next frame.
     pub(crate) fn next(&mut self, now: Duration) -> QualityMode {
         match self.stillness.motion(now) {
             Motion::Resting => QualityMode::Resting,
@@ -120,12 +121,12 @@ impl QualityController {
         }
     }
 
-    /// The picture for a frame that is asked for like this.
+    /// Request for a frame of this mode.
     pub(crate) fn apply(&self, wanted: &ViewRequest, mode: QualityMode) -> ViewRequest {
         self.rung(mode).map_or(*wanted, |rung| rung.setting.applied(wanted))
     }
 
-    /// What is known of a frame that was asked for like this; `None` where the ladder has been another one since then.
+    /// Rung of a frame of this mode; `None` if the ladder has changed since the request.
     fn rung(&self, mode: QualityMode) -> Option<&Rung> {
         let is_of_this = |mode| match mode {
             QualityMode::Resting => true,
@@ -134,34 +135,35 @@ impl QualityController {
         self.ladder.rungs().get(mode.rung()).filter(|_| is_of_this(mode))
     }
 
-    /// A frame has come that was asked for like this, `asked_at`, and took `elapsed` from its beginning. Frames overlap: what
-    /// counts is the time since the one before.
+    /// Records a finished frame, requested at `requested_at`, that took `elapsed` from its beginning. Frames overlap, so no more
+    /// than the time since the previous frame counts.
     pub(crate) fn finished(
         &mut self,
         now: Duration,
         elapsed: Duration,
         mode: QualityMode,
-        asked_at: Duration,
+        requested_at: Duration,
         account: &FrameAccount,
     ) {
         let took = elapsed.min(now.saturating_sub(self.last_finished));
         self.last_finished = now;
-        let is_mixed = self.last_shown.replace(mode).is_some_and(|before| before != mode);
+        let is_mixed = self.last_mode.replace(mode).is_some_and(|before| before != mode);
         if let Some(rung) = self.rung(mode).copied() {
             let before = self.governor.rung();
             self.governor.observe(mode.rung(), took);
             if !is_mixed {
                 self.balance.observe(rung.cost, rung.wire, account);
             }
-            match self.balance.news() {
+            match self.balance.take_change() {
                 Some(ratio) => self.change_ladder(ratio, &rung, took),
                 None => self.log(before, mode),
             }
         }
-        self.stillness.shown(asked_at);
+        self.stillness.shown(requested_at);
     }
 
-    /// Frames wait for something else, or for longer: other knobs help. The last frame, at `rung`, took so long.
+    /// Replaces the ladder after a change of the bottleneck, because other knobs help now. `took` is the time of the last
+    /// frame, at `rung`.
     fn change_ladder(&mut self, ratio: f64, rung: &Rung, took: Duration) {
         self.ladder = self.ladder.balanced(ratio);
         self.ladders = self.ladders.wrapping_add(1);
@@ -171,7 +173,7 @@ impl QualityController {
         self.governor = Governor::starting(times, budget(self.target_fps), full);
         let rungs = self.ladder.rungs().len();
         tracing::debug!(
-            "the wire takes {ratio:.2} times as long as the threads for full pictures: the quality controller has {rungs} rungs now"
+            "the wire takes {ratio:.2} times as long as the threads for full pictures: the ladder has {rungs} rungs now"
         );
     }
 
@@ -179,13 +181,11 @@ impl QualityController {
         let rung = self.governor.rung();
         if rung != before {
             let (setting, cost) = (self.ladder.rungs().get(rung), self.governor.predicted(rung));
-            tracing::debug!(
-                "the quality controller goes from rung {before} to {rung}, {cost:.1?} a frame: {setting:?}"
-            );
+            tracing::debug!("quality: from rung {before} to {rung}, {cost:.1?} a frame: {setting:?}");
         }
-        let is_there = matches!(mode, QualityMode::Moving(_)) && mode.rung() == rung;
-        if self.governor.is_beaten() && is_there && !self.has_told {
-            self.has_told = true;
+        let is_reached = matches!(mode, QualityMode::Moving(_)) && mode.rung() == rung;
+        if self.governor.is_beaten() && is_reached && !self.has_warned {
+            self.has_warned = true;
             let cost = self.governor.predicted(rung).unwrap_or_default();
             let limit = self.balance.limit();
             tracing::warn!(
@@ -199,14 +199,14 @@ impl QualityController {
         }
     }
 
-    /// What the overlay says of a frame.
+    /// Lines of the overlay about a frame.
     pub(crate) fn lines(&self, mode: QualityMode) -> Vec<String> {
         let mut lines = match (mode, self.rung(mode)) {
-            (QualityMode::Resting, _) => return vec!["at rest: all that was asked for".to_owned()],
+            (QualityMode::Resting, _) => return vec!["at rest: full quality".to_owned()],
             (QualityMode::Moving(Step { rung: 0, .. }), _) => {
-                vec!["moving: all that was asked for".to_owned()]
+                vec!["moving: full quality".to_owned()]
             }
-            (QualityMode::Moving(_), None) => vec!["moving: turns other knobs".to_owned()],
+            (QualityMode::Moving(_), None) => vec!["moving: other knobs now".to_owned()],
             (QualityMode::Moving(_), Some(rung)) => {
                 let origin = match self.ladder.origin() {
                     Origin::Measured => "by the scene's table",
@@ -225,7 +225,7 @@ impl QualityController {
     }
 }
 
-/// The time that a frame has at a rate.
+/// Time budget of a frame at a rate.
 fn budget(target_fps: f64) -> Duration {
     Duration::try_from_secs_f64(1.0 / target_fps).unwrap_or(Duration::MAX)
 }

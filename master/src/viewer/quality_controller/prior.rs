@@ -1,10 +1,10 @@
-//! What the knobs cost and lose on other scenes: the ladder where a scene has no table of its own.
+//! The general ladder: costs and losses of the knobs on other scenes, for a scene without a table of its own.
 //!
-//! Costs multiply and losses add up, knob by knob. That is rough, and good enough to begin with: what the costs really are is
-//! learnt from the frames. The figures are medians of the tables in `models/tradeoff`, which `tradeoff` has written: three of
-//! the project's scenes, a bust, and ten of them. Losses are FLIP against the same picture without the loss. Scenes differ by
-//! a factor of four, and more: without shadows, the room is another room. The tables have no rows yet for the scales 1/3 and
-//! 1/4: what is expected of these two continues the row of 3/4 and 1/2.
+//! Costs multiply and losses add up, knob by knob. That is a rough start: the costs are then estimated from the frames. The
+//! figures are medians of the tables in `models/tradeoff`, which `tradeoff` has written: of three example scenes, a bust of
+//! 99,938 triangles, and ten instances of it. Losses are FLIP against the same picture without the loss. Scenes differ by a
+//! factor of four and more. The tables have no rows yet for the scales 1/3 and 1/4: their figures are extrapolated from those
+//! of 3/4 and 1/2.
 
 use rayfarm_tracer::scene::{ColorDepth, RenderScale, Scene, Shading};
 
@@ -12,7 +12,7 @@ use super::ladder::{Ladder, Origin, Rung};
 use super::setting::{Setting, bytes};
 use crate::viewer::view_request::ViewRequest;
 
-/// What turning one knob leaves of the time, and the mean FLIP error that it adds.
+/// Effect of one knob: factor of time, and added mean FLIP error.
 #[derive(Clone, Copy, Debug)]
 struct Effect {
     cost: f64,
@@ -24,25 +24,25 @@ const SCALES: [(RenderScale, Effect); 5] = [
     (RenderScale::Full, NONE),
     (RenderScale::ThreeQuarters, Effect { cost: 0.673, loss: 0.0062 }),
     (RenderScale::Half, Effect { cost: 0.387, loss: 0.0135 }),
-    // Continued from the two above (`small_scales`), not measured.
+    // Extrapolated from the two above (`small_scales`), not measured.
     (RenderScale::Third, Effect { cost: 0.222, loss: 0.0244 }),
     (RenderScale::Quarter, Effect { cost: 0.150, loss: 0.0354 }),
 ];
 const NO_SHADOWS: Effect = Effect { cost: 0.503, loss: 0.0868 };
 const DIFFUSE: Effect = Effect { cost: 0.971, loss: 0.0206 };
-/// What reduced colours do to the time of the threads, and lose: they are for the wire.
+/// Effect of reduced colours on the threads; they relieve the wire.
 const REDUCED: Effect = Effect { cost: 1.008, loss: 0.0523 };
-/// What a pixel costs beside its samples, in samples.
+/// Cost of a pixel without its samples, in samples.
 const PER_PIXEL: f64 = 0.38;
-/// The error of one sample a pixel beside very many; that of n is taken to be smaller by the root of n.
+/// Error of one sample per pixel compared with very many; that of n is smaller by the square root of n.
 const ONE_SAMPLE: f64 = 0.0115;
-/// What a pixel of adaptive anti-aliasing costs however many samples are asked for, and for each of them, in samples.
+/// Cost of a pixel of adaptive anti-aliasing, fixed and per requested sample, in samples.
 const ADAPTIVE_PER_PIXEL: f64 = 2.0;
 const ADAPTIVE_PER_SAMPLE: f64 = 0.165;
-/// What it loses beside all samples everywhere.
+/// Error of adaptive anti-aliasing compared with all samples everywhere.
 const ADAPTIVE_LOSS: f64 = 0.0011;
 
-/// The ladder for pictures of a scene.
+/// General ladder for pictures of a scene.
 pub(crate) fn ladder(scene: &Scene, wanted: &ViewRequest) -> Ladder {
     let mut rungs = Vec::new();
     for (scale, samples) in
@@ -62,20 +62,20 @@ pub(crate) fn ladder(scene: &Scene, wanted: &ViewRequest) -> Ladder {
     Ladder::of(rungs, Origin::General)
 }
 
-/// Square numbers up to what is asked for.
+/// Square numbers up to the requested number of samples.
 fn sample_counts(most: u32) -> impl Iterator<Item = u32> + Clone {
     (1..=most.isqrt()).map(|side| side * side)
 }
 
-/// What is expected of a setting. A knob that is turned down already makes no difference.
+/// Expected cost and loss of a setting. A knob that the request reduces already has no effect.
 fn rung(setting: Setting, wanted: &ViewRequest) -> Rung {
-    let picture = setting.applied(wanted);
-    let (full, quality) = (wanted.view.quality, picture.view.quality);
+    let request = setting.applied(wanted);
+    let (full, quality) = (wanted.view.quality, request.view.quality);
     let scale = |wanted: &ViewRequest| {
         SCALES.iter().find(|(scale, _)| *scale == wanted.scale).map_or(NONE, |(_, effect)| *effect)
     };
-    let (before, after) = (scale(wanted), scale(&picture));
-    let (all, fewer) = (sampling(wanted), sampling(&picture));
+    let (before, after) = (scale(wanted), scale(&request));
+    let (all, fewer) = (sampling(wanted), sampling(&request));
     let effects = [
         Effect { cost: after.cost / before.cost, loss: after.loss - before.loss },
         Effect { cost: fewer.cost / all.cost, loss: fewer.loss - all.loss },
@@ -85,17 +85,17 @@ fn rung(setting: Setting, wanted: &ViewRequest) -> Rung {
     ];
     Rung {
         setting,
-        wire: bytes(&picture) / bytes(wanted),
+        wire: bytes(&request) / bytes(wanted),
         cost: effects.iter().map(|effect| effect.cost).product(),
         loss: effects.iter().map(|effect| effect.loss).sum(),
     }
 }
 
-/// What a pixel's samples cost, in samples, and their error beside very many.
-fn sampling(picture: &ViewRequest) -> Effect {
-    let samples = f64::from(picture.view.samples);
+/// Cost of a pixel's samples, in samples, and their error compared with very many.
+fn sampling(request: &ViewRequest) -> Effect {
+    let samples = f64::from(request.view.samples);
     let loss = ONE_SAMPLE / samples.sqrt();
-    if picture.view.is_adaptive() {
+    if request.view.is_adaptive() {
         Effect { cost: ADAPTIVE_PER_PIXEL + ADAPTIVE_PER_SAMPLE * samples, loss: loss + ADAPTIVE_LOSS }
     } else {
         Effect { cost: PER_PIXEL + samples, loss }
@@ -124,13 +124,13 @@ mod tests {
         ViewRequest { view, scale: RenderScale::Full }
     }
 
-    /// Cost and loss of a setting beside another one, in each table that has both, from the least to the greatest.
-    fn measured(setting: &str, beside: &str) -> [Vec<f64>; 2] {
+    /// Cost and loss of a setting compared with a baseline, in each table that has both, in ascending order.
+    fn measured(setting: &str, baseline: &str) -> [Vec<f64>; 2] {
         let tables = TABLES.map(|text| Table::parse(text).unwrap());
         let row = |table: &Table, name: &str| table.rows.iter().find(|row| row.setting == name).cloned();
-        let pairs = tables.iter().filter_map(|table| row(table, setting).zip(row(table, beside)));
+        let pairs = tables.iter().filter_map(|table| row(table, setting).zip(row(table, baseline)));
         let pairs: Vec<_> = pairs.collect();
-        assert!(pairs.len() >= 3, "{setting} beside {beside}");
+        assert!(pairs.len() >= 3, "{setting} against {baseline}");
         let sorted = |mut values: Vec<f64>| {
             values.sort_by(f64::total_cmp);
             values
@@ -141,11 +141,10 @@ mod tests {
         ]
     }
 
-    /// Alone, a knob is expected to do about what it did to the scenes that were measured, in the middle.
     #[test]
-    fn knobs_are_expected_to_do_what_was_measured() {
+    fn each_knob_alone_has_about_the_median_measured_effect() {
         let median = |values: &[f64]| values[values.len() / 2];
-        for (setting, beside, samples) in [
+        for (setting, baseline, samples) in [
             ("scale-3-4", "samples-1", 1),
             ("scale-1-2", "samples-1", 1),
             ("reduced-colors", "samples-1", 1),
@@ -158,9 +157,9 @@ mod tests {
             ("samples-9+adaptive", "samples-9", 9),
             ("samples-16+adaptive", "samples-16", 16),
         ] {
-            let [costs, losses] = measured(setting, beside);
-            let picture = Measured::named(setting).unwrap().applied_to(&wanted(samples).view);
-            let expected = rung(Setting::of(&picture), &wanted(samples));
+            let [costs, losses] = measured(setting, baseline);
+            let request = Measured::named(setting).unwrap().applied_to(&wanted(samples).view);
+            let expected = rung(Setting::of(&request), &wanted(samples));
             let (cost, loss) = (median(&costs), median(&losses));
             let what = format!("{setting}: expected {expected:?}, measured {costs:?} and {losses:?}");
             assert!((expected.cost / cost - 1.0).abs() < 0.15, "{what}");
@@ -169,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn the_small_scales_are_what_the_larger_ones_lead_to() {
+    fn the_small_scales_are_extrapolated_from_the_larger_ones() {
         let [full, three_quarters, half, third, quarter] = SCALES.map(|(_, effect)| effect);
         let known = [full, three_quarters, half].map(|effect| (effect.cost, effect.loss));
         for (effect, scale) in [(third, RenderScale::Third), (quarter, RenderScale::Quarter)] {
@@ -179,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn half_the_time_is_saved_where_neighbours_do_not_differ_before_anything_else_is_left_out() {
+    fn adaptive_sampling_is_the_first_rung_that_saves_half_the_time() {
         let rungs = ladder(&crate::test_scene::scene(), &wanted(16));
         let first = rungs.rungs().iter().find(|rung| rung.cost < 0.5).unwrap().setting.applied(&wanted(16));
         assert!(first.view.quality.adaptive && first.view.samples == 16, "{first:?}");
@@ -187,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn however_much_is_asked_for_the_ladder_goes_down_to_the_cheapest() {
+    fn the_ladder_ends_at_one_sample_and_a_quarter_of_the_size() {
         let last = ladder(&crate::test_scene::scene(), &wanted(256)).cheapest().applied(&wanted(256));
         assert_eq!((last.view.samples, last.scale), (1, RenderScale::Quarter));
     }

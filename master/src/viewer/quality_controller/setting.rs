@@ -1,45 +1,45 @@
-//! What a rung does to a picture: some knobs turned down, the others left where they are.
+//! Settings of the knobs: upper limits that a rung applies to a request.
 
 use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Scene, Shading};
 
 use crate::viewer::view_request::ViewRequest;
 
-/// What reduced colours leave of the bytes: two of three, and less where both are compressed; in the mean of the figures in
-/// the project's README.
+/// Bytes of a pixel with reduced colours, as a part of those with full ones: two thirds, and less after compression; the mean
+/// of the measured scenes.
 const REDUCED_BYTES: f64 = 0.6;
 
-/// What a picture's pixels come to on the wire, in pixels of full colours.
-pub(super) fn bytes(picture: &ViewRequest) -> f64 {
-    let colors = match picture.view.quality.colors {
+/// Size of a picture on the wire, in pixels of full colours.
+pub(super) fn bytes(request: &ViewRequest) -> f64 {
+    let colors = match request.view.quality.colors {
         ColorDepth::Exact => 1.0,
         ColorDepth::Reduced => REDUCED_BYTES,
     };
-    colors * picture.scale.factor().powi(2) * f64::from(picture.view.width) * f64::from(picture.view.height)
+    colors * request.scale.factor().powi(2) * f64::from(request.view.width) * f64::from(request.view.height)
 }
 
-/// Positions that no knob stands above.
+/// Upper limits of the knobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Setting {
-    /// Rays per pixel at most.
+    /// Largest number of rays per pixel.
     pub(crate) samples: u32,
-    /// The largest scale.
+    /// Largest scale.
     pub(crate) scale: RenderScale,
-    /// Whether shadows may be cast.
+    /// Whether shadows are allowed.
     pub(crate) shadows: bool,
-    /// The most terms.
+    /// Most terms of the shading.
     pub(crate) shading: Shading,
-    /// The best precision of the highlight's power.
+    /// Best precision of the specular exponent.
     pub(crate) exponent: ExponentPrecision,
     /// Whether all samples are traced only where neighbours differ.
     pub(crate) adaptive: bool,
-    /// Whether textures are looked up at the nearest texel.
+    /// Whether textures are sampled at the nearest texel.
     pub(crate) nearest: bool,
-    /// The most colours.
+    /// Largest colour depth.
     pub(crate) colors: ColorDepth,
 }
 
 impl Setting {
-    /// Leaves every picture as it is.
+    /// The setting that changes no request.
     pub(crate) const FULL: Self = Self {
         samples: u32::MAX,
         scale: RenderScale::Full,
@@ -51,21 +51,21 @@ impl Setting {
         colors: ColorDepth::Exact,
     };
 
-    /// The one that makes this of the full picture.
-    pub(crate) fn of(picture: &ViewRequest) -> Self {
+    /// The setting that turns the full request into this one.
+    pub(crate) fn of(request: &ViewRequest) -> Self {
         let Quality { adaptive, shadows, shading, filter, exponent, colors, dither: _ } =
-            picture.view.quality;
-        let (samples, scale) = (picture.view.samples, picture.scale);
+            request.view.quality;
+        let (samples, scale) = (request.view.samples, request.scale);
         let nearest = filter == Some(Filter::Nearest);
         Self { samples, scale, shadows, shading, exponent, adaptive, nearest, colors }
     }
 
-    /// The picture at this setting. No knob is turned up.
+    /// The request at this setting. No knob is raised.
     pub(crate) fn applied(&self, wanted: &ViewRequest) -> ViewRequest {
-        let mut picture = *wanted;
-        picture.scale = wanted.scale.min(self.scale);
-        picture.view.samples = wanted.view.samples.min(self.samples);
-        let quality = &mut picture.view.quality;
+        let mut request = *wanted;
+        request.scale = wanted.scale.min(self.scale);
+        request.view.samples = wanted.view.samples.min(self.samples);
+        let quality = &mut request.view.quality;
         quality.shadows &= self.shadows;
         if self.shading == Shading::Diffuse {
             quality.shading = Shading::Diffuse;
@@ -80,10 +80,11 @@ impl Setting {
         if self.colors == ColorDepth::Reduced {
             quality.colors = ColorDepth::Reduced;
         }
-        picture
+        request
     }
 
-    /// This without what makes no difference to pictures of a scene: the same pixels would come, and no sooner.
+    /// The setting without limits that do not matter to a scene: without lights that cast shadows, for instance, pixels and
+    /// times are the same with shadows on or off.
     pub(crate) fn for_scene(&self, scene: &Scene) -> Self {
         let shadows = scene.lights.iter().any(|light| light.shadows);
         let mut shining = scene.materials.iter().filter(|material| material.is_specular()).peekable();
@@ -91,7 +92,7 @@ impl Setting {
         let powers = shining.any(|material| !material.has_squared_highlight());
         let mut setting = *self;
         setting.shadows |= !shadows;
-        // Without the term, its precision is nobody's business.
+        // Without the specular term, its precision does not matter.
         if !specular {
             setting.shading = Shading::Full;
         }

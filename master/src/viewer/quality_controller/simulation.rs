@@ -1,4 +1,4 @@
-//! The governor against simulated costs: steady, noisy, in steps and ramps, and other than the table says.
+//! The governor against simulated costs: steady, noisy, in steps and ramps, and different from the table.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -8,16 +8,16 @@ use proptest::prelude::*;
 use super::governor::Governor;
 use crate::simulator::Dice;
 
-/// Requests that are open at a time: what the governor says counts from the second frame on.
+/// Requests in flight: a decision of the governor takes effect after as many frames.
 const IN_FLIGHT: usize = 2;
 /// Frames after which everything has settled.
 const SETTLING: usize = 300;
-/// What the tables of these tests say.
+/// Costs of the rungs by the table of these tests.
 const TABLE: [f64; 6] = [1.0, 0.75, 0.6, 0.4, 0.28, 0.15];
 /// 100 frames a second, in seconds a frame.
 const BUDGET: f64 = 0.01;
 
-/// A farm that takes what it is told to.
+/// A farm with given costs.
 struct Simulation {
     governor: Governor,
     truth: Vec<f64>,
@@ -30,12 +30,12 @@ struct Simulation {
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     rung: usize,
-    /// What it would take without noise.
+    /// Time without noise, in seconds.
     expected: f64,
 }
 
 impl Simulation {
-    /// Costs as the table says, with noise of up to `noise` either way.
+    /// Costs of the table, with noise of up to `noise` either way.
     fn new(noise: f64, seed: u64) -> Self {
         Self::with_truth(&TABLE, &TABLE, noise, seed)
     }
@@ -46,7 +46,7 @@ impl Simulation {
         Self { governor, truth: truth.to_vec(), noise, dice: Dice::new(seed), in_flight }
     }
 
-    /// A frame where the full one takes so many budgets.
+    /// Renders a frame where the full one takes `load` budgets.
     fn frame(&mut self, load: f64) -> Frame {
         let rung = self.in_flight.pop_front().unwrap();
         let expected = BUDGET * load * self.truth[rung];
@@ -60,7 +60,7 @@ impl Simulation {
         (0..count).map(|_| self.frame(load)).collect()
     }
 
-    /// Changes of the rung while the load is steady, after it has been so for a while.
+    /// Changes of the rung at a steady load, after settling.
     fn changes(&mut self, load: f64) -> usize {
         self.frames(load, SETTLING);
         changes(&self.frames(load, 1000))
@@ -86,7 +86,7 @@ fn a_steady_load_gets_the_best_rung_that_holds_and_keeps_it() {
 }
 
 #[test]
-fn noise_makes_it_neither_swing_nor_give_up_quality() {
+fn noise_causes_neither_oscillation_nor_loss_of_quality() {
     for seed in 0..200 {
         let load = 0.3 + 0.03 * seed as f64;
         let mut simulation = Simulation::new(0.2, seed);
@@ -100,7 +100,7 @@ fn noise_makes_it_neither_swing_nor_give_up_quality() {
 }
 
 #[test]
-fn it_recovers_within_ten_frames_of_a_step_either_way() {
+fn the_governor_recovers_within_ten_frames_of_a_step_either_way() {
     for (before, after) in
         [(0.8, 3.0), (1.0, 5.0), (0.5, 1.3), (2.0, 2.8), (5.0, 1.0), (3.0, 0.5), (2.6, 1.2)]
     {
@@ -146,7 +146,7 @@ fn a_ramp_is_followed() {
 }
 
 #[test]
-fn a_rung_that_is_not_as_cheap_as_the_table_says_is_tried_once() {
+fn a_rung_that_is_dearer_than_the_table_says_is_tried_once() {
     // Without shadows, a scene that has none is as slow as with them.
     let truth = [1.0, 0.98, 0.97, 0.4, 0.28, 0.15];
     for seed in 0..50 {
@@ -159,7 +159,7 @@ fn a_rung_that_is_not_as_cheap_as_the_table_says_is_tried_once() {
 }
 
 #[test]
-fn what_it_has_learnt_of_a_rung_is_as_it_is() {
+fn estimated_costs_of_rungs_are_the_true_ones() {
     let truth = [1.0, 0.95, 0.8, 0.6, 0.4, 0.2];
     let mut simulation = Simulation::with_truth(&TABLE, &truth, 0.1, 7);
     for load in [0.5, 1.0, 1.2, 1.5, 2.0, 4.0, 1.0, 0.5] {
@@ -173,7 +173,7 @@ fn what_it_has_learnt_of_a_rung_is_as_it_is() {
 }
 
 #[test]
-fn a_load_that_nothing_holds_is_told_and_one_that_eases_is_not() {
+fn a_load_beyond_all_rungs_is_reported_until_it_eases() {
     let mut simulation = Simulation::new(0.2, 3);
     simulation.frames(5.0, 100);
     assert!(!simulation.governor.is_beaten());
@@ -186,7 +186,7 @@ fn a_load_that_nothing_holds_is_told_and_one_that_eases_is_not() {
 }
 
 #[test]
-fn frames_of_a_picture_at_rest_tell_what_a_moving_one_needs() {
+fn frames_at_rest_determine_the_rung_of_moving_ones() {
     let mut governor = Governor::new(TABLE, Duration::from_secs_f64(BUDGET));
     (0..20).for_each(|_| governor.observe(0, Duration::from_secs_f64(3.0 * BUDGET)));
     assert_eq!(governor.rung(), best(&TABLE, 3.0, 0.87));
@@ -194,10 +194,10 @@ fn frames_of_a_picture_at_rest_tell_what_a_moving_one_needs() {
     assert_eq!(governor.rung(), 0);
 }
 
-/// What one rung takes may change without the others, as adaptive anti-aliasing does when the camera comes to edges: the load seems to
-/// have jumped, and nothing but the worst rung to hold.
+/// The cost of one rung may change without the others, as that of adaptive anti-aliasing does when the camera comes to edges:
+/// the load seems to have jumped, and only the worst rung to hold.
 #[test]
-fn a_rung_that_becomes_dear_alone_does_not_spoil_the_others() {
+fn one_rung_that_becomes_dear_does_not_rule_out_the_others() {
     for seed in 0..50 {
         let mut simulation = Simulation::new(0.05, seed);
         simulation.frames(2.0, SETTLING);
@@ -223,7 +223,7 @@ fn ladders() -> impl Strategy<Value = Vec<f64>> {
 
 proptest! {
     #[test]
-    fn a_steady_load_never_swings(
+    fn a_steady_load_never_oscillates(
         table in ladders(),
         errors in prop::collection::vec(0.6..1.7_f64, 7),
         load in 0.1..20.0_f64,
@@ -243,7 +243,7 @@ proptest! {
     }
 
     #[test]
-    fn any_frames_are_put_up_with(
+    fn any_frames_are_accepted(
         ratios in prop::collection::vec(any::<f64>(), 0..9),
         budget in 0_u64..10_000_000_000,
         frames in prop::collection::vec((0_usize..12, any::<u64>()), 0..200),

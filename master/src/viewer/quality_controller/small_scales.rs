@@ -1,12 +1,12 @@
-//! Scales of a third and a quarter where only larger ones were measured.
+//! Extrapolation to scales of a third and a quarter, where only larger ones were measured.
 //!
-//! The time of a frame is taken to go on falling with the same power of the scale as from the whole to a half. The error
-//! grew more slowly the smaller the scale became, in all tables of `models/tradeoff`: it is taken to go on growing as
-//! steeply as from three quarters to a half, against the width of a rendered pixel, which rather overstates it.
+//! The time of a frame falls with the same power of the scale as from the whole to a half. The error grows with the width of
+//! a rendered pixel at the same slope as from three quarters to a half. That overstates it: in all tables of
+//! `models/tradeoff` the slope decreases with the scale.
 
 use rayfarm_tracer::scene::RenderScale;
 
-/// Cost and loss at a scale, continued from those at the whole, three quarters and a half.
+/// Cost and loss at a scale, extrapolated from those at the whole, three quarters and a half.
 pub(super) fn continued(known: [(f64, f64); 3], scale: RenderScale) -> (f64, f64) {
     let [(full, _), (_, three_quarters_lost), (half, half_lost)] = known;
     let factor = scale.factor();
@@ -24,7 +24,7 @@ mod tests {
 
     #[test]
     fn times_keep_their_power_and_errors_their_slope() {
-        // Proportional to the pixels; and 0.02 more for each pixel's width.
+        // Times are proportional to the pixels; errors grow by 0.02 per pixel width.
         let known = [(1.0, 0.0), (0.5625, 0.02 / 3.0), (0.25, 0.02)];
         for (scale, pixels, loss) in
             [(RenderScale::Third, 1.0 / 9.0, 0.04), (RenderScale::Quarter, 1.0 / 16.0, 0.06)]
@@ -35,7 +35,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_that_does_not_grow_stays_and_none_is_more_than_all() {
+    fn an_error_never_falls_and_never_exceeds_one() {
         assert_eq!(continued([(1.0, 0.0), (0.6, 0.3), (0.4, 0.2)], RenderScale::Quarter).1, 0.2);
         assert_eq!(continued([(1.0, 0.0), (0.6, 0.1), (0.4, 0.9)], RenderScale::Quarter).1, 1.0);
     }

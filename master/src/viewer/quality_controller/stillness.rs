@@ -1,49 +1,49 @@
-//! Whether the picture moves. Pure: times are since any fixed moment, and grow.
+//! Detection of motion and rest of the view. Pure: times are since any fixed moment, and grow.
 
 use std::time::Duration;
 
-/// A camera that has not changed for this long is at rest. Keys that are held change it many times in that time; the
-/// rest of half a second is for the full picture.
+/// Time without a change after which a camera is at rest. A held key changes it many times within that time, and the full
+/// picture is to be complete half a second after the last change.
 pub(crate) const REST_AFTER: Duration = Duration::from_millis(100);
 
-/// What a picture is asked for at.
+/// State of the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Motion {
-    /// The rate counts.
+    /// The view changes: the frame rate matters.
     Moving,
-    /// The full picture counts.
+    /// The view is at rest: full quality matters.
     Resting,
 }
 
-/// Tells rest from motion.
+/// Detector of motion and rest.
 #[derive(Clone, Debug)]
 pub(crate) struct Stillness {
-    /// Something moves by itself, so there is no rest.
+    /// Whether something moves without input, so that the view never rests.
     animated: bool,
-    /// When the camera changed last, until it rests.
+    /// Time of the last change of the camera, until it rests.
     changed_at: Option<Duration>,
-    /// Whether a picture of the camera as it is now has come.
+    /// Whether a picture of the current camera has been completed.
     is_shown: bool,
 }
 
 impl Stillness {
-    /// A camera that rests, unless something moves by itself.
+    /// A view at rest, unless something moves without input.
     pub(crate) fn new(animated: bool) -> Self {
         Self { animated, changed_at: None, is_shown: true }
     }
 
-    /// The camera has changed.
+    /// Records a change of the camera.
     pub(crate) fn changed(&mut self, now: Duration) {
         (self.changed_at, self.is_shown) = (Some(now), false);
     }
 
-    /// A picture has come that was asked for `asked_at`.
-    pub(crate) fn shown(&mut self, asked_at: Duration) {
-        self.is_shown |= self.changed_at.is_none_or(|changed_at| changed_at <= asked_at);
+    /// Records a picture that was requested at `requested_at`.
+    pub(crate) fn shown(&mut self, requested_at: Duration) {
+        self.is_shown |= self.changed_at.is_none_or(|changed_at| changed_at <= requested_at);
     }
 
-    /// Moving, or at rest from `now` on. A camera rests when it has not changed for [`REST_AFTER`] and one picture shows
-    /// where it has come to, so that nobody who has a slow farm waits for that until the full picture is there.
+    /// State of the view from `now` on. A camera rests when it has not changed for [`REST_AFTER`] and a picture of its current
+    /// position is complete, so that on a slow farm this picture does not have to wait for the full one.
     pub(crate) fn motion(&mut self, now: Duration) -> Motion {
         if self.is_shown && self.rests_at().is_some_and(|at| at <= now) {
             self.changed_at = None;
@@ -51,8 +51,8 @@ impl Stillness {
         if self.animated || self.changed_at.is_some() { Motion::Moving } else { Motion::Resting }
     }
 
-    /// When it will rest if the camera does not change any more; `None` where nothing but a change or a picture can make
-    /// a difference.
+    /// Time at which the view will rest if the camera does not change any more; `None` where only a change or a picture can
+    /// make a difference.
     pub(crate) fn rests_at(&self) -> Option<Duration> {
         self.changed_at.filter(|_| self.is_shown && !self.animated).map(|at| at + REST_AFTER)
     }
@@ -65,13 +65,13 @@ mod tests {
     const MS: Duration = Duration::from_millis(1);
 
     #[test]
-    fn a_camera_that_nobody_touches_rests() {
+    fn an_untouched_camera_rests() {
         let mut stillness = Stillness::new(false);
         assert_eq!((stillness.motion(MS), stillness.rests_at()), (Motion::Resting, None));
     }
 
     #[test]
-    fn it_moves_from_a_change_until_a_while_after_the_last_one() {
+    fn the_view_moves_until_a_while_after_the_last_change() {
         let mut stillness = Stillness::new(false);
         for step in 0..20 {
             stillness.changed(MS * 90 * step);
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn it_does_not_rest_before_a_picture_shows_where_it_is() {
+    fn the_view_does_not_rest_before_a_picture_of_its_camera() {
         let mut stillness = Stillness::new(false);
         stillness.changed(MS * 50);
         stillness.shown(MS * 49);

@@ -27,9 +27,9 @@ fn finish(
     now: Duration,
     elapsed: Duration,
     mode: QualityMode,
-    asked_at: Duration,
+    requested_at: Duration,
 ) {
-    controller.finished(now, elapsed, mode, asked_at, &FrameAccount::default());
+    controller.finished(now, elapsed, mode, requested_at, &FrameAccount::default());
 }
 
 /// Full frames of 20 ms, one after the other.
@@ -44,11 +44,11 @@ fn the_picture_at_rest_is_the_one_that_is_wanted() {
     assert_eq!(controller.next(MS), QualityMode::Resting);
     assert_eq!(controller.apply(&wanted(4), QualityMode::Resting), wanted(4));
     assert_eq!(controller.apply(&wanted(4), moving(0)), wanted(4));
-    assert_eq!(controller.lines(QualityMode::Resting), ["at rest: all that was asked for"]);
+    assert_eq!(controller.lines(QualityMode::Resting), ["at rest: full quality"]);
 }
 
 #[test]
-fn a_moving_one_is_at_the_rung_that_holds() {
+fn a_moving_picture_is_at_the_rung_that_holds() {
     let mut controller = controller(100.0);
     rest(&mut controller, 5);
     controller.changed(MS * 101);
@@ -62,14 +62,14 @@ fn a_moving_one_is_at_the_rung_that_holds() {
 }
 
 #[test]
-fn only_the_full_picture_of_an_older_camera_is_given_up() {
+fn only_the_full_picture_of_an_older_camera_is_dropped() {
     let (full, reduced) = (moving(0), moving(2));
     assert!(QualityMode::Resting.gives_way_to(reduced) && !QualityMode::Resting.gives_way_to(full));
     assert!(!full.gives_way_to(reduced) && !reduced.gives_way_to(QualityMode::Resting));
 }
 
 #[test]
-fn it_comes_to_rest_when_its_last_camera_has_been_shown() {
+fn the_view_rests_when_its_last_camera_has_been_shown() {
     let mut controller = controller(100.0);
     rest(&mut controller, 5);
     controller.changed(MS * 101);
@@ -80,21 +80,21 @@ fn it_comes_to_rest_when_its_last_camera_has_been_shown() {
 }
 
 #[test]
-fn a_rate_that_is_out_of_reach_is_told() {
+fn a_rate_that_is_out_of_reach_is_reported() {
     let mut controller = controller(1000.0);
     rest(&mut controller, 20);
-    let told = [
+    let lines = [
         "moving: loses about FLIP 0.050",
         "by the general table",
         "1000 FPS: out of reach",
         "waits for render threads",
     ];
-    assert_eq!(controller.lines(moving(2)), told);
-    assert_eq!(controller.lines(QualityMode::Resting), ["at rest: all that was asked for"]);
+    assert_eq!(controller.lines(moving(2)), lines);
+    assert_eq!(controller.lines(QualityMode::Resting), ["at rest: full quality"]);
 }
 
 #[test]
-fn no_knob_is_turned_up() {
+fn no_knob_is_raised() {
     let mut low = wanted(4);
     low.scale = RenderScale::Half;
     low.view.quality.shadows = false;
@@ -114,7 +114,7 @@ fn no_knob_is_turned_up() {
 }
 
 #[test]
-fn knobs_that_make_no_difference_to_a_scene_are_not_on_its_ladder() {
+fn knobs_without_effect_on_a_scene_are_not_on_its_ladder() {
     let mut scene = test_scene::scene();
     scene.materials[0].specular = glam::Vec3::ZERO;
     assert!(scene.lights.is_empty());

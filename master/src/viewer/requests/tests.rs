@@ -153,8 +153,8 @@ fn with_a_controller_the_full_picture_at_rest_is_requested_once() {
     let ladder = Ladder::of([], Origin::General);
     let mut view = View::new(STILL, false, Some(QualityController::new(ladder, 30.0, false)));
     view.finish();
-    let told = view.requests.at_rest().unwrap();
-    assert_eq!(told, ["at rest: all that was asked for"]);
+    let lines = view.requests.at_rest().unwrap();
+    assert_eq!(lines, ["at rest: full quality"]);
     view.change(|state| state.request.view.spin = 1.0);
     view.finish();
     assert_eq!(view.requests.at_rest(), None, "the camera has not rested long enough");
@@ -164,7 +164,7 @@ fn with_a_controller_the_full_picture_at_rest_is_requested_once() {
     view.requests.rest(&view.recorder, &state);
     // The only rung is the full one: the moving picture serves at rest.
     assert_eq!(view.count(), 2);
-    assert_eq!(view.requests.at_rest().unwrap(), told);
+    assert_eq!(view.requests.at_rest().unwrap(), lines);
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl Run {
 
     /// Report of a run whose files all exist.
     fn nothing_to_do(mut self) -> Result<RenderReport, CommandError> {
-        tracing::info!("all {} frames exist already: nothing to render", self.files.plan.skipped);
+        tracing::info!("all {} frames are there already: nothing to render", self.files.plan.skipped);
         self.observability.end()?;
         Ok(self.report())
     }
