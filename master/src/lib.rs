@@ -1,8 +1,7 @@
 //! The master of rayfarm: owns the scene and the screen, hands out segments, assembles frames.
 //!
-//! The seam between what draws and what renders is [`farm::Farm`]: everything above it (command line, window,
-//! reports) asks for frames and shows them; everything below it (scheduler, sessions, framebuffers, local worker
-//! processes) sees to it that each one completes.
+//! [`farm::Farm`] is the boundary between displays and rendering. The code above it (application, viewer, displays) requests
+//! frames and shows them. The code below it (scheduler, sessions, framebuffers, local worker processes) completes each one.
 
 mod accounting;
 mod addresses;
@@ -12,6 +11,7 @@ mod chains;
 mod delivered;
 mod display;
 mod driver;
+mod error;
 pub mod farm;
 mod farm_control;
 mod framebuffer;
@@ -20,8 +20,10 @@ mod in_process;
 mod judge;
 mod lease_book;
 mod local_workers;
+mod log_bar;
 mod pace;
 mod plot;
+mod quantile;
 mod roster;
 pub mod scheduler;
 mod seals;
@@ -48,15 +50,15 @@ use std::process::ExitCode;
 use app::cli::Invocation;
 use app::{commands, logging};
 
-/// The whole program: does what the command line (program name first) asks for and says how it went.
+/// Runs the program for a command line, program name first. Errors are printed on standard error.
 ///
-/// Exit status: 0 done; 2 wrong use or wrong input; 1 anything else. What is wrong is told on standard error.
+/// Exit status: 0 success; 2 wrong use or wrong input; 1 any other failure.
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let (command, log) = match Invocation::parse(args) {
         Ok(Invocation::LocalWorker(args)) => return rayfarm_worker::cli::main_from(args),
         Ok(Invocation::Command(command, log)) => (command, log),
         Err(error) => {
-            let _ = error.print(); // there is nowhere left to say that it could not be said
+            let _ = error.print(); // a failure to print cannot be reported anywhere
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1));
         }
     };

@@ -20,7 +20,7 @@ use rayfarm_protocol::Lease;
 use serde_json::{Value, json};
 
 use super::span::{Mark, Span, What};
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 
 /// Marks between those who tell and the thread that writes.
 const QUEUE: usize = 1 << 16;

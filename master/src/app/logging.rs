@@ -1,4 +1,4 @@
-//! What the program tells on standard error while it works.
+//! The log on standard error.
 
 use std::time::SystemTime;
 
@@ -8,9 +8,9 @@ use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::time::FormatTime;
 
 use crate::app::cli::LogArgs;
-use crate::app::progress::AboveTheBar;
+use crate::log_bar::LogWriter;
 
-/// Hours, minutes and seconds in UTC, as in `14:05:09Z`: runs are watched live, and no time zone has to be known.
+/// Times of the log: hours, minutes and seconds in UTC, as in `14:05:09Z`. Logs are read live, and no time zone is needed.
 #[derive(Clone, Copy, Debug)]
 struct TimeOfDay;
 
@@ -21,13 +21,13 @@ impl FormatTime for TimeOfDay {
     }
 }
 
-/// Of a moment in seconds since 1970.
+/// Time of day of a Unix time in seconds.
 fn time_of_day(seconds: u64) -> String {
     let seconds = seconds % 86_400;
     format!("{:02}:{:02}:{:02}Z", seconds / 3600, seconds / 60 % 60, seconds % 60)
 }
 
-/// Starts telling: warnings and milestones; more or less as asked for; exactly as `RUST_LOG` says where it is set.
+/// Starts the log at level `INFO`, or at the level that the options or `RUST_LOG` set; the latter has priority.
 pub(crate) fn start(args: LogArgs) {
     let level = match (args.verbose, args.quiet) {
         (true, _) => LevelFilter::DEBUG,
@@ -38,12 +38,12 @@ pub(crate) fn start(args: LogArgs) {
     let colors = std::io::IsTerminal::is_terminal(&std::io::stderr());
     let subscriber = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(|| AboveTheBar)
+        .with_writer(|| LogWriter)
         .with_target(args.verbose)
         .with_ansi(colors)
         .with_timer(TimeOfDay)
         .finish();
-    // Fails only where a test has set one already.
+    // Fails only in tests, after the first one has set a subscriber.
     let _ = tracing::subscriber::set_global_default(subscriber);
 }
 

@@ -3,7 +3,6 @@
 pub(crate) mod cli;
 pub(crate) mod commands;
 pub(crate) mod control;
-pub(crate) mod error;
 pub(crate) mod logging;
 pub(crate) mod output;
 pub(crate) mod plan;

@@ -1,4 +1,4 @@
-//! Files that frames go to: names, checks made before anything is rendered, and writing beside the rendering.
+//! Files of frames: names, checks before rendering, and writing in the background.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -6,43 +6,43 @@ use std::path::{Path, PathBuf};
 use rayfarm_tracer::image::{self, RgbImage};
 use tokio::task::JoinHandle;
 
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 
-/// The extensions that pictures can have.
+/// Extensions of pictures.
 const EXTENSIONS: [&str; 2] = ["png", "ppm"];
-/// Frames that may be waiting for the disk; each holds a whole picture.
+/// Largest number of frames being written; each holds a whole picture.
 const MAX_PENDING: usize = 2;
-/// Digits in a number; more would only be zeroes.
+/// Largest number of digits of a frame number; more would only be zeros.
 const MAX_DIGITS: usize = 18;
 
-/// The word in place of a file's name that has no picture written.
+/// Word in place of a file name for which no picture is written.
 const NONE: &str = "none";
 
-/// Where the frames of a run go.
+/// Files of the frames of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum OutputPattern {
-    /// Nowhere: they are rendered to be measured.
+    /// No files: frames are rendered for measurements.
     None,
     /// One file.
     Single(PathBuf),
-    /// A file per frame, named `prefix`, the frame's number with at least `digits` digits, `suffix`.
+    /// A file per frame. Its name is `prefix`, the frame number with at least `digits` digits, and `suffix`.
     Sequence {
-        /// The folder.
+        /// Folder of the files.
         folder: PathBuf,
-        /// The name before the number.
+        /// Name before the number.
         prefix: String,
-        /// The least number of digits, filled up with zeroes.
+        /// Least number of digits, padded with zeros.
         digits: usize,
-        /// The name after the number, with its extension.
+        /// Name after the number, with the extension.
         suffix: String,
     },
 }
 
 impl OutputPattern {
-    /// Reads `picture.png`, `frame-%04d.png` or `none`, for a run of `frames` frames.
+    /// Parses `picture.png`, `frame-%04d.png` or `none`, for a run of `frames` frames.
     ///
     /// # Errors
-    /// A name without a known extension, an unreadable `%`, or one name for many frames.
+    /// A name without a known extension, an invalid `%`, or one name for many frames.
     pub(crate) fn parse(output: &Path, frames: u32) -> Result<Self, CommandError> {
         if output == Path::new(NONE) {
             return Ok(Self::None);
@@ -73,7 +73,7 @@ impl OutputPattern {
         }
     }
 
-    /// The file of frame `index`, from 0, if there shall be one.
+    /// Path of the file of frame `index`, from 0; `None` without files.
     pub(crate) fn path(&self, index: u64) -> Option<PathBuf> {
         match self {
             Self::None => None,
@@ -90,7 +90,7 @@ enum Name {
     Numbered { prefix: String, digits: usize, suffix: String },
 }
 
-/// Finds the one `%d` or `%04d`; `%%` is a per cent sign.
+/// Splits a name at its only `%d` or `%04d`; `%%` is a per cent sign.
 fn split_number(name: &str) -> Result<Name, String> {
     let (mut plain, mut number, mut rest) = (String::new(), None, name);
     while let Some((before, after)) = rest.split_once('%') {
@@ -129,10 +129,10 @@ fn numbered_example(name: &str) -> String {
     format!("{stem}-%04d.{extension}")
 }
 
-/// Finds out, before any work is done for it, that `path` can be written.
+/// Checks, before any work is done for it, that `path` can be written.
 ///
 /// # Errors
-/// A missing or unwritable folder, or a folder in the file's place; the message names it.
+/// A missing or unwritable folder, or a folder in place of the file; the message names it.
 pub(crate) fn check_writable(path: &Path) -> Result<(), CommandError> {
     let refuse = |problem: String| Err(CommandError::WrongInput(format!("{}: {problem}", path.display())));
     if path.is_dir() {
@@ -145,7 +145,7 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), CommandError> {
     if !folder.is_dir() {
         return refuse(format!("there is no folder {}; create it first", folder.display()));
     }
-    // Permission bits do not tell (read-only mounts, access lists): only writing does.
+    // Permission bits do not suffice (read-only mounts, access lists): only writing is a proof.
     let probe = folder.join(format!(".rayfarm-{}.tmp", std::process::id()));
     match std::fs::OpenOptions::new().write(true).create_new(true).open(&probe) {
         Ok(_) => std::fs::remove_file(&probe).or_else(|error| refuse(error.to_string())),
@@ -153,7 +153,7 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), CommandError> {
     }
 }
 
-/// Encodes and writes frames on blocking threads while the next ones are rendered; at most [`MAX_PENDING`] wait.
+/// Writer of frames: encodes and writes on blocking threads, at most [`MAX_PENDING`] frames at a time.
 #[derive(Debug)]
 pub(crate) struct FrameWriter {
     pattern: OutputPattern,
@@ -162,15 +162,15 @@ pub(crate) struct FrameWriter {
 }
 
 impl FrameWriter {
-    /// A writer that has written nothing yet.
+    /// A writer before its first frame.
     pub(crate) fn new(pattern: OutputPattern) -> Self {
         Self { pattern, pending: VecDeque::new(), written: 0 }
     }
 
-    /// Waits until another frame can be taken. Safe to drop half-way, as `select!` does.
+    /// Waits until another frame can be accepted. Cancel safe.
     ///
     /// # Errors
-    /// What went wrong with an earlier frame.
+    /// The failure of an earlier frame.
     pub(crate) async fn ready(&mut self) -> Result<(), CommandError> {
         while self.pending.len() >= MAX_PENDING {
             self.finish_one().await?;
@@ -178,8 +178,8 @@ impl FrameWriter {
         Ok(())
     }
 
-    /// Takes frame `index`, and its `picture` if there is a file for it; at most one for each time that the writer was
-    /// ready. What the picture still needs is done beside the rendering.
+    /// Accepts frame `index`, and calls `picture` if it has a file. At most one call per completion of
+    /// [`FrameWriter::ready`]. The function that `picture` returns runs on a blocking thread.
     pub(crate) fn write<P>(&mut self, index: u64, picture: impl FnOnce() -> P)
     where
         P: FnOnce() -> Result<RgbImage, image::ImageError> + Send + 'static,
@@ -189,10 +189,10 @@ impl FrameWriter {
         self.pending.push_back(tokio::task::spawn_blocking(move || image::save(&path, &picture()?)));
     }
 
-    /// Waits until everything taken is on the disk.
+    /// Waits until all accepted frames are on the disk.
     ///
     /// # Errors
-    /// What went wrong first; the other frames are still written.
+    /// The first failure; the other frames are written all the same.
     pub(crate) async fn finish(&mut self) -> Result<(), CommandError> {
         let mut result = Ok(());
         while !self.pending.is_empty() {
@@ -202,12 +202,12 @@ impl FrameWriter {
         result
     }
 
-    /// Whether frames go to files at all.
+    /// Whether frames have files.
     pub(crate) fn has_files(&self) -> bool {
         self.pattern != OutputPattern::None
     }
 
-    /// Frames that are on the disk, whole.
+    /// Number of frames that are completely on the disk.
     pub(crate) fn written(&self) -> u64 {
         self.written
     }
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn none_is_no_file() {
+    fn none_has_no_file() {
         for frames in [1, 7] {
             assert_eq!(parse("none", frames).unwrap().path(0), None);
         }
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_numbered_name_is_numbered_for_one_frame_too() {
+    fn a_numbered_name_of_one_frame_has_a_number_too() {
         assert_eq!(parse("f%03d.png", 1).unwrap().path(0).as_deref(), Some(Path::new("f000.png")));
     }
 
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn unreadable_names_are_refused() {
+    fn invalid_names_are_refused() {
         for (name, hint) in [
             ("picture", ".png or .ppm"),
             ("picture.jpg", ".png or .ppm"),
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_cannot_be_written_are_found_first() {
+    fn unwritable_paths_are_found_before_rendering() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, b"x").unwrap();
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_failed_write_is_told_and_not_counted() {
+    async fn a_failed_write_is_an_error_and_not_counted() {
         let folder = tempfile::tempdir().unwrap();
         let pattern = OutputPattern::parse(&folder.path().join("gone/f%d.ppm"), 2).unwrap();
         let mut writer = FrameWriter::new(pattern);

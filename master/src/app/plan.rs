@@ -1,4 +1,4 @@
-//! Which frames of a run are rendered: all, or those that are not on the disk yet.
+//! Plan of a run: the frames to render, all or those without a file.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,24 +6,24 @@ use std::sync::{Mutex, PoisonError};
 
 use rayfarm_tracer::image;
 
-use crate::app::error::CommandError;
 use crate::app::output::OutputPattern;
+use crate::error::CommandError;
 
-/// Files that are looked into at a time.
+/// Largest number of files that are read at a time.
 const MAX_READERS: usize = 8;
-/// Damaged files that are named one by one.
+/// Largest number of damaged files that are named one by one.
 const MAX_NAMED: usize = 5;
-/// The end of every PNG file: an empty chunk IEND, and its checksum.
+/// Last bytes of every PNG file: an empty chunk IEND, and its checksum.
 const PNG_END: [u8; 12] = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xae, 0x42, 0x60, 0x82];
 
-/// What becomes of files that exist.
+/// Treatment of existing files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Existing {
-    /// They are rendered again.
+    /// Frames are rendered again.
     Replace,
-    /// They stay as they are, whatever they hold.
+    /// Files are kept without being read.
     Skip,
-    /// Those that are whole pictures of the size `width` x `height` stay.
+    /// Complete pictures of the size `width` x `height` are kept.
     Resume {
         /// Pixels per row.
         width: u32,
@@ -32,20 +32,20 @@ pub(crate) enum Existing {
     },
 }
 
-/// The frames of a run that are rendered.
+/// Frames of a run to render.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Plan {
-    /// Their numbers, from the whole camera path's first, 0; ascending.
+    /// Numbers of the frames in the camera path, from 0; ascending.
     pub(crate) frames: Vec<u64>,
-    /// Frames whose files stay.
+    /// Number of frames whose files are kept.
     pub(crate) skipped: u64,
 }
 
 impl Plan {
-    /// Of the frames `first..end` of a path.
+    /// Plan for the frames `first..end` of a camera path.
     ///
     /// # Errors
-    /// A first frame beyond the end; a file in the place of a frame that is of another size, or is no regular file.
+    /// A first frame beyond the end; an existing file with a picture of another size, or that is not a regular file.
     pub(crate) fn new(
         first: u64,
         end: u64,
@@ -61,33 +61,31 @@ impl Plan {
         }
         if existing != Existing::Replace && pattern.path(first).is_none() {
             return Err(CommandError::WrongInput(
-                "--resume and --skip-existing look at files, and -o none writes none; leave them out"
+                "--resume and --skip-existing depend on files, and -o none writes none; leave them out"
                     .to_owned(),
             ));
         }
         let all = first..end;
         let Existing::Resume { width, height } = existing else {
-            let stays = |frame: &u64| {
+            let is_kept = |frame: &u64| {
                 existing == Existing::Skip
                     && pattern.path(*frame).is_some_and(|path| path.symlink_metadata().is_ok())
             };
-            let frames: Vec<u64> = all.filter(|frame| !stays(frame)).collect();
+            let frames: Vec<u64> = all.filter(|frame| !is_kept(frame)).collect();
             return Ok(Self { skipped: end - first - frames.len() as u64, frames });
         };
-        let there: Vec<(u64, PathBuf)> = all
+        let existing: Vec<(u64, PathBuf)> = all
             .clone()
             .filter_map(|frame| Some((frame, pattern.path(frame)?)))
             .filter(|(_, path)| path.symlink_metadata().is_ok())
             .collect();
-        let kept = whole_ones(&there, width, height)?;
+        let kept = complete_files(&existing, width, height)?;
         let mut kept = kept.into_iter().peekable();
         let frames: Vec<u64> = all.filter(|frame| kept.next_if_eq(frame).is_none()).collect();
         Ok(Self { skipped: end - first - frames.len() as u64, frames })
     }
-}
 
-impl Plan {
-    /// Of an interrupted or finished run: what was there before it, for people.
+    /// Text about the files that existed before the run.
     pub(crate) fn already(&self) -> String {
         match self.skipped {
             0 => String::new(),
@@ -97,14 +95,14 @@ impl Plan {
     }
 }
 
-/// The frames whose files are whole pictures, ascending. Reads them on several threads.
-fn whole_ones(files: &[(u64, PathBuf)], width: u32, height: u32) -> Result<Vec<u64>, CommandError> {
+/// Numbers of the frames whose files are complete pictures, ascending. Reads files on several threads.
+fn complete_files(files: &[(u64, PathBuf)], width: u32, height: u32) -> Result<Vec<u64>, CommandError> {
     if files.len() > 1 {
-        tracing::info!("looking at {} pictures that are there already", files.len());
+        tracing::info!("checking {} existing pictures", files.len());
     }
     let next = AtomicUsize::new(0);
     let found = Mutex::new(Vec::with_capacity(files.len()));
-    let look = || {
+    let check = || {
         while let Some((frame, path)) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
             let state = state_of(path, width, height);
             found.lock().unwrap_or_else(PoisonError::into_inner).push((*frame, path, state));
@@ -113,16 +111,16 @@ fn whole_ones(files: &[(u64, PathBuf)], width: u32, height: u32) -> Result<Vec<u
     let readers = std::thread::available_parallelism().map_or(1, usize::from).min(MAX_READERS);
     std::thread::scope(|scope| {
         for _ in 1..readers {
-            scope.spawn(look);
+            scope.spawn(check);
         }
-        look();
+        check();
     });
     let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
     found.sort_unstable_by_key(|(frame, ..)| *frame);
     let (mut kept, mut damaged) = (Vec::new(), 0);
     for (frame, path, state) in found {
         match state? {
-            State::Whole => kept.push(frame),
+            State::Complete => kept.push(frame),
             State::Damaged(problem) => {
                 damaged += 1;
                 if damaged <= MAX_NAMED {
@@ -137,11 +135,11 @@ fn whole_ones(files: &[(u64, PathBuf)], width: u32, height: u32) -> Result<Vec<u
     Ok(kept)
 }
 
-/// What a file in the place of a frame is.
+/// State of an existing file.
 #[derive(Debug, PartialEq, Eq)]
 enum State {
-    Whole,
-    /// Why it is no whole picture.
+    Complete,
+    /// Reason for which it is not a complete picture.
     Damaged(String),
 }
 
@@ -149,8 +147,8 @@ fn state_of(path: &Path, width: u32, height: u32) -> Result<State, CommandError>
     let refuse = |problem: String| Err(CommandError::WrongInput(format!("{}: {problem}", path.display())));
     match path.metadata() {
         Ok(metadata) if metadata.is_file() => {}
-        Ok(_) => return refuse("is no regular file; remove it, or write the frames elsewhere".to_owned()),
-        Err(error) => return Ok(State::Damaged(format!("cannot be looked at: {error}"))),
+        Ok(_) => return refuse("is not a regular file; remove it, or write the frames elsewhere".to_owned()),
+        Err(error) => return Ok(State::Damaged(format!("cannot be read: {error}"))),
     }
     match image::size(path) {
         Ok(size) if size == (width, height) => {}
@@ -161,19 +159,19 @@ fn state_of(path: &Path, width: u32, height: u32) -> Result<State, CommandError>
             ));
         }
         Err(image::ImageError::Read { source, .. }) => return refuse(format!("cannot be read: {source}")),
-        Err(error) => return Ok(State::Damaged(format!("is no whole picture ({error})"))),
+        Err(error) => return Ok(State::Damaged(format!("is not a complete picture ({error})"))),
     }
     match image::load(path) {
-        Err(error) => Ok(State::Damaged(format!("is no whole picture ({error})"))),
-        Ok(_) if !has_its_end(path) => {
-            Ok(State::Damaged("is no whole picture: its end is missing".to_owned()))
+        Err(error) => Ok(State::Damaged(format!("is not a complete picture ({error})"))),
+        Ok(_) if !has_end(path) => {
+            Ok(State::Damaged("is not a complete picture: its end is missing".to_owned()))
         }
-        Ok(_) => Ok(State::Whole),
+        Ok(_) => Ok(State::Complete),
     }
 }
 
-/// A PNG may lack its end and still decode; a PPM that lacks anything does not.
-fn has_its_end(path: &Path) -> bool {
+/// Whether a decodable picture has its last bytes. A PNG without its end may decode; a truncated PPM does not.
+fn has_end(path: &Path) -> bool {
     use std::io::{Read, Seek, SeekFrom};
     if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return true;
@@ -214,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn only_whole_pictures_are_kept() {
+    fn only_complete_pictures_are_kept() {
         for extension in ["png", "ppm"] {
             let folder = tempfile::tempdir().unwrap();
             let pattern = sequence(folder.path(), extension);
@@ -250,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn another_size_is_refused_and_so_is_what_is_no_file() {
+    fn pictures_of_another_size_and_folders_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let pattern = sequence(folder.path(), "png");
         save(&pattern.path(1).unwrap(), &picture(5)).unwrap();
@@ -261,11 +259,11 @@ mod tests {
         std::fs::remove_file(pattern.path(1).unwrap()).unwrap();
         std::fs::create_dir(pattern.path(2).unwrap()).unwrap();
         let problem = Plan::new(0, 3, SIZE, &pattern).unwrap_err().to_string();
-        assert!(problem.contains("f02.png") && problem.contains("no regular file"), "{problem}");
+        assert!(problem.contains("f02.png") && problem.contains("not a regular file"), "{problem}");
     }
 
     #[test]
-    fn without_files_nothing_can_be_kept() {
+    fn without_files_no_frame_can_be_kept() {
         for existing in [Existing::Skip, SIZE] {
             let problem = Plan::new(0, 3, existing, &OutputPattern::None).unwrap_err().to_string();
             assert!(problem.contains("-o none"), "{problem}");

@@ -1,26 +1,23 @@
-//! How far a `render` run is: a bar where standard error is a terminal, a line now and then where it is not.
+//! Progress of a `render` run: a bar where standard error is a terminal, a line of the log now and then where it is not.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::net::SocketAddr;
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::addresses::Reachable;
 use crate::farm::FarmStatus;
+use crate::log_bar::{show_below_log, show_nothing_below_log};
 use crate::pace::spoken;
 
-/// Between two lines where there is no terminal.
+/// Interval of the lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
-/// How long no worker may be there before that is told, where a local one needs a moment to start, and told again.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Time without any worker before the first warning, where a local one needs a moment to start, and before each further one.
+const STARTUP_TIME: Duration = Duration::from_secs(3);
 const REMIND_EVERY: Duration = Duration::from_secs(30);
 
-/// The bar on the terminal, if there is one: log lines are written above it.
-static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
-
-/// The progress of one run.
+/// Progress of one run.
 pub(crate) struct Progress {
     bar: ProgressBar,
     frames: u64,
@@ -36,7 +33,7 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Of a run of `frames` frames, rendered by workers that connect to `address`.
+    /// Progress of a run of `frames` frames, rendered by workers that connect to `address`.
     pub(crate) fn new(frames: u64, address: SocketAddr, local_workers: u32) -> Self {
         let quiet = !tracing::enabled!(tracing::Level::INFO);
         let target = match io::stderr().is_terminal() && !quiet {
@@ -44,7 +41,7 @@ impl Progress {
             false => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target(Some(frames), target).with_style(style());
-        stand_below_the_log(&bar);
+        show_below_log(&bar);
         let now = Instant::now();
         Self {
             bar,
@@ -55,19 +52,19 @@ impl Progress {
             address,
             local_workers,
             alone_since: None,
-            next_reminder: patience(local_workers),
+            next_reminder: startup_time(local_workers),
             last_line: now,
             quiet,
         }
     }
 
-    /// `done` frames are complete, the last ones at this rate.
+    /// Records that `done` frames are complete, at the current rate of `fps`.
     pub(crate) fn completed(&mut self, done: u64, fps: f64) {
         (self.done, self.fps) = (done, fps);
         self.bar.set_position(done);
     }
 
-    /// Shows what the farm is doing; several times a second.
+    /// Shows the state of the farm. To be called several times a second.
     pub(crate) fn update(&mut self, status: &FarmStatus) {
         self.left = status.totals.left;
         let left = self.left.map_or(String::new(), |left| format!("{} left, ", spoken(left)));
@@ -79,24 +76,24 @@ impl Progress {
         }
     }
 
-    /// The run is over.
+    /// Removes the bar and logs the summary of the run.
     pub(crate) fn finish(&mut self, summary: &str) {
         self.bar.finish_and_clear();
-        nothing_below_the_log();
+        show_nothing_below_log();
         tracing::info!("{summary}");
     }
 
     fn remind_of_workers(&mut self, alone: bool) {
         if !alone {
             self.alone_since = None;
-            self.next_reminder = patience(self.local_workers);
+            self.next_reminder = startup_time(self.local_workers);
             return;
         }
         let since = *self.alone_since.get_or_insert_with(Instant::now);
         if since.elapsed() >= self.next_reminder {
             self.next_reminder += REMIND_EVERY;
-            let whose = if self.local_workers == 0 { "a worker" } else { "this machine's worker" };
-            tracing::warn!("waiting for {whose}; {}", Reachable::of(self.address).for_log());
+            let worker = if self.local_workers == 0 { "a worker" } else { "this machine's worker" };
+            tracing::warn!("waiting for {worker}; {}", Reachable::of(self.address).for_log());
         }
     }
 
@@ -106,8 +103,8 @@ impl Progress {
     }
 }
 
-fn patience(local_workers: u32) -> Duration {
-    if local_workers == 0 { Duration::ZERO } else { PATIENCE }
+fn startup_time(local_workers: u32) -> Duration {
+    if local_workers == 0 { Duration::ZERO } else { STARTUP_TIME }
 }
 
 fn style() -> ProgressStyle {
@@ -130,34 +127,4 @@ fn message(status: &FarmStatus, fps: f64) -> String {
     }
     let percent = 100.0 * f64::from(status.rows_done) / f64::from(status.rows.max(1));
     format!("{fps:.2} FPS, {workers}, frame {percent:.0} %")
-}
-
-/// From now on, log lines are written above this bar, where it is to be seen at all.
-pub(crate) fn stand_below_the_log(bar: &ProgressBar) {
-    if !bar.is_hidden() {
-        *BAR.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
-    }
-}
-
-/// The bar is gone.
-pub(crate) fn nothing_below_the_log() {
-    *BAR.lock().unwrap_or_else(PoisonError::into_inner) = None;
-}
-
-/// Standard error, below which a progress bar may stand: what is written appears above the bar.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct AboveTheBar;
-
-impl Write for AboveTheBar {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let bar = BAR.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        match bar {
-            Some(bar) => bar.suspend(|| io::stderr().write(bytes)),
-            None => io::stderr().write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        io::stderr().flush()
-    }
 }

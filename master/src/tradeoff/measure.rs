@@ -9,9 +9,9 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame};
 
 use super::setting::Setting;
 use super::table::Row;
-use crate::app::error::CommandError;
-use crate::app::reports::{percentile, round_to_us};
+use crate::error::CommandError;
 use crate::in_process::trace;
+use crate::quantile::{percentile, round_to_us};
 
 /// Where pictures are taken: a scene, what is seen of it, and who renders.
 pub(crate) struct Studio<'a> {

@@ -2,6 +2,7 @@
 //! reference ([`measure`]), whether the reference is right ([`oracle`]), which of them are worth having ([`pareto`]), and a table of it
 //! that can be read back ([`table`]). [`report`] shows it to people.
 
+pub(crate) mod ladder;
 pub(crate) mod measure;
 pub(crate) mod oracle;
 pub(crate) mod pareto;

@@ -99,10 +99,10 @@ pub(super) struct Channels {
 }
 
 impl Channels {
-    /// Both ends, for a farm whose workers connect to `address`.
-    pub(super) fn new(address: SocketAddr) -> (Self, ViewerHandle) {
+    /// Both ends, for a farm of this status whose workers connect to `address`.
+    pub(super) fn new(address: SocketAddr, status: FarmStatus) -> (Self, ViewerHandle) {
         let (frames, frames_out) = watch::channel(None);
-        let (status, status_out) = watch::channel(Arc::default());
+        let (status, status_out) = watch::channel(Arc::new(status));
         let (stats, stats_out) = watch::channel(Arc::default());
         let (input_in, input) = mpsc::channel(MAX_WAITING_ACTIONS);
         let handle = ViewerHandle {
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     fn channels() -> (Channels, ViewerHandle) {
-        Channels::new(SocketAddr::from(([127, 0, 0, 1], 9)))
+        Channels::new(SocketAddr::from(([127, 0, 0, 1], 9)), FarmStatus::default())
     }
 
     #[test]

@@ -39,7 +39,7 @@ fn wrong_use_leaves_no_file() {
         ("render small.toml", "--output"),
         ("render small.toml -o .", ".png or .ppm"),
         ("render small.toml -o a.png --fps-log missing/log.csv", "missing/log.csv"),
-        ("--size 5x5 render small.toml -o a.png", "stands before render"),
+        ("--size 5x5 render small.toml -o a.png", "precedes render"),
     ] {
         let outcome = run(&scenes, args).expect_failure(2, &[word]);
         assert_eq!(outcome.stdout, "", "{args}");

@@ -74,7 +74,7 @@ fn resume_renders_what_is_missing_or_damaged_and_nothing_else() {
     let report = json(&outcome);
     assert_eq!((&report["frames"], &report["skipped"]), (&4.into(), &4.into()));
     for damaged in ["f-3.png", "f-6.png"] {
-        assert!(outcome.stderr.contains(&format!("{damaged}: is no whole picture")), "{outcome:?}");
+        assert!(outcome.stderr.contains(&format!("{damaged}: is not a complete picture")), "{outcome:?}");
     }
     assert!(
         outcome.stderr.contains("4 of 4 frames written") && outcome.stderr.contains("4 were there already")

@@ -1,4 +1,4 @@
-//! The options that say who renders.
+//! Options of the farm: workers, and how frames are divided among them.
 
 use std::net::SocketAddr;
 
@@ -7,28 +7,28 @@ use clap::Args;
 use super::values::{listen_address, thread_count, worker_count};
 use crate::farm::{FarmOptions, SegmentPolicy};
 
-/// Who renders.
+/// Workers, and how frames are divided among them.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct FarmArgs {
-    /// Where workers connect, for workers on other machines [default: 127.0.0.1:7117].
+    /// Address at which workers connect, for workers on other machines [default: 127.0.0.1:7117].
     #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address)]
     pub(super) listen: Option<SocketAddr>,
-    /// Worker processes on this machine that the master starts and ends.
+    /// Number of worker processes that the master starts on this machine.
     #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
     pub(super) local_workers: u32,
-    /// Start no worker: wait for others to connect.
+    /// Start no worker: wait for workers to connect.
     #[arg(long, conflicts_with = "local_workers")]
     pub(super) no_local_workers: bool,
-    /// Render threads of each local worker; without it, they share all cores.
+    /// Render threads of each local worker; without it, the workers share all cores.
     #[arg(long, value_name = "N", value_parser = thread_count)]
     pub(super) threads: Option<usize>,
-    /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
+    /// Policy for the size of segments: static:ROWS, smart:ROWS or adaptive.
     #[arg(long, value_name = "POLICY", default_value = "adaptive")]
     pub(super) segment: SegmentPolicy,
-    /// Frames that workers may begin before the one on the way is complete: 1, or 0 for the newest camera.
+    /// Frames that workers may begin before the current one is complete: 1, or 0 for the newest camera.
     #[arg(long, value_name = "0|1", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=1))]
     pub(super) pipeline: u8,
-    /// Have this share of the segments rendered by a second worker too, and send away who sends wrong pixels.
+    /// Render this share of the segments on a second worker too, and ban workers that send wrong pixels.
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
     pub(super) verify: u8,
 }
@@ -39,7 +39,7 @@ impl FarmArgs {
         if self.no_local_workers { 0 } else { self.local_workers }
     }
 
-    /// As the farm wants it.
+    /// Options of the farm.
     pub(crate) fn options(&self) -> FarmOptions {
         FarmOptions {
             listen: self.listen,

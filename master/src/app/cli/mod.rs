@@ -1,8 +1,8 @@
-//! The command line: what may be asked for, and how wrong use is refused.
+//! The command line: commands, options, and messages about wrong use.
 //!
-//! Parsing touches nothing outside the arguments. `view` is the default command, so `rayfarm-master SCENE` opens a
-//! window. The hidden `local-worker` is how the master starts itself again as its own render node; everything after
-//! that word belongs to the worker's own command line.
+//! Parsing has no side effects. `view` is the default command, so `rayfarm-master SCENE` opens a window. The hidden command
+//! `local-worker` turns the process into a worker of a master on this machine; all further words belong to the worker's
+//! command line.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -32,23 +32,23 @@ pub(crate) use quality_control::{ErrorArgs, QualityControlArgs};
 pub(crate) use simulate::{Profile, SimulateArgs};
 pub(crate) use tradeoff::TradeoffArgs;
 
-/// The word that turns the master into a worker.
+/// The command that turns the master into a worker.
 pub(crate) const LOCAL_WORKER: &str = "local-worker";
 
-/// What one command line asks for.
+/// Meaning of one command line.
 #[derive(Debug)]
 pub(crate) enum Invocation {
-    /// Be a render node of a master on this machine; the arguments are the worker's, the first in place of its name.
+    /// A worker of a master on this machine, with the worker's arguments; the first one replaces the program name.
     LocalWorker(Vec<OsString>),
-    /// Do one of the commands.
+    /// A command of the master.
     Command(Box<Command>, LogArgs),
 }
 
 impl Invocation {
-    /// Reads a whole command line, program name first.
+    /// Parses a whole command line, program name first.
     ///
     /// # Errors
-    /// clap's error, which carries the message and the exit status (2; 0 for `--help` and `--version`).
+    /// clap's error, which has the message and the exit status (2; 0 for `--help` and `--version`).
     pub(crate) fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
         let args: Vec<OsString> = args.into_iter().collect();
         if args.get(1).is_some_and(|word| word == LOCAL_WORKER) {
@@ -61,8 +61,8 @@ impl Invocation {
     }
 }
 
-/// The options of the default command are known before a command's name too, but mean nothing to that command:
-/// ignoring them in silence would render something else than was asked for.
+/// Refuses options before the name of a command. clap parses them as options of the default command, so that the named
+/// command would silently ignore them.
 fn refuse_options_before_the_command(matches: &ArgMatches) -> Result<(), clap::Error> {
     let Some(name) = matches.subcommand_name() else { return Ok(()) };
     let mut cli = Cli::command();
@@ -72,7 +72,7 @@ fn refuse_options_before_the_command(matches: &ArgMatches) -> Result<(), clap::E
     };
     let stray = cli.get_arguments().find(given).map(ToString::to_string);
     stray.map_or(Ok(()), |stray| {
-        let message = format!("{stray} stands before {name}; what belongs to {name} follows it");
+        let message = format!("{stray} precedes {name}; options of {name} must follow it");
         Err(cli.error(ErrorKind::ArgumentConflict, message))
     })
 }
@@ -91,33 +91,33 @@ struct Cli {
     log: LogArgs,
 }
 
-/// The commands.
+/// Commands of the master.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show a scene in a window; workers on this machine render it, and others may join.
+    /// Show a scene in a window; workers on this machine render it, and workers on other machines can connect.
     View(ViewArgs),
     /// Render frames to files; needs no display.
     Render(RenderArgs),
-    /// Write a model with its bounding volume hierarchy, ready to load.
+    /// Compile a model with its bounding volume hierarchy, so that it loads fast.
     Compile(CompileArgs),
-    /// Measure the tracer alone, in this one process, without the farm.
+    /// Measure the tracer alone, in one process, without the farm.
     Bench(BenchArgs),
-    /// Run the scheduler with simulated workers, in virtual time: how well it uses them, or what it survives.
+    /// Run the scheduler with simulated workers, in virtual time: measure its efficiency, or test it with faults.
     Simulate(SimulateArgs),
-    /// Draw CSV tables as a plot, as SVG or PNG.
+    /// Plot CSV tables, as SVG or PNG.
     Plot(PlotArgs),
-    /// Tell what a scene asks for, what it does without, and what that means in work, memory and bytes.
+    /// Report the features that a scene uses and those that it does not, with their work, memory and bytes.
     Explain(ExplainArgs),
-    /// Check a scene's numbers: leaks, acne, scale, distance from the origin, levels of SIMD.
+    /// Check the numerics of a scene: leaks, acne, scale, distance from the origin, levels of SIMD.
     CheckNumerics(CheckNumericsArgs),
-    /// Measure what each setting of the tracer costs and how far its picture is from the best one; write table, plot and pictures.
+    /// Measure the time and the error of each setting of the tracer; write a table, plots and pictures.
     Tradeoff(TradeoffArgs),
 }
 
-/// `view`.
+/// Options of `view`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ViewArgs {
-    /// A scene (.toml), or a model (.obj or compiled); without it, the room that comes with rayfarm.
+    /// A scene (.toml), or a model (.obj or compiled); without it, the room from rayfarm's models.
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) models: ModelArgs,
@@ -127,11 +127,11 @@ pub(crate) struct ViewArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) quality_control: QualityControlArgs,
-    /// End after N frames; without it, the window stays until Esc. Frames are rendered although nothing changes.
+    /// End after N frames, which are rendered although nothing changes; without it, the window stays open until Esc.
     #[arg(long, value_name = "N", value_parser = frame_count)]
     pub(crate) frames: Option<u32>,
-    /// Render frame after frame although nothing changes or the window is hidden, to measure rates. Without it, a picture
-    /// at rest is rendered once.
+    /// Render continuously although nothing changes or the window is hidden, to measure rates. Without it, a picture at rest
+    /// is rendered once.
     #[arg(long)]
     pub(crate) continuous: bool,
     /// Write a CSV line per frame.
@@ -141,12 +141,12 @@ pub(crate) struct ViewArgs {
     pub(crate) observability: ObservabilityArgs,
 }
 
-/// `render`.
+/// Options of `render`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct RenderArgs {
     /// A scene (.toml), or a model (.obj or compiled).
     pub(crate) scene: PathBuf,
-    /// The picture to write: .png or .ppm; frame-%04d.png numbers a sequence from 0000; none writes nothing.
+    /// Picture to write: .png or .ppm; frame-%04d.png numbers a sequence from 0000; none writes no file.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
@@ -157,19 +157,19 @@ pub(crate) struct RenderArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) error: ErrorArgs,
-    /// Frames of the whole camera path.
+    /// Number of frames of the whole camera path.
     #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
     pub(crate) frames: u32,
-    /// Begin at frame N of them, counted from 0; each frame is the same picture as in a run of all.
+    /// Begin at frame N, counted from 0; each frame is the same picture as in a run of all frames.
     #[arg(long, value_name = "N", default_value = "0", value_parser = frame_index)]
     pub(crate) first_frame: u32,
-    /// Render the frames whose files are missing, damaged or cut short: go on with a run that was interrupted.
+    /// Render the frames whose files are missing, damaged or truncated: continue an interrupted run.
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Render the frames whose files do not exist; look into none of those that do.
+    /// Render the frames whose files do not exist; existing files are not read.
     #[arg(long, conflicts_with = "resume")]
     pub(crate) skip_existing: bool,
-    /// Begin when N workers are connected, and not before; without it, when the local ones are.
+    /// Begin when N workers are connected; without it, when the local ones are connected.
     #[arg(long, value_name = "N", value_parser = worker_count)]
     pub(crate) wait_for_workers: Option<u32>,
     /// Write a CSV line per frame.
@@ -182,34 +182,34 @@ pub(crate) struct RenderArgs {
     pub(crate) observability: ObservabilityArgs,
 }
 
-/// `compile`.
+/// Options of `compile`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct CompileArgs {
-    /// The model (.obj).
+    /// Model to compile (.obj).
     pub(crate) model: PathBuf,
-    /// The compiled model to write.
+    /// Compiled model to write.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// How much time the hierarchy may take. The picture does not depend on it.
+    /// Quality of the hierarchy: higher quality takes more time to build. Pictures do not depend on it.
     #[arg(long, value_enum, value_name = "QUALITY", default_value_t)]
     pub(crate) quality: Quality,
     #[command(flatten)]
     pub(crate) models: ModelArgs,
 }
 
-/// How well a hierarchy is built.
+/// Quality of a hierarchy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Quality {
-    /// As soon as possible.
+    /// Shortest build.
     Fast,
-    /// Where more time would gain little.
+    /// Best quality before longer builds gain little.
     #[default]
     Default,
-    /// For models that are compiled once and rendered often.
+    /// Best quality, for models that are compiled once and rendered often.
     High,
 }
 
-/// `bench`.
+/// Options of `bench`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct BenchArgs {
     /// A scene (.toml), or a model (.obj or compiled).
@@ -221,7 +221,7 @@ pub(crate) struct BenchArgs {
     pub(crate) threads: Option<usize>,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
-    /// Frames to measure, after one that is not counted.
+    /// Number of frames to measure, after one for warming up.
     #[arg(long, value_name = "N", default_value = "20", value_parser = frame_count)]
     pub(crate) frames: u32,
     /// Print one line of JSON on standard output.
@@ -229,7 +229,7 @@ pub(crate) struct BenchArgs {
     pub(crate) json: bool,
 }
 
-/// `explain`.
+/// Options of `explain`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ExplainArgs {
     /// A scene (.toml), or a model (.obj or compiled).
@@ -249,22 +249,22 @@ pub(crate) struct ExplainArgs {
     pub(crate) json: bool,
 }
 
-/// `check-numerics`.
+/// Options of `check-numerics`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct CheckNumericsArgs {
     /// A scene (.toml), or a model (.obj or compiled); without it, built-in scenes of a plane, spheres and tori.
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) models: ModelArgs,
-    /// Rays to aim at edges and vertices of the models [default: 200000].
+    /// Number of rays aimed at edges and vertices of the models [default: 200000].
     #[arg(long, value_name = "N", value_parser = ray_count)]
     pub(crate) rays: Option<u64>,
-    /// Shoot only this ray of the check for leaks, and tell all that is known of it: the number that a failure names. It is the same
-    /// ray whatever --rays says.
+    /// Trace only this ray of the check for leaks, by the number that a failure names, and report everything about it. The
+    /// number does not depend on --rays.
     #[arg(long, value_name = "N", conflicts_with = "json")]
     pub(crate) ray: Option<u64>,
-    /// Pixels of each picture that the slow tracer in double precision is asked for: 27648 are all of a picture of 4 to 3
-    /// [default: as many as some seconds allow].
+    /// Pixels of each picture to compare with the reference tracer in double precision: 27648 are all pixels at an aspect of 4
+    /// to 3 [default: as many as take some seconds].
     #[arg(long, value_name = "N", value_parser = frame_count)]
     pub(crate) pixels: Option<u32>,
     /// Print a line of JSON for each scene on standard output.
@@ -272,25 +272,25 @@ pub(crate) struct CheckNumericsArgs {
     pub(crate) json: bool,
 }
 
-/// What watches and steers a run.
+/// Options for watching and controlling a run.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ObservabilityArgs {
     /// Write a timeline of what every worker did, for ui.perfetto.dev or chrome://tracing.
     #[arg(long, alias = "trace", value_name = "FILE")]
     pub(crate) timeline: Option<PathBuf>,
-    /// Take commands, one a line: from standard input (-), a port of this machine (127.0.0.1:PORT; its log names the
-    /// token) or a Unix socket (a path with a slash in it). The command help lists them.
+    /// Accept commands, one per line: on standard input (-), at a port of this machine (127.0.0.1:PORT; the log names the
+    /// token) or at a Unix socket (a path with a slash in it). The command help lists them.
     #[arg(long, value_name = "PLACE", value_parser = Place::parse, allow_hyphen_values = true)]
     pub(crate) control: Option<Place>,
 }
 
-/// How much is told on standard error; RUST_LOG wins over both.
+/// Verbosity of the log on standard error. RUST_LOG has priority.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct LogArgs {
-    /// Tell more on standard error.
+    /// Log more on standard error.
     #[arg(short, long, global = true, conflicts_with = "quiet")]
     pub(crate) verbose: bool,
-    /// Tell only of errors on standard error.
+    /// Log only errors on standard error.
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
 }

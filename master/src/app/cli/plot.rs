@@ -1,4 +1,4 @@
-//! The options of `plot`.
+//! Options of `plot`.
 
 use std::path::PathBuf;
 
@@ -6,53 +6,52 @@ use clap::Args;
 
 use super::values::equation;
 
-/// `plot`.
+/// Options of `plot`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PlotArgs {
-    /// Tables (.csv) whose first line names the columns; their rows count as those of one table.
+    /// Tables (.csv) whose first line names the columns; their rows are combined.
     #[arg(required = true, value_name = "CSV")]
     pub(crate) tables: Vec<PathBuf>,
-    /// The plot to write: .svg or .png; give it again for both.
+    /// Plot to write: .svg or .png; repeat the option for both.
     #[arg(short, long, value_name = "FILE", required = true)]
     pub(crate) output: Vec<PathBuf>,
-    /// The column that goes to the right. Rows where it is empty are drawn as a level across the whole plot.
+    /// Column of x. Rows where it is empty are drawn as a horizontal line across the plot.
     #[arg(long, value_name = "COLUMN")]
     pub(crate) x: String,
-    /// The column that goes upwards. Rows of one series with the same x are repeats: their median, least and greatest
-    /// are shown.
+    /// Column of y. Rows of one series with the same x are repeats: median, minimum and maximum are drawn.
     #[arg(long, value_name = "COLUMN")]
     pub(crate) y: String,
-    /// Rows that agree in these columns are one series.
+    /// Columns whose values distinguish the series.
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub(crate) series: Vec<String>,
-    /// The column whose text stands beside each point.
+    /// Column with a label for each point.
     #[arg(long, value_name = "COLUMN")]
     pub(crate) label: Option<String>,
-    /// Only rows where that column has that text.
+    /// Use only rows in which this column has this text.
     #[arg(long = "where", value_name = "COLUMN=TEXT", value_parser = equation)]
     pub(crate) only: Vec<(String, String)>,
-    /// Points without lines between them; each row is one.
+    /// Draw each row as a point, without lines.
     #[arg(long)]
     pub(crate) scatter: bool,
-    /// A series, by its name in the legend, that is only there to compare with.
+    /// Draw a series dashed, by its name in the legend, as a baseline.
     #[arg(long, value_name = "SERIES")]
     pub(crate) dashed: Vec<String>,
-    /// What stands above.
+    /// Title above the plot.
     #[arg(long, value_name = "TEXT", default_value = "")]
     pub(crate) title: String,
-    /// What x is; without it, the column's name.
+    /// Label of x; without it, the name of the column.
     #[arg(long, value_name = "TEXT")]
     pub(crate) x_label: Option<String>,
-    /// What y is; without it, the column's name.
+    /// Label of y; without it, the name of the column.
     #[arg(long, value_name = "TEXT")]
     pub(crate) y_label: Option<String>,
-    /// Equal distances to the right are equal ratios.
+    /// Logarithmic x.
     #[arg(long)]
     pub(crate) log_x: bool,
-    /// Equal distances upwards are equal ratios.
+    /// Logarithmic y.
     #[arg(long)]
     pub(crate) log_y: bool,
-    /// Upwards from zero, however far the values are from it.
+    /// Begin y at zero.
     #[arg(long, conflicts_with = "log_y")]
     pub(crate) from_zero: bool,
 }

@@ -1,4 +1,4 @@
-//! The options of `simulate`.
+//! Options of `simulate`.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use super::values::{Size, frame_count, size};
 use crate::farm::SegmentPolicy;
 use crate::simulator::{PassingSetup, Setup};
 
-/// Workers that are simulated at most.
+/// Largest number of simulated workers.
 const MAX_WORKERS: i64 = 4096;
 
-/// `simulate`.
+/// Options of `simulate`.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct SimulateArgs {
-    /// Simulated workers.
+    /// Number of simulated workers.
     #[arg(long, value_name = "N", default_value = "8", value_parser = clap::value_parser!(u32).range(1..=MAX_WORKERS))]
     workers: u32,
     /// Measure for each of these numbers of workers, such as 1,2,4,8.
@@ -24,83 +24,82 @@ pub(crate) struct SimulateArgs {
     /// Render threads of each worker.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=256))]
     threads: u32,
-    /// How frames are cut: static:ROWS, smart:ROWS or adaptive.
+    /// Policy for the size of segments: static:ROWS, smart:ROWS or adaptive.
     #[arg(long, alias = "policy", value_name = "POLICY", default_value = "adaptive")]
     segment: SegmentPolicy,
-    /// Frames that workers may begin before the one on the way is complete.
+    /// Frames that workers may begin before the current one is complete.
     #[arg(long, value_name = "0|1", default_value = "1", value_parser = clap::value_parser!(u8).range(0..=1))]
     pipeline: u8,
-    /// Frames to measure, after some that are not counted.
+    /// Number of frames to measure, after some for warming up.
     #[arg(long, value_name = "N", default_value = "30", value_parser = frame_count)]
     frames: u32,
     /// Picture size in pixels.
     #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = size)]
     size: Size,
-    /// What rows cost.
+    /// Costs of rows.
     #[arg(long, value_enum, value_name = "PROFILE", default_value_t)]
     pub(crate) costs: Profile,
-    /// A file with a number per row, top to bottom, in place of a profile.
+    /// File with the cost of each row, top to bottom, in place of a profile.
     #[arg(long, value_name = "FILE", conflicts_with = "costs")]
     pub(crate) rows: Option<PathBuf>,
-    /// What a frame takes an average worker, in milliseconds.
+    /// Time of a frame on an average worker, in milliseconds.
     #[arg(long, value_name = "MS", default_value = "1000", value_parser = positive)]
     work: f64,
-    /// The fastest worker's speed over the slowest one's.
+    /// Speed of the fastest worker as a multiple of the slowest one's.
     #[arg(long, value_name = "RATIO", default_value = "4", value_parser = positive)]
     speeds: f64,
-    /// Rows that are traced together: a tile's height. Frames of a second have so many samples a pixel that it is 1; frames
-    /// with one sample have 16.
+    /// Height of a tile, in rows: 16 with one sample per pixel, 1 with as many samples as make a frame take a second.
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=16))]
     tile_rows: u32,
-    /// What a tile's height of rows costs however few of them are traced, as a share: 0.38 was measured.
+    /// Part of the cost of a row of tiles that does not depend on the number of rows traced; 0.38 was measured.
     #[arg(long, value_name = "SHARE", default_value = "0.38", value_parser = share)]
     tile_share: f64,
-    /// Bits a second of every link.
+    /// Bits per second of each link.
     #[arg(long, value_name = "BITS", default_value = "1e9", value_parser = positive)]
     link: f64,
-    /// Raw pixel bytes over bytes on the wire.
+    /// Ratio of raw pixel bytes to bytes on the wire.
     #[arg(long, value_name = "RATIO", default_value = "9", value_parser = positive)]
     compression: f64,
-    /// Round trip, in milliseconds.
+    /// Round-trip time, in milliseconds.
     #[arg(long, value_name = "MS", default_value = "0.2", value_parser = positive)]
     rtt: f64,
-    /// Requests a second of a moving camera; 0 asks for the next frame when one is complete.
+    /// Requests per second of a moving camera; with 0, each frame is requested when the previous one is complete.
     #[arg(long, value_name = "N", default_value = "0", value_parser = rate)]
     input: f64,
-    /// Render this share of the segments twice, in per cent, and compare.
+    /// Share of the segments to render twice and compare, in per cent.
     #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=100))]
     verify: u8,
-    /// What everything random follows from.
+    /// Seed of all random numbers.
     #[arg(long, value_name = "N", default_value = "1")]
     pub(crate) seed: u64,
-    /// Send an asset of so many megabytes to all workers instead: from the master alone, and passed on.
+    /// Simulate the transfer of an asset of this many megabytes to all workers instead: from the master alone, and passed on.
     #[arg(long, value_name = "MB", conflicts_with = "faults", value_parser = megabytes)]
     asset: Option<f64>,
-    /// Live through fault schedules instead, from --seed on: each chooses everything but the seed itself.
+    /// Run fault schedules instead, from --seed on: each seed determines all other parameters.
     #[arg(long)]
     pub(crate) faults: bool,
-    /// How many fault schedules.
+    /// Number of fault schedules.
     #[arg(long, value_name = "N", default_value = "1", requires = "faults")]
     pub(crate) schedules: u64,
-    /// Print one line of JSON for each measurement.
+    /// Print a line of JSON for each measurement.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Named costs of rows.
+/// Profile of the costs of rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Profile {
-    /// All the same.
+    /// Equal costs.
     Flat,
-    /// A scanned bust on a ground, as measured.
+    /// Measured costs of a scanned bust on a plane.
     #[default]
     Bust,
-    /// Nearly all in one corner, which moves from frame to frame.
+    /// Nearly all costs in one corner, which moves from frame to frame.
     Corner,
 }
 
 impl SimulateArgs {
-    /// The asset to send, from the master alone and passed on, for each number of workers.
+    /// Setups for the transfer of the asset, from the master alone and passed on, for each number of workers.
     pub(crate) fn assets(&self) -> Vec<[PassingSetup; 2]> {
         let Some(megabytes) = self.asset else { return Vec::new() };
         let setup = |workers, pass_on| PassingSetup {
@@ -120,7 +119,7 @@ impl SimulateArgs {
         if self.sweep.is_empty() { vec![self.workers] } else { self.sweep.clone() }
     }
 
-    /// What to measure, but for the costs of rows: one setup for each number of workers.
+    /// Setups to measure, without the costs of rows, for each number of workers.
     pub(crate) fn setups(&self) -> Vec<Setup> {
         let setup = Setup {
             threads: self.threads,

@@ -50,7 +50,7 @@ fn view_is_the_default_command() {
 }
 
 #[test]
-fn what_is_not_said_is_as_documented() {
+fn defaults_are_as_documented() {
     let args = render("rayfarm-master render a.toml -o b.png");
     assert_eq!((args.scene, args.output), ("a.toml".into(), "b.png".into()));
     assert_eq!((args.frames, args.json, args.fps_log), (1, false, None));
@@ -62,7 +62,7 @@ fn what_is_not_said_is_as_documented() {
 }
 
 #[test]
-fn every_common_option_is_read() {
+fn every_common_option_is_parsed() {
     let args = render(
         "rayfarm-master render --listen 0.0.0.0:7117 --local-workers 3 --threads 2 --size 1024x768 --samples 9 \
          --segment smart:24 --frames 100 --orbit -90.5 --spin 2 --fps-log log.csv --json -o f%04d.ppm a.obj",
@@ -77,7 +77,7 @@ fn every_common_option_is_read() {
 }
 
 #[test]
-fn every_command_that_reads_a_scene_takes_how_its_models_are_read() {
+fn every_command_that_reads_a_scene_has_the_options_of_models() {
     let options = "--up z --crease-angle 25.5 --allow-parent-textures";
     let all = [
         view(&format!("rayfarm-master {options} a.obj")).models,
@@ -114,7 +114,7 @@ fn every_command_that_reads_a_scene_takes_how_its_models_are_read() {
 }
 
 #[test]
-fn the_other_commands_are_read() {
+fn the_other_commands_are_parsed() {
     match command("rayfarm-master compile bust.obj -o bust.rfm") {
         Command::Compile(args) => {
             assert_eq!((args.model, args.output), ("bust.obj".into(), "bust.rfm".into()));
@@ -155,7 +155,7 @@ fn the_last_of_two_equal_options_counts() {
 }
 
 #[test]
-fn no_local_workers_is_none() {
+fn no_local_workers_means_zero() {
     assert_eq!(view("rayfarm-master --no-local-workers").farm.local_workers(), 0);
     assert_eq!(view("rayfarm-master --local-workers 0").farm.local_workers(), 0);
 }
@@ -202,8 +202,8 @@ fn wrong_use_is_status_2_and_says_what_was_expected() {
         ("rayfarm-master check-numerics --ray 1 --json", "cannot be used with"),
         ("rayfarm-master view --json", "--json"),
         ("rayfarm-master -v -q", "cannot be used with"),
-        ("rayfarm-master --size 5x5 render a.toml -o b.png", "--size <WxH> stands before render"),
-        ("rayfarm-master a.toml render b.toml -o b.png", "[SCENE] stands before render"),
+        ("rayfarm-master --size 5x5 render a.toml -o b.png", "--size <WxH> precedes render"),
+        ("rayfarm-master a.toml render b.toml -o b.png", "[SCENE] precedes render"),
     ] {
         let message = refused(line);
         assert!(message.contains(hint), "{line}: {message}");
@@ -211,7 +211,7 @@ fn wrong_use_is_status_2_and_says_what_was_expected() {
 }
 
 #[test]
-fn log_options_stand_before_or_after_the_command() {
+fn log_options_precede_or_follow_the_command() {
     for line in
         ["rayfarm-master render a.toml -o b.png -v", "rayfarm-master -v a.toml", "rayfarm-master view -v"]
     {
@@ -230,12 +230,12 @@ fn help_and_version_are_no_errors() {
 }
 
 #[test]
-fn the_definition_itself_is_sound() {
+fn clap_accepts_the_definition() {
     Cli::command().debug_assert();
 }
 
 #[test]
-fn a_run_is_watched_and_steered() {
+fn a_run_has_a_timeline_and_control() {
     let observability =
         render("rayfarm-master render a.toml -o a.png --trace t.json --control -").observability;
     assert_eq!(observability.timeline, Some("t.json".into()));
@@ -246,7 +246,7 @@ fn a_run_is_watched_and_steered() {
 }
 
 #[test]
-fn knobs_are_read_and_win_over_the_scene() {
+fn knobs_are_parsed_and_override_the_scene() {
     use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
 
     let all = "--adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4 --dither";

@@ -1,4 +1,4 @@
-//! The values of options: each parser says what was expected, so clap's message names option, value and remedy.
+//! Values of options. Each parser returns the expected syntax, so clap's message has option, value and remedy.
 
 use std::net::SocketAddr;
 
@@ -23,7 +23,7 @@ pub(crate) struct Size {
     pub(crate) height: u32,
 }
 
-/// `1024x768`.
+/// A size, such as `1024x768`.
 pub(super) fn size(text: &str) -> Result<Size, String> {
     let expected = || format!("expected WIDTHxHEIGHT, each from 1 to {MAX_SIDE}, such as 1024x768");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
@@ -47,12 +47,12 @@ pub(super) fn frame_count(text: &str) -> Result<u32, String> {
     whole_number(text, 1, MAX_FRAMES)
 }
 
-/// A frame's number, from 0.
+/// A frame number, from 0.
 pub(super) fn frame_index(text: &str) -> Result<u32, String> {
     whole_number(text, 0, MAX_FRAMES)
 }
 
-/// Local workers; zero is none.
+/// A number of workers, from 0.
 pub(super) fn worker_count(text: &str) -> Result<u32, String> {
     whole_number(text, 0, MAX_LOCAL_WORKERS)
 }
@@ -72,10 +72,10 @@ pub(super) fn ray_count(text: &str) -> Result<u64, String> {
     whole_number(text, 1, MAX_RAYS)
 }
 
-/// Frames a second that somebody may want.
+/// Frames per second.
 pub(super) fn frame_rate(text: &str) -> Result<f64, String> {
     let in_range = text.parse().ok().filter(|rate| (MIN_RATE..=MAX_RATE).contains(rate));
-    in_range.ok_or_else(|| format!("expected frames a second from {MIN_RATE} to {MAX_RATE}, such as 60"))
+    in_range.ok_or_else(|| format!("expected frames per second from {MIN_RATE} to {MAX_RATE}, such as 60"))
 }
 
 /// A mean FLIP error.
@@ -98,8 +98,8 @@ pub(super) fn crease_angle(text: &str) -> Result<f64, String> {
     in_range.ok_or_else(|| "expected an angle from 0 to 180 degrees, such as 40".to_owned())
 }
 
-/// `0.0.0.0:7117` or `[fe80::1%eth0]:7117`; names of hosts are not looked up, because the address is one of this machine's
-/// own.
+/// An address to listen at, such as `0.0.0.0:7117` or `[fe80::1%eth0]:7117`. Host names are not resolved, because the address
+/// is one of this machine.
 pub(super) fn listen_address(text: &str) -> Result<SocketAddr, String> {
     address::parse(text)?.ok_or_else(|| {
         "expected ADDR:PORT with an address of this machine in digits: \
@@ -108,7 +108,7 @@ pub(super) fn listen_address(text: &str) -> Result<SocketAddr, String> {
     })
 }
 
-/// `workers=4`.
+/// An equation, such as `workers=4`.
 pub(super) fn equation(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').ok_or("expected COLUMN=TEXT, such as workers=4")?;
     Ok((parts.0.to_owned(), parts.1.to_owned()))

@@ -1,4 +1,4 @@
-//! `bench`: the tracer alone, in this one process: what a farm of one worker could reach if it cost nothing.
+//! `bench`: the tracer alone, in one process: the upper bound of a farm with one worker.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -10,30 +10,31 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
 
 use super::source::{Source, animation};
 use crate::app::cli::BenchArgs;
-use crate::app::error::CommandError;
-use crate::app::reports::{BenchReport, MsPerFrame, print_json, round_to_us};
+use crate::app::reports::{BenchReport, MsPerFrame, print_json};
 use crate::display::numbers::{counted, grouped};
+use crate::error::CommandError;
 use crate::in_process::{all_cores, trace};
+use crate::quantile::round_to_us;
 use crate::viewer::frame_counts::RaysPerFrame;
 use crate::viewer::view_request::ViewRequest;
 
-/// Measures the frames of a scene and tells the figures on standard output.
+/// Measures the frames of a scene and prints the figures on standard output.
 ///
 /// # Errors
 /// A wrong scene.
 pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
     let started = Instant::now();
     let source = Source::load(&args.scene, args.models, args.picture.size)?;
-    let wanted = source.wanted(&args.picture)?;
-    let view = wanted.rendered();
+    let request = source.request(&args.picture)?;
+    let view = request.rendered();
     let scene = Arc::new(source.compiled()?);
     let load = started.elapsed();
     let threads = args.threads.unwrap_or_else(all_cores);
     let animation = animation(&args.picture, args.frames);
 
-    let mut bench = Bench::new(scene, wanted, threads);
+    let mut bench = Bench::new(scene, request, threads);
     bench.frame(&view)?; // warms caches and page tables
-    bench.forget();
+    bench.reset();
     for index in 0..u64::from(args.frames) {
         bench.frame(&animation.view(&view, index))?;
     }
@@ -43,22 +44,21 @@ pub(super) fn run(args: &BenchArgs) -> Result<(), CommandError> {
 
 struct Bench {
     scene: Arc<CompiledScene>,
-    wanted: ViewRequest,
+    request: ViewRequest,
     threads: usize,
-    /// The newest frame, in the size in which it is wanted.
+    /// The newest frame, in the size in which it is delivered.
     picture: RgbImage,
     times: Vec<Duration>,
     rays: RayCounts,
 }
 
 impl Bench {
-    fn new(scene: Arc<CompiledScene>, wanted: ViewRequest, threads: usize) -> Self {
+    fn new(scene: Arc<CompiledScene>, request: ViewRequest, threads: usize) -> Self {
         let picture = RgbImage::new(0, 0);
-        Self { scene, wanted, threads, picture, times: Vec::new(), rays: RayCounts::default() }
+        Self { scene, request, threads, picture, times: Vec::new(), rays: RayCounts::default() }
     }
 
-    /// One frame, with all that belongs to it: preparing it for its camera, tracing it, and enlarging it where it is traced at a
-    /// smaller scale.
+    /// Renders and times one frame: preparation for its camera, tracing, and enlargement where it is traced at a smaller scale.
     fn frame(&mut self, view: &FrameView) -> Result<(), CommandError> {
         let mut picture = std::mem::replace(&mut self.picture, RgbImage::new(0, 0));
         if (picture.width, picture.height) != (view.width, view.height) {
@@ -66,22 +66,21 @@ impl Bench {
         }
         let started = Instant::now();
         let frame = PreparedFrame::new(Arc::clone(&self.scene), view).map_err(CommandError::failed)?;
-        let rays = trace(&frame, &mut picture.pixels, self.threads, &|| false, &|_| ()).map_err(|_| {
-            CommandError::Failed("the tracer stopped although nobody cancelled it".to_owned())
-        })?;
-        self.picture = self.wanted.delivered(picture).map_err(CommandError::failed)?;
+        let rays = trace(&frame, &mut picture.pixels, self.threads, &|| false, &|_| ())
+            .map_err(|_| CommandError::Failed("the tracer stopped without being cancelled".to_owned()))?;
+        self.picture = self.request.delivered(picture).map_err(CommandError::failed)?;
         self.times.push(started.elapsed());
         self.rays += rays;
         Ok(())
     }
 
-    fn forget(&mut self) {
+    fn reset(&mut self) {
         self.times.clear();
         self.rays = RayCounts::default();
     }
 
     fn report(&self, load: Duration) -> BenchReport {
-        let view = &self.wanted.view;
+        let view = &self.request.view;
         let frames = u32::try_from(self.times.len()).unwrap_or(u32::MAX);
         let RayCounts { primary, shadow, secondary, .. } = self.rays;
         let rays = RaysPerFrame { primary, shadow, secondary };
@@ -91,7 +90,7 @@ impl Bench {
             width: view.width,
             height: view.height,
             samples: view.samples,
-            quality: self.wanted.knobs(),
+            quality: self.request.knobs(),
             threads: self.threads,
             triangles: self.scene.triangle_count(),
             load_ms: round_to_us(load),

@@ -1,4 +1,4 @@
-//! `check-numerics`: whether the numbers hold on a scene, as a table. See [`rayfarm_tracer::numerics`] for what is checked.
+//! `check-numerics`: checks of the numerics on a scene, as a table. The checks are in [`rayfarm_tracer::numerics`].
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,15 +9,15 @@ use serde::Serialize;
 
 use super::source::Source;
 use crate::app::cli::{CheckNumericsArgs, ModelArgs};
-use crate::app::error::CommandError;
 use crate::app::reports::print_json;
 use crate::display::numbers::grouped;
+use crate::error::CommandError;
 
-/// What `--json` prints, as one line for each scene.
+/// Report of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct Report {
     scene: String,
-    /// The level that all others were held against.
+    /// SIMD level with which all others are compared.
     simd_level: &'static str,
     holds: bool,
     checks: Vec<Row>,
@@ -28,26 +28,26 @@ struct Report {
 struct Row {
     check: String,
     case: String,
-    /// What is counted: rays, pixels or bytes.
+    /// Unit of the counts: rays, pixels or bytes.
     unit: &'static str,
     tested: u64,
     at_edges: u64,
     wrong: u64,
-    /// The first of `failures`.
+    /// First of `failures`.
     #[serde(skip_serializing_if = "Option::is_none")]
     first_wrong: Option<String>,
-    /// What is wrong, of the first ones a line each.
+    /// A line for each of the first failures.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     failures: Vec<String>,
 }
 
-/// Checks a scene, or the built-in ones, and tells on standard output.
+/// Checks a scene, or the built-in ones, and prints the counts on standard output.
 ///
 /// # Errors
-/// A wrong scene, or one on which something does not hold.
+/// A wrong scene, or one with a failed check.
 pub(super) fn run(args: &CheckNumericsArgs) -> Result<(), CommandError> {
-    let usual = Effort::default();
-    let effort = Effort { rays: args.rays.unwrap_or(usual.rays), pixels: args.pixels, ..usual };
+    let default = Effort::default();
+    let effort = Effort { rays: args.rays.unwrap_or(default.rays), pixels: args.pixels, ..default };
     if let Some(number) = args.ray {
         return replay(args.scene.as_deref(), args.models, &effort, number);
     }
@@ -70,16 +70,16 @@ pub(super) fn run(args: &CheckNumericsArgs) -> Result<(), CommandError> {
     Err(CommandError::Failed(format!("the numbers do not hold: {}", broken.join(", "))))
 }
 
-/// Tells all that is known of one ray of the check for leaks.
+/// Traces one ray of the check for leaks again and prints everything about it.
 fn replay(scene: Option<&Path>, models: ModelArgs, effort: &Effort, number: u64) -> Result<(), CommandError> {
-    let mut told = false;
+    let mut found = false;
     for subject in subjects(scene, models)? {
         if let Some(text) = numerics::replay(&subject, effort, number).map_err(CommandError::wrong_input)? {
             print(&format!("{}, {}: {text}", subject.name, simd_level()))?;
-            told = true;
+            found = true;
         }
     }
-    if told {
+    if found {
         return Ok(());
     }
     let message = "--ray: the scene has no models; rays are aimed at the edges and vertices of models only";
@@ -89,7 +89,7 @@ fn replay(scene: Option<&Path>, models: ModelArgs, effort: &Effort, number: u64)
 fn subjects(scene: Option<&Path>, models: ModelArgs) -> Result<Vec<Subject>, CommandError> {
     let Some(path) = scene else {
         if let Some(option) = models.of_a_model() {
-            return Err(CommandError::WrongInput(format!("{option} is for a model by itself: name one")));
+            return Err(CommandError::WrongInput(format!("{option} is for a bare model: name one")));
         }
         return numerics::built_in().map_err(CommandError::failed);
     };
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wrong_count_is_enough_and_stands_in_the_table() {
+    fn one_wrong_count_fails_the_scene_and_is_in_the_table() {
         let subject = numerics::built_in().unwrap().remove(0);
         let fine = report(&subject, &[outcome(Check::Leaks, 0), outcome(Check::Acne, 0)]);
         assert!(fine.holds && table(&fine).starts_with("a plane, ") && table(&fine).contains(": holds\n"));
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_is_told_of_scenes_with_models_only() {
+    fn single_rays_need_a_scene_with_models() {
         let effort = Effort::default();
         assert!(replay(None, ModelArgs::default(), &effort, 7_001).is_ok());
         let folder = tempfile::tempdir().unwrap();

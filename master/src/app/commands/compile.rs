@@ -1,4 +1,4 @@
-//! `compile`: a model with its bounding volume hierarchy, ready to load.
+//! `compile`: a model with its bounding volume hierarchy, as one file that loads fast.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,11 +9,11 @@ use rayfarm_tracer::mesh::{BuildQuality, CompileOptions};
 use rayfarm_tracer::scene;
 
 use crate::app::cli::{CompileArgs, Quality};
-use crate::app::error::CommandError;
 use crate::app::output::check_writable;
 use crate::display::numbers::counted;
+use crate::error::CommandError;
 
-/// Reads a model, builds its tree and writes both; tells what came of it on standard output.
+/// Reads a model, builds its hierarchy and writes both; prints the counts on standard output.
 ///
 /// # Errors
 /// A wrong model or output; a full disk.
@@ -50,12 +50,12 @@ fn build_quality(quality: Quality) -> BuildQuality {
     }
 }
 
-/// Its source would be gone.
+/// Refuses to overwrite the model by its own compiled form.
 fn refuse_the_model_itself(args: &CompileArgs) -> Result<(), CommandError> {
     let real = |path: &Path| path.canonicalize().ok();
     match (real(&args.model), real(&args.output)) {
         (Some(model), Some(output)) if model == output => Err(CommandError::WrongInput(format!(
-            "{}: is the model itself; give the compiled one another name, as in {}",
+            "{}: is the model itself; choose another name for the compiled one, as in {}",
             args.output.display(),
             args.output.with_extension("rfm").display()
         ))),

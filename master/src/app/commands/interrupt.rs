@@ -1,8 +1,8 @@
-//! Ctrl-C and SIGTERM: the first ends the run in order, the second at once.
+//! Ctrl-C and SIGTERM: the first ends the run in order, the second one at once.
 
 use tokio_util::sync::CancellationToken;
 
-/// Listens from now on; the token is cancelled by the first signal. Call it inside a runtime.
+/// A token that the first signal cancels. Must be called inside a runtime.
 pub(super) fn cancelled_by_signals() -> CancellationToken {
     let interrupted = CancellationToken::new();
     let token = interrupted.clone();
@@ -10,7 +10,7 @@ pub(super) fn cancelled_by_signals() -> CancellationToken {
         signal().await;
         token.cancel();
         signal().await;
-        // Whoever asks twice does not want to wait; local workers see their standard input close and end too.
+        // No orderly end after a second signal: local workers end too, because their standard input is closed.
         std::process::exit(1);
     });
     interrupted
@@ -33,7 +33,7 @@ async fn signal() {
     interrupt().await;
 }
 
-/// Waits for Ctrl-C; where it cannot be listened for, for ever: the system's own handling ends the process then.
+/// Waits for Ctrl-C; for ever where there is no handler, because the system's default handling then ends the process.
 async fn interrupt() {
     if tokio::signal::ctrl_c().await.is_err() {
         std::future::pending::<()>().await;

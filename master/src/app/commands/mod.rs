@@ -1,4 +1,4 @@
-//! The commands: each turns its arguments into work and tells how it went.
+//! Commands: each executes its arguments and returns its result.
 
 mod bench;
 mod check_numerics;
@@ -15,12 +15,12 @@ mod tradeoff;
 mod view;
 
 use crate::app::cli::Command;
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 
-/// Does what the command line asks for.
+/// Executes a command.
 ///
 /// # Errors
-/// Whatever kept it from being done, with the exit status that tells whose fault it was.
+/// The reason of the failure, with the exit status.
 pub(crate) fn run(command: Command) -> Result<(), CommandError> {
     if let Some(threads) = threads(&command) {
         limit_builds(threads);
@@ -38,7 +38,7 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
     }
 }
 
-/// What `--threads` says.
+/// Value of `--threads`.
 fn threads(command: &Command) -> Option<usize> {
     match command {
         Command::View(args) => args.farm.options().threads,
@@ -49,14 +49,14 @@ fn threads(command: &Command) -> Option<usize> {
     }
 }
 
-/// Lets models and scenes be compiled on that many threads. Without it, they are on all cores.
+/// Compiles models and scenes on that many threads. Without this call, they are compiled on all cores.
 fn limit_builds(threads: usize) {
     if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global() {
         tracing::debug!("models are compiled on all cores: {error}");
     }
 }
 
-/// The runtime that the farm lives on: sockets and timers only, so two threads are plenty. Rendering never runs here.
+/// The runtime of the farm: sockets and timers only, so two threads suffice. Rendering never runs here.
 fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
@@ -71,7 +71,7 @@ mod tests {
     use crate::app::cli::Invocation;
 
     #[test]
-    fn builds_take_as_many_threads_as_the_command_line_says() {
+    fn builds_use_the_threads_of_the_command_line() {
         let threads = |line: &str| match Invocation::parse(line.split(' ').map(Into::into)) {
             Ok(Invocation::Command(command, _)) => threads(&command),
             other => panic!("{line}: {other:?}"),

@@ -1,36 +1,36 @@
-//! What watches and steers a run: `--trace` and `--control`.
+//! Timeline and control of a run: `--timeline` and `--control`.
 
 use tokio_util::sync::CancellationToken;
 
 use crate::accounting::TraceFile;
 use crate::app::cli::ObservabilityArgs;
 use crate::app::control::{self, Console, Place};
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 use crate::farm::Farm;
 
-/// As asked for on the command line.
+/// Timeline and control, as the command line requests them.
 pub(super) struct Observability {
     timeline: Option<TraceFile>,
     control: Option<Place>,
-    /// Cancelled when the run is over.
+    /// Cancelled at the end of the run.
     over: CancellationToken,
 }
 
 impl Observability {
-    /// Creates the trace's file.
+    /// Creates the file of the timeline.
     ///
     /// # Errors
-    /// A place that cannot be written.
+    /// A file that cannot be created.
     pub(super) fn new(args: &ObservabilityArgs) -> Result<Self, CommandError> {
         let timeline = args.timeline.as_deref().map(TraceFile::create).transpose()?;
         Ok(Self { timeline, control: args.control.clone(), over: CancellationToken::new() })
     }
 
-    /// Watches a farm from now on, and takes commands for it; `quit` is cancelled where they end the run. Call it inside
-    /// a runtime.
+    /// Records the timeline of a farm from now on, and accepts commands for it. The command `quit` cancels `quit`. Must be called
+    /// inside a runtime.
     ///
     /// # Errors
-    /// A place that cannot be listened at.
+    /// A place at which the process cannot listen.
     pub(super) fn begin(&self, farm: &Farm, quit: &CancellationToken) -> Result<(), CommandError> {
         if let Some(timeline) = &self.timeline {
             farm.trace_into(timeline.sink());
@@ -44,10 +44,10 @@ impl Observability {
         }
     }
 
-    /// The run is over: no more commands are taken, and the trace is written to its end.
+    /// Ends control and timeline, and writes the rest of the timeline.
     ///
     /// # Errors
-    /// A trace that could not be written.
+    /// A timeline that cannot be written.
     pub(super) fn end(&mut self) -> Result<(), CommandError> {
         self.over.cancel();
         self.timeline.take().map_or(Ok(()), TraceFile::finish)

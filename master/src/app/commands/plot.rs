@@ -1,8 +1,8 @@
-//! `plot`: CSV tables as a picture.
+//! `plot`: CSV tables as a plot.
 
 use crate::app::cli::PlotArgs;
-use crate::app::error::CommandError;
 use crate::app::output::check_writable;
+use crate::error::CommandError;
 use crate::plot::{Axis, Chart, Columns, PlotError, read_series};
 
 /// Reads the tables and writes each output.

@@ -1,17 +1,18 @@
-//! The quality controller as a command line asks for it.
+//! Quality of a run: the fixed setting or the quality controller that the command line requests.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::source::Source;
 use crate::app::cli::{ErrorArgs, QualityControlArgs};
-use crate::app::error::CommandError;
+use crate::error::CommandError;
+use crate::tradeoff::ladder::ladder as measured_ladder;
 use crate::tradeoff::table::Table;
-use crate::viewer::quality_controller::{Ladder, QualityController, measured_ladder, prior_ladder};
+use crate::viewer::quality_controller::{Ladder, QualityController, prior_ladder};
 use crate::viewer::view_request::ViewRequest;
 
-/// What a window shall show when it rests, and the quality controller for when it moves. With a rate to hold, the largest error is for
-/// moving pictures; without one, for all.
+/// Request of a view at rest, and the quality controller for its motion. With a rate to hold, the largest error applies to
+/// moving pictures; without one, to all.
 ///
 /// # Errors
 /// A table that cannot be used.
@@ -29,7 +30,7 @@ pub(super) fn view_quality(
     })
 }
 
-/// The picture at the fastest setting that loses no more than is allowed.
+/// Request at the fastest setting within the largest error.
 ///
 /// # Errors
 /// A table that cannot be used.
@@ -54,12 +55,10 @@ fn ladder(args: &ErrorArgs, source: &Source, wanted: &ViewRequest) -> Result<Lad
             let table = Table::read(path).map_err(CommandError::wrong_input)?;
             if table.scene != source.name {
                 let (path, of, name) = (path.display(), &table.scene, &source.name);
-                tracing::warn!(
-                    "{path} was measured on {of}, not on {name}: what settings cost and lose may be other here"
-                );
+                tracing::warn!("{path} was measured on {of}, not on {name}: costs and losses may differ");
             }
-            let told = |problem| CommandError::WrongInput(format!("{}: {problem}", path.display()));
-            measured_ladder(&table, wanted).map_err(told)?
+            let refuse = |problem| CommandError::WrongInput(format!("{}: {problem}", path.display()));
+            measured_ladder(&table, wanted).map_err(refuse)?
         }
         None => own_ladder(source, wanted).unwrap_or_else(|| prior_ladder(&source.scene, wanted)),
     };
@@ -69,7 +68,7 @@ fn ladder(args: &ErrorArgs, source: &Source, wanted: &ViewRequest) -> Result<Lad
     })
 }
 
-/// The ladder of the table that lies with the scene, if there is one that can be used; where it cannot, the log says why.
+/// The ladder of the table in the scene's folder, if there is a usable one. The log has the reason for which one is unusable.
 fn own_ladder(source: &Source, wanted: &ViewRequest) -> Option<Ladder> {
     let path = table_places(&source.path).into_iter().find(|path| path.is_file())?;
     let ladder = Table::read(&path).map_err(|error| error.to_string()).and_then(|table| {
@@ -82,29 +81,30 @@ fn own_ladder(source: &Source, wanted: &ViewRequest) -> Option<Ladder> {
     });
     match ladder {
         Ok(ladder) => {
-            tracing::info!("what settings cost and lose is taken from {}", path.display());
+            tracing::info!("costs and losses of settings are taken from {}", path.display());
             Some(ladder)
         }
         Err(problem) => {
-            tracing::warn!("{problem}; settings are expected to do what they do on other scenes");
+            tracing::warn!("{problem}; costs and losses are medians over other scenes instead");
             None
         }
     }
 }
 
-/// Where the table of a scene may be: `SCENE.tradeoff.csv` in its folder, with or without the ending of the scene's name,
-/// or `tradeoff/SCENE.csv` below it.
+/// Paths of the table of a scene: `SCENE.tradeoff.csv` in its folder, with or without the extension of the scene's name, or
+/// `tradeoff/SCENE.csv` below it.
 fn table_places(scene: &Path) -> Vec<PathBuf> {
     let folder = scene.parent().unwrap_or(Path::new(""));
-    let named = |name: Option<&OsStr>, ending: &str| {
+    let named = |name: Option<&OsStr>, suffix: &str| {
         let mut name = name.unwrap_or_default().to_owned();
-        name.push(ending);
+        name.push(suffix);
         name
     };
     let (whole, stem) = (scene.file_name(), scene.file_stem());
-    let beside = [named(stem, ".tradeoff.csv"), named(whole, ".tradeoff.csv")].map(|name| folder.join(name));
+    let same_folder =
+        [named(stem, ".tradeoff.csv"), named(whole, ".tradeoff.csv")].map(|name| folder.join(name));
     let below = [named(stem, ".csv"), named(whole, ".csv")].map(|name| folder.join("tradeoff").join(name));
-    beside.into_iter().chain(below).collect()
+    same_folder.into_iter().chain(below).collect()
 }
 
 #[cfg(test)]
@@ -124,7 +124,7 @@ mod tests {
         material = { red = { diffuse = [0.8, 0.1, 0.1] } }
     ";
 
-    /// The origin of a scene's ladder, with these files in its folder.
+    /// Origin of a scene's ladder, with these files in its folder.
     fn origin(scene: &str, files: &[(&str, String)], front: Option<&str>, samples: u32) -> Origin {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("tradeoff")).unwrap();
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_that_lies_with_the_scene_is_taken() {
+    fn the_table_in_the_scenes_folder_is_used() {
         for place in ["a.tradeoff.csv", "a.toml.tradeoff.csv", "tradeoff/a.csv", "tradeoff/a.toml.csv"] {
             let found = origin("a.toml", &[(place, table_of("a.toml"))], None, 1);
             assert_eq!(found, Origin::Measured, "{place}");
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_that_cannot_be_used_makes_way_for_the_general_one() {
+    fn the_general_ladder_replaces_an_unusable_table() {
         let other = [("a.tradeoff.csv", table_of("b.toml"))];
         assert_eq!(origin("a.toml", &other, None, 1), Origin::General);
         let broken = [("a.tradeoff.csv", "no table".to_owned())];
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_that_is_named_wins() {
+    fn a_table_of_the_command_line_has_priority() {
         let files = [("a.tradeoff.csv", "no table".to_owned()), ("mine.csv", table_of("a.toml"))];
         assert_eq!(origin("a.toml", &files, Some("mine.csv"), 1), Origin::Measured);
     }

@@ -7,15 +7,15 @@ use rayfarm_tracer::files::read_within;
 use serde::Serialize;
 
 use crate::app::cli::{Profile, SimulateArgs};
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 use crate::simulator::{
     CostProfile, Measured, Passed, PassingSetup, Schedule, Setup, Survivor, measure, pass, survive,
 };
 
-/// Bytes of a file of costs.
+/// Largest file of costs, in bytes.
 const MAX_COSTS_BYTES: u64 = 16 << 20;
 
-/// A line of JSON: what was simulated, and what came of it.
+/// A line of JSON: a setup and its figures.
 #[derive(Serialize)]
 struct Line<'a> {
     workers: u32,
@@ -27,7 +27,7 @@ struct Line<'a> {
     measured: &'a Measured,
 }
 
-/// A line of JSON about an asset that was sent to all workers.
+/// A line of JSON about the transfer of an asset to all workers.
 #[derive(Serialize)]
 struct PassedLine {
     workers: u32,
@@ -36,7 +36,7 @@ struct PassedLine {
     passed_on: Passed,
 }
 
-/// A line of JSON about fault schedules that were survived.
+/// A line of JSON about fault schedules without a failure.
 #[derive(Serialize)]
 struct Survived {
     first_seed: u64,
@@ -47,31 +47,31 @@ struct Survived {
     hours: f64,
 }
 
-/// Simulates what is asked for and tells the figures on standard output.
+/// Runs the simulation and prints its figures on standard output.
 ///
 /// # Errors
-/// Costs of rows that cannot be read; an invariant that does not hold, with the command that shows it again.
+/// Costs of rows that cannot be read; a violated invariant, with the command that reproduces it.
 pub(super) fn run(args: &SimulateArgs) -> Result<(), CommandError> {
     match (args.faults, args.assets()) {
-        (true, _) => live_through(args),
+        (true, _) => run_schedules(args),
         (false, assets) if assets.is_empty() => measure_all(args),
         (false, assets) => pass_all(args, assets),
     }
 }
 
-/// How long an asset takes to all workers, and how often the master sends it.
+/// Prints the time of a transfer to all workers, and the number of copies that the master sends.
 fn pass_all(args: &SimulateArgs, assets: Vec<[PassingSetup; 2]>) -> Result<(), CommandError> {
     if !args.json {
-        tell("workers  from the master alone        passed on")?;
+        print("workers  from the master alone        passed on")?;
     }
     for setups in assets {
         let workers = setups[0].workers;
         let [alone, passed_on] = setups.map(|setup| pass(&setup));
         if args.json {
-            tell_json(&PassedLine { workers, seed: args.seed, alone, passed_on })?;
+            print_line(&PassedLine { workers, seed: args.seed, alone, passed_on })?;
         } else {
-            let told = |p: Passed| format!("{:8.2} s, {:6.2} copies", p.seconds, p.master_copies);
-            tell(&format!("{workers:7}  {}   {}", told(alone), told(passed_on)))?;
+            let figures = |p: Passed| format!("{:8.2} s, {:6.2} copies", p.seconds, p.master_copies);
+            print(&format!("{workers:7}  {}   {}", figures(alone), figures(passed_on)))?;
         }
     }
     Ok(())
@@ -85,7 +85,7 @@ fn measure_all(args: &SimulateArgs) -> Result<(), CommandError> {
         (None, Profile::Corner) => CostProfile::Corner,
     };
     if !args.json {
-        tell(
+        print(
             "workers    FPS   ideal  efficiency  cutting  wasted  leases   idle   tail  frame ms  worst  latency",
         )?;
     }
@@ -94,18 +94,18 @@ fn measure_all(args: &SimulateArgs) -> Result<(), CommandError> {
         let measured = measure(&setup).ok_or_else(|| {
             CommandError::Failed(format!("{} workers did not finish within an hour", setup.workers))
         })?;
-        if args.json { tell_json(&line(&setup, &measured))? } else { tell(&row(&setup, &measured))? }
+        if args.json { print_line(&line(&setup, &measured))? } else { print(&row(&setup, &measured))? }
     }
     Ok(())
 }
 
 fn read_costs(path: &Path) -> Result<CostProfile, CommandError> {
-    let told = |what: String| CommandError::WrongInput(format!("{}: {what}", path.display()));
-    let bytes = read_within(path, MAX_COSTS_BYTES).map_err(|error| told(error.to_string()))?;
-    let bytes = bytes.ok_or_else(|| told(format!("has more than {MAX_COSTS_BYTES} bytes, the limit")))?;
+    let refuse = |problem: String| CommandError::WrongInput(format!("{}: {problem}", path.display()));
+    let bytes = read_within(path, MAX_COSTS_BYTES).map_err(|error| refuse(error.to_string()))?;
+    let bytes = bytes.ok_or_else(|| refuse(format!("has more than {MAX_COSTS_BYTES} bytes, the limit")))?;
     let text =
-        String::from_utf8(bytes).map_err(|_| told("not UTF-8 text: numbers are expected".to_owned()))?;
-    CostProfile::from_text(&text).map_err(told)
+        String::from_utf8(bytes).map_err(|_| refuse("not UTF-8 text: numbers are expected".to_owned()))?;
+    CostProfile::from_text(&text).map_err(refuse)
 }
 
 fn line<'a>(setup: &Setup, measured: &'a Measured) -> Line<'a> {
@@ -132,12 +132,12 @@ fn row(setup: &Setup, m: &Measured) -> String {
     )
 }
 
-fn live_through(args: &SimulateArgs) -> Result<(), CommandError> {
+fn run_schedules(args: &SimulateArgs) -> Result<(), CommandError> {
     let mut all = Survivor::default();
     for seed in (args.seed..).take(usize::try_from(args.schedules).unwrap_or(usize::MAX)) {
-        let survivor = survive(Schedule { seed }).map_err(|what| {
+        let survivor = survive(Schedule { seed }).map_err(|problem| {
             CommandError::Failed(format!(
-                "schedule {seed}: {what}; to see it again: rayfarm-master simulate --faults --seed {seed}"
+                "schedule {seed}: {problem}; to reproduce it: rayfarm-master simulate --faults --seed {seed}"
             ))
         })?;
         all.completed += survivor.completed;
@@ -147,7 +147,7 @@ fn live_through(args: &SimulateArgs) -> Result<(), CommandError> {
     }
     let hours = all.lived as f64 / 3.6e12;
     if args.json {
-        return tell_json(&Survived {
+        return print_line(&Survived {
             first_seed: args.seed,
             schedules: args.schedules,
             workers: all.workers,
@@ -156,18 +156,18 @@ fn live_through(args: &SimulateArgs) -> Result<(), CommandError> {
             hours,
         });
     }
-    tell(&format!(
-        "{} schedules survived: {} workers, {} frames asked for, {} completed, {hours:.1} hours of virtual time",
+    print(&format!(
+        "{} schedules survived: {} workers, {} frames requested, {} completed, {hours:.1} hours of virtual time",
         args.schedules, all.workers, all.requested, all.completed
     ))
 }
 
-fn tell_json(line: &impl Serialize) -> Result<(), CommandError> {
+fn print_line(line: &impl Serialize) -> Result<(), CommandError> {
     let text = serde_json::to_string(line).map_err(|error| CommandError::Failed(error.to_string()))?;
-    tell(&text)
+    print(&text)
 }
 
-fn tell(line: &str) -> Result<(), CommandError> {
+fn print(line: &str) -> Result<(), CommandError> {
     writeln!(io::stdout().lock(), "{line}")
         .map_err(|error| CommandError::Failed(format!("standard output: {error}")))
 }

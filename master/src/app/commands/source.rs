@@ -1,4 +1,4 @@
-//! Where scenes come from: the file named on the command line, or the room that comes with rayfarm.
+//! Sources of scenes: the file of the command line, or the room from rayfarm's models.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,36 +9,36 @@ use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene};
 use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
 use crate::viewer::view_request::ViewRequest;
 
-/// The scene shown when none is named, inside a folder of models.
+/// Scene without a file on the command line, in a folder of models.
 const DEFAULT_SCENE: &str = "room.toml";
-/// The variable that names that folder.
+/// Environment variable with the folder of models.
 const MODELS_VARIABLE: &str = "RAYFARM_MODELS";
 
-/// A scene that has been read, with its models, and checked.
+/// A scene with its models and textures, loaded and validated.
 pub(super) struct Source {
-    /// The file's name, for titles and messages.
+    /// Name of the file, for titles and messages.
     pub(super) name: String,
-    /// Where it was read.
+    /// Path of the file.
     pub(super) path: PathBuf,
     /// The scene as data.
     pub(super) scene: Scene,
-    /// Its models.
+    /// Meshes of its models.
     pub(super) meshes: Vec<Arc<CompiledMesh>>,
-    /// The files that they come from, as the scene names them.
+    /// Files of the meshes, as the scene names them.
     pub(super) mesh_files: Vec<PathBuf>,
-    /// Its textures.
+    /// Textures of its materials.
     pub(super) textures: Vec<Arc<Texture>>,
 }
 
 impl Source {
-    /// Reads a scene file or a bare model, to be shown in `size` if that is given; its warnings go to the log.
+    /// Loads a scene file or a bare model, for pictures of `size` if that is given. Warnings go to the log.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line where there is one.
+    /// The mistake in the file, with its line where there is one.
     pub(super) fn load(path: &Path, models: ModelArgs, size: Option<Size>) -> Result<Self, CommandError> {
         let LoadedScene { scene, meshes, mesh_files, textures, warnings } =
             scene::load_with(path, models.load_options(size)).map_err(CommandError::wrong_input)?;
@@ -49,19 +49,19 @@ impl Source {
         Ok(Self { name, path: path.to_owned(), scene, meshes, mesh_files, textures })
     }
 
-    /// What its first frame shows: the scene's own settings, or what the command line says instead.
+    /// Request of the first frame: settings of the scene, overridden by the command line.
     ///
     /// # Errors
     /// A combination that cannot be rendered.
-    pub(super) fn wanted(&self, picture: &PictureArgs) -> Result<ViewRequest, CommandError> {
-        self.wanted_still(picture.size, picture.samples, &picture.quality)
+    pub(super) fn request(&self, picture: &PictureArgs) -> Result<ViewRequest, CommandError> {
+        self.still_request(picture.size, picture.samples, &picture.quality)
     }
 
-    /// Likewise, of a picture that does not move.
+    /// Request of a picture without animation.
     ///
     /// # Errors
     /// A combination that cannot be rendered.
-    pub(super) fn wanted_still(
+    pub(super) fn still_request(
         &self,
         size: Option<Size>,
         samples: Option<u32>,
@@ -74,15 +74,15 @@ impl Source {
         view.samples = samples.unwrap_or(view.samples);
         view.quality = quality.over(view.quality);
         view.validate().map_err(CommandError::wrong_input)?;
-        if quality.asks_to_adapt() && view.samples == 1 {
-            let message = "--adaptive leaves out samples, but there is only one a pixel: \
-                           ask for more with --samples 4, 9, 16, ..., or leave --adaptive out";
+        if quality.is_adaptive() && view.samples == 1 {
+            let message = "--adaptive omits samples, but there is only one per pixel: \
+                           request more with --samples 4, 9, 16, ..., or leave --adaptive out";
             return Err(CommandError::WrongInput(message.into()));
         }
         Ok(ViewRequest { view, scale: quality.scale_over(self.scene.render.scale) })
     }
 
-    /// The scene as the tracer wants it: trees, bounds and counts.
+    /// Compiles the scene for the tracer.
     ///
     /// # Errors
     /// A scene that cannot be traced.
@@ -92,23 +92,23 @@ impl Source {
     }
 }
 
-/// The animation that a command line asks for, over `frames` frames.
+/// Animation of a command line, over `frames` frames.
 pub(super) fn animation(picture: &PictureArgs, frames: u32) -> Animation {
     Animation { orbit: picture.orbit, spin: picture.spin, frames }
 }
 
-/// The scene file to show when none is named.
+/// Scene file without one on the command line.
 ///
 /// # Errors
-/// When it is nowhere; the message lists where it was looked for, and the way out.
+/// A file that is in none of the folders; the message lists them and the remedy.
 pub(super) fn default_scene() -> Result<PathBuf, CommandError> {
     let named = std::env::var_os(MODELS_VARIABLE).map(PathBuf::from);
     let executable = std::env::current_exe().and_then(std::fs::canonicalize).ok();
     find_default(&candidates(named.as_deref(), executable.as_deref()))
 }
 
-/// Folders that may hold the models, likeliest first: the one that is named (and then no other), the current
-/// folder's, those beside and above the executable (a build's output lies below the checkout).
+/// Folders of models to search, in order: the named one (and then no other), the one in the current folder, those next to and
+/// above the executable (a build's output is below the checkout).
 fn candidates(named: Option<&Path>, executable: Option<&Path>) -> Vec<PathBuf> {
     if let Some(named) = named {
         return vec![named.to_owned()];
@@ -122,7 +122,7 @@ fn find_default(folders: &[PathBuf]) -> Result<PathBuf, CommandError> {
     files.iter().find(|file| file.is_file()).cloned().ok_or_else(|| {
         let places: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         CommandError::WrongInput(format!(
-            "no scene was named, and the one that comes with rayfarm is not at {}; \
+            "no scene was named, and rayfarm's own is not at {}; \
              name a scene, or set {MODELS_VARIABLE} to rayfarm's folder of models",
             places.join(", ")
         ))
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_that_is_there_is_taken() {
+    fn the_first_existing_file_is_used() {
         let here = tempfile::tempdir().unwrap();
         let there = tempfile::tempdir().unwrap();
         let folders = [here.path().to_owned(), there.path().to_owned()];

@@ -1,4 +1,4 @@
-//! `tradeoff`: what each setting costs and how far its picture is from the best one, as table, plot and pictures in a folder.
+//! `tradeoff`: time and error of each setting, as table, plots and pictures in a folder.
 
 use std::fs;
 use std::io::{self, Write};
@@ -16,9 +16,9 @@ use super::interrupt::cancelled_by_signals;
 use super::runtime;
 use super::source::Source;
 use crate::app::cli::{QualityArgs, TradeoffArgs};
-use crate::app::error::CommandError;
 use crate::app::output::check_writable;
 use crate::app::reports::print_json;
+use crate::error::CommandError;
 use crate::in_process::all_cores;
 use crate::tradeoff::measure::{Studio, summary};
 use crate::tradeoff::oracle::{Verdict, affordable, chosen, judge};
@@ -27,13 +27,13 @@ use crate::tradeoff::setting::{Asked, Setting};
 use crate::tradeoff::steps::Steps;
 use crate::tradeoff::table::{Row, Table};
 
-/// What is written last, when all is measured.
+/// Table of all settings, written last: where it exists, all other files do.
 const TABLE: &str = "tradeoff.csv";
 const PAGE: &str = "tradeoff.md";
 const PLOTS: [&str; 2] = ["front.svg", "front.png"];
 const REFERENCE: &str = "reference.png";
 
-/// Measures a scene and writes the folder, or reads a table that was written before; tells the front on standard output.
+/// Measures a scene and writes the folder, or reads an existing table; prints the Pareto front on standard output.
 ///
 /// # Errors
 /// A wrong scene, folder or table; Ctrl-C; a full disk.
@@ -48,14 +48,14 @@ pub(super) fn run(args: &TradeoffArgs) -> Result<(), CommandError> {
 fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
     let table = Table::read(path).map_err(CommandError::wrong_input)?;
     for row in table.rows.iter().filter(|row| Setting::named(&row.setting).is_none()) {
-        tracing::warn!("{}: this version of rayfarm has no setting {}", path.display(), row.setting);
+        tracing::warn!("{}: unknown setting {}, perhaps of another version", path.display(), row.setting);
     }
     if json { print_json(&table) } else { print(&front(&table)) }
 }
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
     let source = Source::load(scene, args.models, args.size)?;
-    let view = source.wanted_still(args.size, None, &QualityArgs::default())?.view;
+    let view = source.still_request(args.size, None, &QualityArgs::default())?.view;
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;
     let runtime = runtime()?;
@@ -96,7 +96,7 @@ fn measure(repeats: u32, source: &Source, studio: &Studio, folder: &Folder) -> R
     Ok(Report { table, repeats, reference_samples, reference_check, front })
 }
 
-/// Asks the oracle about some pixels of the reference.
+/// Compares some pixels of the reference with the tracer in double precision.
 fn check(
     source: &Source,
     studio: &Studio,
@@ -105,13 +105,13 @@ fn check(
     steps: &Steps,
 ) -> Result<Verdict, CommandError> {
     let pixels = chosen(view.width, view.height, affordable(&studio.scene, view.samples));
-    steps.part("reference against the oracle", pixels.len() as u64);
+    steps.part("reference against double precision", pixels.len() as u64);
     let oracle = Oracle::new(&source.scene, &source.meshes, &source.textures, view);
     judge(&oracle, reference, &pixels, studio.threads, studio.cancelled, &|| steps.done(1))
         .ok_or_else(stopped)
 }
 
-/// Renders and compares each setting, and writes its two pictures.
+/// Renders each setting, compares it with the reference, and writes its two pictures.
 fn compare(
     studio: &Studio,
     settings: &[Setting],
@@ -130,7 +130,7 @@ fn compare(
     settings.iter().map(one).collect()
 }
 
-/// The times of each setting, `repeats` rounds over all of them.
+/// Times of each setting, over `repeats` rounds of all settings.
 fn time(
     studio: &Studio,
     settings: &[Setting],
@@ -149,11 +149,11 @@ fn stopped() -> CommandError {
     CommandError::Interrupted("no table was written".to_owned())
 }
 
-/// Where all of it goes.
+/// Folder of the results.
 struct Folder<'a>(&'a Path);
 
 impl<'a> Folder<'a> {
-    /// Makes it where it is not there, and sees that it can be written into.
+    /// Creates the folder if it does not exist, and checks that it is writable.
     fn open(path: &'a Path) -> Result<Self, CommandError> {
         fs::create_dir_all(path).map_err(|error| {
             CommandError::WrongInput(format!("{}: {error}; name a folder with -o", path.display()))
@@ -172,7 +172,7 @@ impl<'a> Folder<'a> {
             .map_err(|error| CommandError::Failed(format!("{}: {error}", path.display())))
     }
 
-    /// The table comes last: where it is, all else is.
+    /// Writes plots, page and, last, the table.
     fn write_report(&self, report: &Report) -> Result<(), CommandError> {
         let chart = chart(report);
         for plot in PLOTS {
@@ -183,14 +183,14 @@ impl<'a> Folder<'a> {
     }
 }
 
-/// A line for each setting on the front.
+/// Text with a line for each setting on the Pareto front.
 fn front(table: &Table) -> String {
     let rows: Vec<&Row> = table.front().into_iter().filter_map(|index| table.rows.get(index)).collect();
     let width = rows.iter().map(|row| row.setting.len()).max().unwrap_or(0);
     let line =
         |row: &&Row| format!("  {:width$} {:9.2} ms  FLIP {:.4}\n", row.setting, row.median_ms, row.flip);
     let lines: String = rows.iter().map(line).collect();
-    format!("worth having, from the fastest to the best:\n{lines}")
+    format!("Pareto front, from the fastest to the best:\n{lines}")
 }
 
 fn print(text: &str) -> Result<(), CommandError> {

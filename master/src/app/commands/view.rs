@@ -10,9 +10,9 @@ use super::observability::Observability;
 use super::quality::view_quality;
 use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
-use crate::app::error::CommandError;
 use crate::delivered::as_text;
 use crate::display::{Display, SceneInfo, WindowDisplay};
+use crate::error::CommandError;
 use crate::farm::{Farm, FarmControl, FarmScene};
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
@@ -28,7 +28,7 @@ const FRAMES_PER_ORBIT: u32 = 360;
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
     let source = Source::load(&path, args.models, args.picture.size)?;
-    let requested = source.wanted(&args.picture)?;
+    let requested = source.request(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
     let (request, controller) =
         view_quality(&args.quality_control, &source, requested, animation.is_moving())?;

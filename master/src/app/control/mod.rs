@@ -24,7 +24,7 @@ pub(crate) use place::Place;
 
 use tokio_util::sync::CancellationToken;
 
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 
 /// Accepts commands at a place until `stop` is cancelled. Must be called inside a runtime.
 ///

@@ -16,7 +16,7 @@ use super::console::{Answer, Console, Then, refused};
 use super::lines::{Line, LineSplitter};
 use super::slots::{Connection, ConnectionSlots, MAX_CONNECTIONS};
 use super::token::TokenFile;
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 
 /// Time within which a connection must send the token.
 const TOKEN_TIMEOUT: Duration = Duration::from_secs(10);

@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 
 use super::console::{Console, Then};
 use super::lines::{Line, LineSplitter};
-use crate::app::error::CommandError;
+use crate::error::CommandError;
 
 /// Reads commands on a thread of its own. It is never joined, because reading standard input cannot be cancelled.
 pub(super) fn start(console: Console) -> Result<(), CommandError> {

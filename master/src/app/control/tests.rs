@@ -193,15 +193,15 @@ impl Port {
     }
 
     /// Answers, until the end of the connection, to something other than the token.
-    async fn answer_to(&self, says: &[u8]) -> String {
+    async fn answer_to(&self, bytes: &[u8]) -> String {
         let mut stream = TcpStream::connect(self.address).await.unwrap();
         // Closing over unread bytes may reset the connection.
-        let _ = stream.write_all(says).await;
-        let mut heard = Vec::new();
-        let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut heard))
+        let _ = stream.write_all(bytes).await;
+        let mut answer = Vec::new();
+        let _ = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut answer))
             .await
             .expect("the connection stays open");
-        String::from_utf8(heard).unwrap()
+        String::from_utf8(answer).unwrap()
     }
 }
 
@@ -224,9 +224,9 @@ async fn a_port_requires_the_token_in_its_owners_file() {
         let mode = |path: &std::path::Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
         assert_eq!((mode(&port.file()), mode(port.file().parent().unwrap())), (0o600, 0o700));
     }
-    for says in ["quit\n", "status\n", "token 00\nquit\n", "token\nquit\n", "\nquit\n"] {
-        let heard = port.answer_to(says.as_bytes()).await;
-        assert!(heard.matches('\n').count() <= 1 && !heard.contains("true"), "{says:?}: {heard}");
+    for bytes in ["quit\n", "status\n", "token 00\nquit\n", "token\nquit\n", "\nquit\n"] {
+        let answer = port.answer_to(bytes.as_bytes()).await;
+        assert!(answer.matches('\n').count() <= 1 && !answer.contains("true"), "{bytes:?}: {answer}");
     }
     let mut stream = port.connect().await;
     stream.write_all(b"status\nnonsense\n").await.unwrap();
@@ -275,14 +275,14 @@ async fn a_web_page_cannot_end_a_run() {
     let farm = farm().await;
     let (console, quit) = console(&farm);
     let port = Port::open(console.clone());
-    for says in foreign_requests() {
-        port.answer_to(&says).await;
+    for bytes in foreign_requests() {
+        port.answer_to(&bytes).await;
         // The same after a token: even then, none of it is a command.
         let mut stream = port.connect().await;
-        let _ = stream.write_all(&says).await;
+        let _ = stream.write_all(&bytes).await;
         let refusal = read_line(&mut stream).await;
         assert!(!refusal.contains("\"ok\":true"), "{refusal}");
-        assert_eq!(read_line(&mut stream).await, "", "{:?}", String::from_utf8_lossy(&says));
+        assert_eq!(read_line(&mut stream).await, "", "{:?}", String::from_utf8_lossy(&bytes));
     }
     assert!(!quit.is_cancelled());
     farm.shut_down().await;
@@ -296,12 +296,12 @@ async fn a_unix_socket_refuses_http_too() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("control");
     start(&Place::Unix(path.clone()), console, CancellationToken::new()).unwrap();
-    for says in foreign_requests() {
+    for bytes in foreign_requests() {
         let mut stream = BufReader::new(tokio::net::UnixStream::connect(&path).await.unwrap());
-        let _ = stream.write_all(&says).await;
+        let _ = stream.write_all(&bytes).await;
         let refusal = read_line(&mut stream).await;
         assert!(!refusal.contains("\"ok\":true"), "{refusal}");
-        assert_eq!(read_line(&mut stream).await, "", "{:?}", String::from_utf8_lossy(&says));
+        assert_eq!(read_line(&mut stream).await, "", "{:?}", String::from_utf8_lossy(&bytes));
     }
     assert!(!quit.is_cancelled());
     farm.shut_down().await;

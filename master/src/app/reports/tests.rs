@@ -9,17 +9,6 @@ fn ms(values: &[u64]) -> Vec<Duration> {
 }
 
 #[test]
-fn percentiles_interpolate() {
-    let sorted = ms(&[10, 20, 30, 40]);
-    assert_eq!(percentile(&sorted, 0.0), Duration::from_millis(10));
-    assert_eq!(percentile(&sorted, 0.5), Duration::from_millis(25));
-    assert_eq!(percentile(&sorted, 1.0), Duration::from_millis(40));
-    assert_eq!(percentile(&sorted, 7.0), Duration::from_millis(40));
-    assert_eq!(percentile(&[], 0.5), Duration::ZERO);
-    assert_eq!(percentile(&ms(&[3]), 0.95), Duration::from_millis(3));
-}
-
-#[test]
 fn the_order_of_frames_does_not_matter() {
     let expected = MsPerFrame { min: 1.0, median: 3.0, p95: 8.2, max: 9.0 };
     assert_eq!(MsPerFrame::of(&ms(&[9, 1, 3, 5, 2])), expected);

@@ -1,4 +1,4 @@
-//! What is written over the picture: figures, the list of keys, and what the window waits for.
+//! Overlay of the picture: figures, panels, the list of keys, and messages.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -15,13 +15,14 @@ pub(super) mod accounts;
 mod kicked;
 pub(super) mod legend;
 
-/// Between lines, and between text and the edge of its panel, in dots.
+/// Height of a line, in dots.
 const LINE: usize = GLYPH + 3;
+/// Distance between text and the edge of its panel, in dots.
 const MARGIN: usize = 5;
 const WHITE: u32 = 0x00f4_f4f4;
 const SOFT: u32 = 0x00c4_ccd4;
 
-/// The keys of the window, and what each does.
+/// Keys of the window, and the effect of each.
 const KEYS: [(&str, &str); 16] = [
     ("W A S D", "move"),
     ("Q E", "move down, up"),
@@ -30,33 +31,33 @@ const KEYS: [(&str, &str); 16] = [
     ("wheel", "nearer, farther"),
     ("R", "back to the start"),
     ("O", "hide the figures"),
-    ("F", "where the time goes"),
+    ("F", "workers and their time"),
     ("C", "colour by worker, by cost"),
     ("Tab", "select a worker"),
     ("P", "pause, resume (all or selected)"),
-    ("L", "let the selected worker go"),
+    ("L", "drain the selected worker"),
     ("K", "kick the selected worker"),
-    ("B", "bring back who was kicked or let go"),
+    ("B", "bring kicked and drained workers back"),
     ("H", "hide this list"),
     ("Esc", "end"),
 ];
 
-/// All that is written over a picture.
+/// Content of the overlay.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Overlay {
     pub(super) figures: Option<Figures>,
-    /// A title and what each colour means.
+    /// Title, and the meaning of each colour.
     pub(super) legend: Option<(&'static str, Vec<Entry>)>,
     pub(super) accounts: Option<AccountPanel>,
     pub(super) help: bool,
-    /// What the window waits for: the picture is not the newest.
+    /// Message about a farm that renders nothing, in the middle of the window.
     pub(super) message: Option<Vec<String>>,
 }
 
 impl Overlay {
-    /// Draws it over what is there.
+    /// Draws the overlay over the canvas.
     pub(super) fn draw(&self, canvas: &mut Canvas) {
-        // The picture alone: panels on it stay as readable as ever.
+        // Only the picture is darkened; panels come later.
         if self.message.is_some() {
             canvas.darken(Rect { x: 0, y: 0, width: canvas.width(), height: canvas.height() });
         }
@@ -77,35 +78,35 @@ impl Overlay {
     }
 }
 
-/// The figures in the corner.
+/// Figures in the upper left corner.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Figures {
-    /// Completed frames per second; `None` at rest, when none are requested.
+    /// Completed frames per second; `None` at rest, when no frame is requested.
     pub(super) fps: Option<f64>,
-    /// What a frame takes, or took.
+    /// Mean time of a frame.
     pub(super) frame_time: Duration,
-    /// From an input to its picture on the screen, where that is known.
+    /// Time from an input to its picture on the screen, where known.
     pub(super) latency: Option<Duration>,
     /// Pixels per row and rows.
     pub(super) size: (u32, u32),
     /// Rays per pixel.
     pub(super) samples: u32,
-    /// What the quality controller says.
+    /// Lines of the quality controller.
     pub(super) quality: Vec<String>,
-    /// Each knob that is not at full quality.
+    /// A text for each knob that is not at full quality.
     pub(super) reductions: Vec<String>,
-    /// Workers connected.
+    /// Connected workers.
     pub(super) workers: usize,
-    /// Their render threads together.
+    /// Render threads of all workers.
     pub(super) threads: u32,
     /// Triangles over all instances.
     pub(super) triangles: u64,
-    /// How much of the frame being rendered is done, where that is worth telling: 0..=1.
+    /// Completed part of the frame in flight, 0..=1, where frames are slow.
     pub(super) progress: Option<f64>,
 }
 
 impl Figures {
-    /// As lines of the overlay.
+    /// Lines of the overlay.
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![self.speed()];
         let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
@@ -127,7 +128,7 @@ impl Figures {
         lines
     }
 
-    /// As it also stands in the title.
+    /// Rate and frame time, also for the title of the window.
     pub(super) fn speed(&self) -> String {
         let frame_time = three_digits(self.frame_time.as_secs_f64() * 1e3);
         match self.fps {
@@ -152,29 +153,29 @@ fn draw_help(canvas: &mut Canvas) {
     draw_centred(canvas, &lines, lines.len());
 }
 
-/// What the window says while there is no worker. `trouble` is what became of this machine's own.
+/// Message while no worker is connected. `problem` is the reason for which the local ones have ended.
 pub(super) fn waiting_for_workers(
     address: SocketAddr,
     local_workers: u32,
-    trouble: Option<&str>,
+    problem: Option<&str>,
     kicked: &[KickedWorker],
 ) -> Vec<String> {
-    let first = match (trouble, local_workers) {
-        (Some(trouble), _) => format!("Waiting for a worker: {trouble}."),
+    let first = match (problem, local_workers) {
+        (Some(problem), _) => format!("Waiting for a worker: {problem}."),
         (None, 0) => "Waiting for a worker.".to_owned(),
         (None, 1) => "Waiting for this machine's worker.".to_owned(),
         (None, n) => format!("Waiting for this machine's {n} workers."),
     };
     let mut lines = vec![first];
-    lines.extend(kicked::way_back(kicked, trouble.is_some() && local_workers > 0));
+    lines.extend(kicked::remedies(kicked, problem.is_some() && local_workers > 0));
     lines.push(String::new());
     lines.extend(Reachable::of(address).for_window());
     lines
 }
 
-/// What the window says while nobody may render.
+/// Message while all workers are paused.
 pub(super) fn all_paused() -> Vec<String> {
-    vec!["All workers are paused.".to_owned(), String::new(), "P: go on".to_owned()]
+    vec!["All workers are paused.".to_owned(), String::new(), "P: resume".to_owned()]
 }
 
 fn draw_centred(canvas: &mut Canvas, lines: &[String], bright: usize) {
@@ -191,7 +192,7 @@ struct Panel {
 }
 
 impl Panel {
-    /// The largest text that fits and suits the canvas; lines that are too long even for the smallest are broken.
+    /// A panel with the largest text that fits and suits the canvas. Lines that are too long for the smallest text are broken.
     fn fit(canvas: &Canvas, lines: &[String]) -> Self {
         let suits = Self::suited_to(canvas.height());
         let panel = |scale| Self { lines: lines.to_vec(), scale };
@@ -204,7 +205,7 @@ impl Panel {
         })
     }
 
-    /// The scale of text that suits a canvas of this height.
+    /// Scale of text that suits a canvas of this height.
     fn suited_to(height: usize) -> usize {
         ((height + 225) / 450).clamp(1, 4)
     }
@@ -218,12 +219,12 @@ impl Panel {
         (self.lines.len() * LINE + 2 * MARGIN - (LINE - GLYPH)) * self.scale
     }
 
-    /// The first `bright` lines stand out.
+    /// Draws the panel at (`x`, `y`); the first `bright` lines are brighter.
     fn draw(&self, canvas: &mut Canvas, x: usize, y: usize, bright: usize) {
         self.draw_in(canvas, x, y, |index| if index < bright { WHITE } else { SOFT });
     }
 
-    /// Each line in its colour.
+    /// Draws the panel at (`x`, `y`) with a colour for each line.
     fn draw_in(&self, canvas: &mut Canvas, x: usize, y: usize, color: impl Fn(usize) -> u32) {
         canvas.darken(Rect { x, y, width: self.width(), height: self.height() });
         for (index, line) in self.lines.iter().enumerate() {
@@ -233,7 +234,7 @@ impl Panel {
     }
 }
 
-/// A line broken at spaces into pieces of at most `columns` characters; a longer word is cut.
+/// Breaks a line at spaces into pieces of at most `columns` characters; cuts longer words.
 fn broken(line: &str, columns: usize) -> Vec<String> {
     let (mut pieces, mut piece) = (Vec::new(), String::new());
     for word in line.split(' ') {

@@ -64,7 +64,7 @@ impl Viewer {
     /// A viewer of a view that input changes, and the handle for its displays.
     pub(crate) fn interactive(farm: Farm, config: ViewerConfig) -> (Self, ViewerHandle) {
         let ViewerConfig { request, camera, policy, log, controller } = config;
-        let (channels, handle) = Channels::new(farm.address());
+        let (channels, handle) = Channels::new(farm.address(), farm.status());
         let viewer = Self {
             farm,
             state: ViewState { request, hidden: false },
@@ -86,7 +86,7 @@ impl Viewer {
         numbers: &[u64],
     ) -> (Self, ViewerHandle, FrameSequence) {
         let (plan, sender, sequence) = SequencePlan::new(numbers);
-        let (channels, handle) = Channels::new(farm.address());
+        let (channels, handle) = Channels::new(farm.address(), farm.status());
         let viewer = Self {
             farm,
             state: ViewState { request, hidden: false },

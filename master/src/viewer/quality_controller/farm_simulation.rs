@@ -6,11 +6,11 @@ use std::time::Duration;
 use glam::{DVec3, Vec3};
 use rayfarm_tracer::scene::{Attenuation, ColorDepth, FrameView, Light, LightKind, RenderScale, Shading};
 
-use super::ladder::Rung;
 use super::*;
 use crate::accounting::{Parts, WorkerAccount};
 use crate::simulator::Dice;
 use crate::test_scene;
+use crate::tradeoff::ladder::ladder as measured_ladder;
 use crate::tradeoff::table::Table;
 
 const ROOM: &[u8] = include_bytes!("../../../../models/tradeoff/room.csv");

@@ -11,7 +11,6 @@ mod balance;
 mod costs;
 mod governor;
 mod ladder;
-mod measured;
 mod prior;
 mod setting;
 mod small_scales;
@@ -28,10 +27,11 @@ use std::time::Duration;
 
 use balance::Balance;
 use governor::Governor;
-pub(crate) use ladder::{Ladder, Origin};
-use ladder::{Loss, Rung};
-pub(crate) use measured::ladder as measured_ladder;
+use ladder::Loss;
+pub(crate) use ladder::{Ladder, Origin, Rung};
 pub(crate) use prior::ladder as prior_ladder;
+pub(crate) use setting::{Setting, bytes};
+pub(crate) use small_scales::continued;
 use stillness::{Motion, Stillness};
 
 use crate::accounting::FrameAccount;

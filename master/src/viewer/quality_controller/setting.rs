@@ -9,7 +9,7 @@ use crate::viewer::view_request::ViewRequest;
 const REDUCED_BYTES: f64 = 0.6;
 
 /// Size of a picture on the wire, in pixels of full colours.
-pub(super) fn bytes(request: &ViewRequest) -> f64 {
+pub(crate) fn bytes(request: &ViewRequest) -> f64 {
     let colors = match request.view.quality.colors {
         ColorDepth::Exact => 1.0,
         ColorDepth::Reduced => REDUCED_BYTES,

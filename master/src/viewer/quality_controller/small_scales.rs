@@ -7,7 +7,7 @@
 use rayfarm_tracer::scene::RenderScale;
 
 /// Cost and loss at a scale, extrapolated from those at the whole, three quarters and a half.
-pub(super) fn continued(known: [(f64, f64); 3], scale: RenderScale) -> (f64, f64) {
+pub(crate) fn continued(known: [(f64, f64); 3], scale: RenderScale) -> (f64, f64) {
     let [(full, _), (_, three_quarters_lost), (half, half_lost)] = known;
     let factor = scale.factor();
     let power = (half / full).ln() / RenderScale::Half.factor().ln();

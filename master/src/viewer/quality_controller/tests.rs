@@ -1,6 +1,5 @@
 use rayfarm_tracer::scene::{ExponentPrecision, FrameView, RenderScale, Shading};
 
-use super::setting::Setting;
 use super::*;
 use crate::test_scene;
 

@@ -1,4 +1,4 @@
-//! What a scene may ask for, whether this one does, and what it costs where it is asked for.
+//! Features that scenes may use, whether a scene uses them, and their costs.
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::MeshMemory;
@@ -8,31 +8,32 @@ use serde::Serialize;
 use super::super::source::Source;
 use crate::display::numbers::counted;
 
-/// What features add to the time of a frame, in per cent: medians of scenes that differ in the feature alone, one thread with
-/// AVX-512. Another scene has other shares; these say what is dear and what is not. `scripts/bench_tracer.sh` measures them.
+/// Time that features add to a frame, in per cent: medians over pairs of scenes that differ in the feature alone, one thread
+/// with AVX-512. Other scenes have other percentages; these give the order of magnitude. `scripts/bench_tracer.sh` measures
+/// them.
 const SHADOWS: f64 = 79.0;
 const SPECULAR: f64 = 1.6;
 const SMOOTH: f64 = 12.0;
 const NEAREST: f64 = 11.0;
 const BILINEAR: f64 = 23.0;
-/// Likewise in instructions, of four samples a pixel beside one.
+/// Instructions that four samples per pixel add to one, in per cent.
 const FOUR_SAMPLES: f64 = 146.0;
 
-/// A part of the work that scenes may do without.
+/// A feature that scenes may use.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct FeatureFacts {
     pub(super) name: &'static str,
-    /// Whether this scene asks for it. What is not asked for is not computed.
+    /// Whether the scene uses it. Unused features are not computed.
     pub(super) asked_for: bool,
-    /// Who asks for it, or what would.
+    /// Objects that use it.
     pub(super) why: String,
-    /// What it added to the time of a frame where it was measured, in per cent.
+    /// Time that it added to a frame where it was measured, in per cent.
     pub(super) measured_percent: Option<f64>,
-    /// Bytes that it takes in memory and once on the wire; where it is left out, those that are saved.
+    /// Bytes in memory and once on the wire; for an unused feature, those that are saved.
     pub(super) bytes: usize,
 }
 
-/// All features, those that the scene asks for and those that it does not.
+/// All features, used and unused.
 pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<FeatureFacts> {
     vec![
         shadows(source, view),
@@ -63,7 +64,7 @@ fn shadows(source: &Source, view: &FrameView) -> FeatureFacts {
     }
 }
 
-/// What a knob does to what the scene asks for.
+/// Note on a feature that a knob turns off.
 fn turned_off(off: bool) -> &'static str {
     if off { "; turned off" } else { "" }
 }
@@ -114,11 +115,11 @@ fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
         name: "textures",
         asked_for,
         why: if maps.is_empty() {
-            "there are none".to_owned()
+            "none".to_owned()
         } else {
             format!("{nearest} of {} nearest, the others bilinear", counted(maps.len() as u64, "texture"))
         },
-        // Most pixels, perhaps, have the dearer one.
+        // The more expensive filter, unless all textures have the other one.
         measured_percent: Some(if asked_for && nearest == maps.len() { NEAREST } else { BILINEAR }),
         bytes: pictures + uvs,
     }
@@ -129,7 +130,7 @@ fn vertex_colors(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
     let asked_for = compiled.features().vertex_colors;
     let saved = MeshMemory::full_color_bytes;
     FeatureFacts {
-        name: "colours of vertices",
+        name: "vertex colours",
         asked_for,
         why: format!("{colored} of {} have them", counted(source.meshes.len() as u64, "mesh")),
         measured_percent: None,
@@ -137,19 +138,19 @@ fn vertex_colors(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
     }
 }
 
-/// A feature that materials ask for, and that takes no memory.
+/// A feature of materials that takes no memory.
 fn of_materials(
     source: &Source,
     name: &'static str,
     asked_for: bool,
-    asks: impl Fn(&Material) -> bool,
+    is_used: impl Fn(&Material) -> bool,
 ) -> FeatureFacts {
     let materials = &source.scene.materials;
-    let asking = materials.iter().filter(|material| asks(material)).count();
+    let using = materials.iter().filter(|material| is_used(material)).count();
     FeatureFacts {
         name,
         asked_for,
-        why: format!("{asking} of {} ask for it", counted(materials.len() as u64, "material")),
+        why: format!("{using} of {} have it", counted(materials.len() as u64, "material")),
         measured_percent: None,
         bytes: 0,
     }
@@ -157,17 +158,17 @@ fn of_materials(
 
 fn samples(view: &FrameView) -> FeatureFacts {
     let rays = counted(view.samples.into(), "ray");
-    let pixels = if view.is_adaptive() { "a pixel with an edge, about one elsewhere" } else { "a pixel" };
+    let pixels = if view.is_adaptive() { "per pixel with an edge, about one elsewhere" } else { "per pixel" };
     FeatureFacts {
-        name: "several samples a pixel",
+        name: "several samples per pixel",
         asked_for: view.samples > 1,
-        why: format!("{rays} {pixels}; measured with 4 a pixel"),
+        why: format!("{rays} {pixels}; measured with 4 per pixel"),
         measured_percent: Some(FOUR_SAMPLES),
         bytes: 0,
     }
 }
 
-/// Sums a part of all meshes: what it takes where the scene asks for it, else what it would take where it is not there.
+/// Sum of a part of the memory of all meshes: of a used feature, the bytes taken; of an unused one, the bytes saved.
 fn taken_or_saved(
     source: &Source,
     asked_for: bool,
@@ -182,13 +183,13 @@ fn taken_or_saved(
     }
 }
 
-/// The parts of the tracer that frames of this scene go through, in the order of the data.
+/// Stages of the tracer for frames of this scene, in order.
 pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<String> {
     let (scene, features) = (&source.scene, compiled.features().at(&view.quality));
     let mut kernels =
-        vec!["what the eye sees: tiles of 16 x 16 rays, down trees of 16 children a node".to_owned()];
+        vec!["camera rays: tiles of 16 x 16 rays, through hierarchies of 16 children per node".to_owned()];
     if !scene.spheres.is_empty() {
-        kernels.push("spheres: one by one where their boxes are touched, in double precision".to_owned());
+        kernels.push("spheres: one by one where rays hit their boxes, in double precision".to_owned());
     }
     if !scene.planes.is_empty() {
         kernels.push(format!(
@@ -199,29 +200,30 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
     let normals = if features.smooth {
         "interpolated where models are smooth"
     } else {
-        "one a facet, none interpolated"
+        "one per facet, none interpolated"
     };
     kernels.push(format!("normals: {normals}"));
     if features.textured {
-        kernels.push("texels: once a point, whatever the number of lights".to_owned());
+        kernels.push("texels: once per point, independent of the number of lights".to_owned());
     }
     if features.cut_out {
-        kernels.push("cut-outs: the alpha of each hit that may be one, in double precision".to_owned());
+        kernels.push("cut-outs: the alpha of each hit on a textured cut-out, in double precision".to_owned());
     }
     let terms = if features.specular {
         "diffuse and specular"
     } else {
-        "diffuse alone: no vectors to the eye, no powers"
+        "diffuse only: no directions to the viewer, no exponents"
     };
     kernels.push(format!("shading: {terms}, {}", counted(scene.lights.len() as u64, "light")));
     if view.quality.shadows && scene.lights.iter().any(|light| light.shadows) {
         kernels.push(
-            "shadows: the tile's points again, seen from each light that reaches one of them".to_owned(),
+            "shadows: the points of each tile as a tile of rays from each light that reaches one of them"
+                .to_owned(),
         );
     }
     if view.is_adaptive() {
         kernels.push(format!(
-            "samples: one at each corner of a pixel, one at the centre where those differ, all {} where they differ much",
+            "samples: one at each corner of a pixel, one at the centre where these differ, all {} where they differ much",
             view.samples
         ));
     }

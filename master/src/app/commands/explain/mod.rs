@@ -1,6 +1,6 @@
-//! `explain`: what a scene asks for, what it gets, what is left out, and what that costs or saves in work, memory and bytes.
+//! `explain`: the features that a scene uses and those that it does not, with their work, memory and bytes.
 //!
-//! Nothing is rendered: the facts are those that the tracer and the farm go by.
+//! Nothing is rendered: the facts are from the structures of the tracer and the farm.
 
 mod features;
 mod text;
@@ -17,26 +17,26 @@ use serde::Serialize;
 use self::features::{FeatureFacts, features, kernels};
 use super::source::Source;
 use crate::app::cli::ExplainArgs;
-use crate::app::error::CommandError;
 use crate::app::reports::print_json;
 use crate::assets::Assets;
+use crate::error::CommandError;
 use crate::viewer::view_request::{Knobs, ViewRequest};
 
-/// What is told of a scene; `--json` prints it as one line.
+/// Explanation of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct Explanation {
     scene: String,
     width: u32,
     height: u32,
     samples: u32,
-    /// Where the knobs stand.
+    /// Values of the knobs.
     quality: Knobs,
-    /// Those that are not at full quality.
+    /// Knobs that are not at full quality.
     #[serde(skip)]
     reductions: Vec<String>,
-    /// The widest vectors of this machine.
+    /// SIMD level of this machine.
     simd_level: &'static str,
-    /// Over all instances.
+    /// Triangles over all instances.
     triangles: u64,
     things: Things,
     features: Vec<FeatureFacts>,
@@ -48,7 +48,7 @@ struct Explanation {
     rays_per_frame_at_most: Rays,
 }
 
-/// How many of each are in the scene.
+/// Counts of the objects of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Things {
     models: usize,
@@ -57,16 +57,16 @@ struct Things {
     single_triangles: usize,
     materials: usize,
     lights: usize,
-    /// Those of the lights that cast shadows.
+    /// Lights that cast shadows.
     lights_with_shadows: usize,
 }
 
-/// One mesh, whatever the number of its instances.
+/// A mesh and its instances.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct MeshFacts {
-    /// The file that it comes from, as the scene names it.
+    /// File of the mesh, as the scene names it.
     file: String,
-    /// The first eight digits of its hash.
+    /// First eight digits of the hash.
     id: String,
     instances: usize,
     triangles: usize,
@@ -80,42 +80,42 @@ struct MeshFacts {
     bytes: usize,
 }
 
-/// One texture.
+/// A texture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct TextureFacts {
-    /// The first eight digits of its name.
+    /// First eight digits of the hash.
     id: String,
     width: u32,
     height: u32,
-    /// It has alpha, because some of it is transparent.
+    /// Whether some texels are transparent.
     alpha: bool,
     bytes: usize,
 }
 
-/// What a process that traces the scene holds of it, in bytes.
+/// Memory of a process that traces the scene, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Memory {
     meshes: usize,
     textures: usize,
-    /// The tree over models, spheres and single triangles.
+    /// Hierarchy over models, spheres and single triangles.
     scene_tree: usize,
     total: usize,
 }
 
-/// What goes over the wire for one worker, in bytes.
+/// Transfers to and from one worker, in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Travel {
-    /// The scene without its meshes and textures, once.
+    /// Scene without its meshes and textures, once.
     scene_body: usize,
-    /// With its meshes and textures, once: a worker asks for what it lacks.
+    /// Scene with its meshes and textures, once: a worker requests those that it lacks.
     once: usize,
-    /// The announcement of a frame, to each worker.
+    /// Announcement of a frame, to each worker.
     per_frame: usize,
-    /// The pixels of a whole frame, all workers together, before they are compressed.
+    /// Pixels of a whole frame from all workers, before compression.
     pixels_per_frame: u64,
 }
 
-/// Upper bounds: not every ray hits something, and not every point is turned to every light.
+/// Upper bounds of rays: not every ray hits a surface, and not every surface faces every light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Rays {
     primary: u64,
@@ -123,13 +123,13 @@ struct Rays {
     secondary: u64,
 }
 
-/// Tells of a scene on standard output.
+/// Prints the explanation of a scene on standard output.
 ///
 /// # Errors
 /// A wrong scene.
 pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
     let source = Source::load(&args.scene, args.models, args.size)?;
-    let wanted = source.wanted_still(args.size, args.samples, &args.quality)?;
+    let wanted = source.still_request(args.size, args.samples, &args.quality)?;
     let explanation = explain(&source, &wanted)?;
     if args.json {
         return print_json(&explanation);
@@ -246,7 +246,7 @@ fn travel(source: &Source, view: &FrameView) -> Result<Travel, CommandError> {
     })
 }
 
-/// Of one pixel on the wire, before compression.
+/// Bytes of one pixel on the wire, before compression.
 fn pixel_bytes(view: &FrameView) -> u64 {
     match view.quality.colors {
         ColorDepth::Exact => 3,
@@ -257,7 +257,7 @@ fn pixel_bytes(view: &FrameView) -> u64 {
 fn rays(things: &Things, view: &FrameView) -> Rays {
     let [width, height, samples] = [view.width, view.height, view.samples].map(u64::from);
     let primary = if view.is_adaptive() {
-        // At the corners of each band of rows, at the centre, and all; where segments cut bands, some corners twice.
+        // Corners of each band of rows, centres, and all samples; where segments divide bands, some corners twice.
         (width + 1) * (height + height.div_ceil(u64::from(TILE_SIZE))) + width * height * (1 + samples)
     } else {
         width * height * samples

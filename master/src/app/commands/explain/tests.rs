@@ -19,7 +19,7 @@ fn of_file(path: &Path) -> Explanation {
 
 const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
 
-/// Flat, diffuse, without shadows: as little as a scene can ask for.
+/// A scene that uses no feature: flat, diffuse, without shadows.
 const BARE: &str = "
     render = { width = 64, height = 48 }
     camera = { position = [0, 0, 4], look_at = [0, 0, 0] }
@@ -33,7 +33,7 @@ fn asked_for(explanation: &Explanation) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_bare_scene_asks_for_nothing_and_what_that_saves_is_told() {
+fn a_bare_scene_uses_no_feature_and_its_savings_are_listed() {
     let bare = explained(BARE);
     assert_eq!(asked_for(&bare), Vec::<&str>::new());
     assert_eq!((bare.things.models, bare.meshes.len(), bare.meshes[0].instances), (2, 1, 2));
@@ -47,12 +47,12 @@ fn a_bare_scene_asks_for_nothing_and_what_that_saves_is_told() {
 }
 
 #[test]
-fn each_key_that_asks_for_more_is_told() {
+fn each_key_that_uses_a_feature_is_listed() {
     let cases = [
         ("shadows = false", "shadows = true", "shadows"),
         ("specular = [0, 0, 0]", "specular = [0.1, 0, 0]", "specular term"),
         ("normals = 'flat'", "normals = 'smooth'", "smooth normals"),
-        ("height = 48", "height = 48, samples = 4", "several samples a pixel"),
+        ("height = 48", "height = 48, samples = 4", "several samples per pixel"),
     ];
     for (key, more, name) in cases {
         let explanation = explained(&BARE.replace(key, more));
@@ -61,7 +61,7 @@ fn each_key_that_asks_for_more_is_told() {
 }
 
 #[test]
-fn what_surfaces_show_beside_reflected_light_is_told() {
+fn emission_textures_vertex_colours_and_cut_outs_are_listed() {
     let lamp = explained(&BARE.replace("specular = [0, 0, 0]", "emission = [1, 1, 0]"));
     assert_eq!(asked_for(&lamp), ["emission"]);
     let folder = tempfile::tempdir().unwrap();
@@ -72,7 +72,7 @@ fn what_surfaces_show_beside_reflected_light_is_told() {
     write("photo.ppm", b"P6\n2 1\n255\nabcdef");
     write("holes.ppm", b"P6\n2 1\n255\n\0\0\0\xff\xff\xff");
     let photo = of_file(&folder.path().join("m.obj"));
-    for name in ["textures", "colours of vertices", "unlit materials", "cut-outs"] {
+    for name in ["textures", "vertex colours", "unlit materials", "cut-outs"] {
         assert!(asked_for(&photo).contains(&name), "{name}: {:?}", asked_for(&photo));
     }
     assert_eq!(photo.textures.iter().filter(|texture| texture.alpha).count(), 1);
@@ -82,17 +82,18 @@ fn what_surfaces_show_beside_reflected_light_is_told() {
 }
 
 #[test]
-fn left_out_samples_are_told() {
+fn adaptive_samples_are_a_stage() {
     let regular = explained(&BARE.replace("height = 48", "height = 48, samples = 4"));
     let adaptive = explained(&BARE.replace("height = 48", "height = 48, samples = 4, adaptive = true"));
-    let told = |explanation: &Explanation| explanation.kernels.iter().any(|kernel| kernel.contains("corner"));
-    assert_eq!((told(&regular), told(&adaptive)), (false, true));
+    let has_stage =
+        |explanation: &Explanation| explanation.kernels.iter().any(|kernel| kernel.contains("corner"));
+    assert_eq!((has_stage(&regular), has_stage(&adaptive)), (false, true));
     assert_eq!(asked_for(&regular), asked_for(&adaptive));
     assert!(text::text(&adaptive).contains("adaptive samples"));
 }
 
 #[test]
-fn textures_are_told_with_their_bytes() {
+fn textures_are_listed_with_their_bytes() {
     let textured = of_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/textured.toml"));
     assert!(asked_for(&textured).contains(&"textures"));
     let feature = textured.features.iter().find(|feature| feature.name == "textures").unwrap();
@@ -104,7 +105,7 @@ fn textures_are_told_with_their_bytes() {
 }
 
 #[test]
-fn what_is_turned_off_is_not_asked_for() {
+fn a_feature_that_is_turned_off_is_not_in_use() {
     let more = BARE.replace("shadows = false", "shadows = true");
     let more = more.replace("specular = [0, 0, 0]", "specular = [0.1, 0, 0]");
     assert_eq!(asked_for(&explained(&more)), ["shadows", "specular term"]);
@@ -123,11 +124,11 @@ fn what_is_turned_off_is_not_asked_for() {
 }
 
 #[test]
-fn what_travels_is_what_is_sent() {
+fn transfers_are_the_bytes_on_the_wire() {
     let bare = explained(BARE);
     let assets = bare.meshes.iter().map(|mesh| mesh.bytes).sum::<usize>();
     assert_eq!(bare.travel.once, bare.travel.scene_body + assets);
-    // The README says so.
+    // The documentation promises these bounds.
     assert!((48..200).contains(&bare.travel.per_frame), "{:?}", bare.travel);
     assert_eq!(bare.travel.pixels_per_frame, 64 * 48 * 3);
 }

@@ -1,17 +1,17 @@
-//! An explanation as text.
+//! Text of an explanation.
 
 use std::fmt::Write;
 
 use super::{Explanation, MeshFacts, TextureFacts};
 use crate::display::numbers::{counted, grouped};
 
-/// Meshes and textures that are listed one by one; of more, the largest are.
+/// Largest number of meshes and of textures in the lists; of more, the largest ones are listed.
 const LISTED: usize = 12;
 
-/// Several lines, each with its newline.
+/// The text, with a newline after each line.
 pub(super) fn text(explanation: &Explanation) -> String {
     let mut out = String::new();
-    // A string takes all that is written to it.
+    // Writing to a string does not fail.
     let _ = write_text(&mut out, explanation);
     out
 }
@@ -19,7 +19,7 @@ pub(super) fn text(explanation: &Explanation) -> String {
 fn write_text(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     write_head(out, explanation)?;
     write_features(out, explanation)?;
-    writeln!(out, "\nFrames of it go through:")?;
+    writeln!(out, "\nStages of its frames:")?;
     for kernel in &explanation.kernels {
         writeln!(out, "  {kernel}")?;
     }
@@ -32,7 +32,7 @@ fn write_head(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     let Explanation { scene, width, height, samples, simd_level, triangles, things, .. } = explanation;
     writeln!(
         out,
-        "{scene}: {width} x {height}, {} a pixel, {simd_level} on this machine",
+        "{scene}: {width} x {height}, {} per pixel, {simd_level} on this machine",
         counted((*samples).into(), "sample")
     )?;
     let parts = [
@@ -54,8 +54,8 @@ fn write_head(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
 
 fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     for (asked_for, title) in [
-        (true, "It asks for, with what that added where it was measured:"),
-        (false, "It does without, and does not pay for:"),
+        (true, "Features in use, with the time that each added where it was measured:"),
+        (false, "Features not in use, at no cost:"),
     ] {
         writeln!(out, "\n{title}")?;
         let mut any = false;
@@ -70,7 +70,7 @@ fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Resu
             writeln!(out, "  {:<24} {percent:>7}  {}{memory}", feature.name, feature.why)?;
         }
         if !any {
-            writeln!(out, "  nothing")?;
+            writeln!(out, "  none")?;
         }
     }
     Ok(())
@@ -119,10 +119,10 @@ fn write_meshes(out: &mut String, meshes: &[MeshFacts]) -> std::fmt::Result {
     write_more(out, meshes.len())
 }
 
-/// A file's name as far as its column goes: the end says more than the beginning.
+/// A file name cut to the width of its column; the end is kept, because it distinguishes files better.
 fn shortened(file: &str) -> String {
     let (all, most) = (file.chars().count(), 24);
-    // Names are the scene file's own: what would move the cursor is not shown as it is.
+    // Names are from the scene file: control characters are replaced.
     let plain = file.chars().map(|c| if c.is_control() { '?' } else { c });
     if all <= most { plain.collect() } else { "...".chars().chain(plain.skip(all - most + 3)).collect() }
 }
@@ -175,7 +175,7 @@ fn write_figures(out: &mut String, explanation: &Explanation) -> std::fmt::Resul
     )
 }
 
-/// A number of bytes in the unit that leaves it short.
+/// A number of bytes with a unit that keeps it short.
 fn size(bytes: usize) -> String {
     let bytes = bytes as f64;
     match bytes {

@@ -10,11 +10,11 @@ use tokio_util::sync::CancellationToken;
 
 use super::repair::Delivered;
 use super::totals::Totals;
-use crate::app::error::CommandError;
 use crate::app::output::FrameWriter;
 use crate::app::plan::Plan;
 use crate::app::progress::Progress;
 use crate::display::{Display, DisplayError};
+use crate::error::CommandError;
 use crate::farm::FinishedFrame;
 use crate::viewer::view_request::ViewRequest;
 use crate::viewer::{FrameSequence, SequenceFrame, Slot, ViewerHandle};

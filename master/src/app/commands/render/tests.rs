@@ -1,4 +1,4 @@
-//! Runs with workers that send wrong pixels: what becomes of the files, and of the exit status.
+//! Runs with workers that send wrong pixels: files and exit status.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ radius = 1.0
 material = "clay"
 "#;
 
-/// A run of `render` in a folder, and where its workers connect.
+/// Runs of `render` in a folder, and the address of their workers.
 struct Renders {
     folder: tempfile::TempDir,
     address: SocketAddr,
@@ -76,8 +76,8 @@ impl Renders {
         }
     }
 
-    /// A worker that renders the scene as it is.
-    fn honest_worker(&self) -> JoinHandle<()> {
+    /// Starts a worker that renders the scene.
+    fn real_worker(&self) -> JoinHandle<()> {
         let options = WorkerOptions {
             master: self.address.to_string(),
             threads: Some(1),
@@ -97,42 +97,42 @@ fn bytes(path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-async fn patiently<T>(what: impl Future<Output = T>) -> T {
+async fn in_time<T>(what: impl Future<Output = T>) -> T {
     tokio::time::timeout(PATIENCE, what).await.expect("it never comes to pass")
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn frames_with_wrong_rows_are_rendered_again_and_their_files_replaced() {
+async fn frames_with_wrong_rows_are_rendered_again_and_their_files_are_replaced() {
     let renders = Renders::new();
     let run = renders.start("right", 3);
     renders.ready().await;
-    renders.honest_worker();
-    patiently(run).await.unwrap().unwrap();
+    renders.real_worker();
+    in_time(run).await.unwrap().unwrap();
 
-    // What a fake worker takes for pixels is not what this scene looks like.
-    let run = renders.start("mended", 3);
+    // The pixels of a fake worker are not those of this scene.
+    let run = renders.start("repaired", 3);
     renders.ready().await;
-    let liar = fake_worker::start(renders.address, Script::Honest).await;
-    patiently(liar).await.unwrap();
-    renders.honest_worker();
-    patiently(run).await.unwrap().unwrap();
+    let worker = fake_worker::start(renders.address, Script::Honest).await;
+    in_time(worker).await.unwrap();
+    renders.real_worker();
+    in_time(run).await.unwrap().unwrap();
     for index in 0..3 {
         assert!(
-            bytes(&renders.file("mended", index)) == bytes(&renders.file("right", index)),
+            bytes(&renders.file("repaired", index)) == bytes(&renders.file("right", index)),
             "frame {index}"
         );
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_run_that_cannot_mend_its_frames_names_them_and_fails() {
+async fn a_run_that_cannot_render_its_frames_again_names_them_and_fails() {
     let renders = Renders::new();
     let run = renders.start("wrong", 1);
     renders.ready().await;
     // The only segment is the frame: it is complete before it is verified.
-    let liar = fake_worker::start(renders.address, Script::Honest).await;
-    patiently(liar).await.unwrap();
-    let error = patiently(run).await.unwrap().unwrap_err();
+    let worker = fake_worker::start(renders.address, Script::Honest).await;
+    in_time(worker).await.unwrap();
+    let error = in_time(run).await.unwrap().unwrap_err();
     assert_eq!(error.exit_code(), std::process::ExitCode::from(1));
     assert!(error.to_string().contains("frames 0 have rows of workers that sent wrong pixels"), "{error}");
     assert!(renders.file("wrong", 0).exists());

@@ -3,10 +3,10 @@
 use std::time::{Duration, Instant};
 
 use crate::accounting::RunAccount;
-use crate::app::error::CommandError;
 use crate::app::plan::Plan;
 use crate::app::reports::{MsPerFrame, RenderReport, VerificationReport};
 use crate::display::numbers::three_digits;
+use crate::error::CommandError;
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame, mean};
 use crate::viewer::view_request::ViewRequest;
 use crate::viewer::{FrameLine, FrameLogFile, FrameRate, PresentedFrame};

@@ -2,11 +2,9 @@
 
 use rayfarm_tracer::scene::RenderScale;
 
-use super::ladder::{Ladder, Origin, Rung};
-use super::setting::{Setting, bytes};
-use super::small_scales::continued;
-use crate::tradeoff::setting::Setting as Measured;
-use crate::tradeoff::table::{Row, Table};
+use super::setting::Setting as Measured;
+use super::table::{Row, Table};
+use crate::viewer::quality_controller::{Ladder, Origin, Rung, Setting, bytes, continued};
 use crate::viewer::view_request::ViewRequest;
 
 /// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
