@@ -1,17 +1,20 @@
-//! How a command ends when it does not end well, and the exit status that says so.
+//! Errors of commands, and the exit status of each.
 
 use std::process::ExitCode;
 
-/// Why a command did not do what was asked.
+use crate::display::DisplayError;
+use crate::viewer::{FrameLogError, ViewerError};
+
+/// Reason for which a command failed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CommandError {
-    /// The command line, or a file it names, is wrong: exit status 2.
+    /// The command line, or a file that it names, is wrong: exit status 2.
     #[error("{0}")]
     WrongInput(String),
-    /// Anything else: exit status 1.
+    /// Any other failure: exit status 1.
     #[error("{0}")]
     Failed(String),
-    /// Ctrl-C or SIGTERM; the text says what was finished before it: exit status 1.
+    /// Ctrl-C or SIGTERM; the text says how much was finished: exit status 1.
     #[error("interrupted: {0}")]
     Interrupted(String),
 }
@@ -22,7 +25,7 @@ impl CommandError {
         Self::WrongInput(error.to_string())
     }
 
-    /// Anything that is not the caller's fault.
+    /// A failure that the input did not cause.
     pub(crate) fn failed(error: impl std::fmt::Display) -> Self {
         Self::Failed(error.to_string())
     }
@@ -32,6 +35,33 @@ impl CommandError {
         match self {
             Self::WrongInput(_) => ExitCode::from(2),
             Self::Failed(_) | Self::Interrupted(_) => ExitCode::from(1),
+        }
+    }
+}
+
+impl From<ViewerError> for CommandError {
+    fn from(error: ViewerError) -> Self {
+        match error {
+            ViewerError::Farm(error) => Self::failed(error),
+            ViewerError::Log(error) => error.into(),
+        }
+    }
+}
+
+impl From<FrameLogError> for CommandError {
+    fn from(error: FrameLogError) -> Self {
+        match error {
+            FrameLogError::Create { .. } => Self::wrong_input(error),
+            FrameLogError::Write { .. } => Self::failed(error),
+        }
+    }
+}
+
+impl From<DisplayError> for CommandError {
+    fn from(error: DisplayError) -> Self {
+        match error {
+            DisplayError::Failed(problem) => Self::Failed(problem),
+            DisplayError::Interrupted => Self::Interrupted(String::new()),
         }
     }
 }

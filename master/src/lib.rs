@@ -1,25 +1,16 @@
 //! The master of rayfarm: owns the scene and the screen, hands out segments, assembles frames.
 //!
-//! The seam between what draws and what renders is [`farm::Farm`]: everything above it (command line, window,
-//! reports) asks for frames and shows them; everything below it (scheduler, sessions, framebuffers, local worker
-//! processes) sees to it that each one completes.
+//! [`farm::Farm`] is the boundary between displays and rendering. The code above it (application, viewer, displays) requests
+//! frames and shows them. The code below it (scheduler, sessions, framebuffers, local worker processes) completes each one.
 
-mod camera_control;
-mod cli;
-mod commands;
-mod control;
-mod dial;
+mod app;
 mod display;
 mod error;
 mod in_process;
-mod logging;
+mod log_bar;
 mod measure;
-mod orbit;
-mod output;
-mod plan;
-mod progress;
-mod report;
-mod wanted;
+mod quantile;
+mod viewer;
 
 pub use rayfarm_farm as farm;
 pub use rayfarm_scheduler as scheduler;
@@ -27,21 +18,22 @@ pub use rayfarm_scheduler as scheduler;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use cli::Invocation;
+use app::cli::Invocation;
+use app::{commands, logging};
 pub use measure::simulator;
 use rayfarm_farm::accounting;
 #[cfg(test)]
 use rayfarm_farm::testing::{fake_worker, test_scene};
 
-/// The whole program: does what the command line (program name first) asks for and says how it went.
+/// Runs the program for a command line, program name first. Errors are printed on standard error.
 ///
-/// Exit status: 0 done; 2 wrong use or wrong input; 1 anything else. What is wrong is told on standard error.
+/// Exit status: 0 success; 2 wrong use or wrong input; 1 any other failure.
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let (command, log) = match Invocation::parse(args) {
         Ok(Invocation::LocalWorker(args)) => return rayfarm_worker::cli::main_from(args),
         Ok(Invocation::Command(command, log)) => (command, log),
         Err(error) => {
-            let _ = error.print(); // there is nowhere left to say that it could not be said
+            let _ = error.print(); // a failure to print cannot be reported anywhere
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1));
         }
     };

@@ -15,7 +15,7 @@ use bytes::Bytes;
 use rayfarm_protocol::{
     AssetId, FrameAnnounce, FrameId, Lease, Reconnect, ToMaster, ToWorker, Welcome, handshake, session,
 };
-use rayfarm_worker::{Cancelled, RayCounts, ShutdownHandle, Renderer, Share, WorkerOptions, run_with};
+use rayfarm_worker::{Cancelled, RayCounts, Renderer, Share, ShutdownHandle, WorkerOptions, run_with};
 use tokio::net::TcpListener;
 
 const WIDTH: u32 = 64;

@@ -1,4 +1,4 @@
-//! The pixels of a window: pictures, darkened panels and text. Everything is clipped; nothing outside is touched.
+//! Canvas of a window: pictures, darkened panels and text, all clipped to its size.
 
 use font8x8::UnicodeFonts;
 use rayfarm_tracer::image::Resizer;
@@ -6,7 +6,7 @@ use rayfarm_tracer::image::Resizer;
 /// Pixels per side of a glyph at scale 1.
 pub(super) const GLYPH: usize = 8;
 
-/// A buffer as minifb takes it: `0RGB`, rows from the top, `width * height` pixels.
+/// Pixel buffer in minifb's format: `0RGB`, rows from the top, `width * height` pixels.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     width: usize,
@@ -14,7 +14,7 @@ pub(super) struct Canvas {
     pixels: Vec<u32>,
 }
 
-/// A picture as the farm hands it over.
+/// A picture in the farm's format.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Picture<'a> {
     /// Pixels per row.
@@ -28,9 +28,9 @@ pub(super) struct Picture<'a> {
 /// A rectangle in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Rect {
-    /// From the left.
+    /// Pixels from the left edge.
     pub(super) x: usize,
-    /// From the top.
+    /// Pixels from the top edge.
     pub(super) y: usize,
     /// Pixels per row.
     pub(super) width: usize,
@@ -38,17 +38,17 @@ pub(super) struct Rect {
     pub(super) height: usize,
 }
 
-/// How a row of the picture is coloured.
+/// Tint of a row of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum RowTint {
-    /// Not at all.
+    /// No tint.
     #[default]
     None,
-    /// Half of it is this colour.
+    /// Mean of each pixel and this colour.
     Blend(u32),
-    /// Its brightness in this colour.
+    /// This colour with the brightness of each pixel.
     Grey(u32),
-    /// The first row of a segment: this colour alone.
+    /// This colour in place of the pixels: the first row of a segment.
     Edge(u32),
 }
 
@@ -68,20 +68,20 @@ impl Canvas {
         &self.pixels
     }
 
-    /// Takes the size of the window; what it showed is gone.
+    /// Changes the size, in pixels. The content is undefined afterwards.
     pub(super) fn resize(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
         self.pixels.resize(width * height, 0);
     }
 
-    /// Fills everything with one colour.
+    /// Fills the canvas with one colour.
     pub(super) fn fill(&mut self, color: u32) {
         self.pixels.fill(color);
     }
 
-    /// Shows a picture over the whole canvas. One of another size (it is rendered at a smaller scale, or the window has just been
-    /// resized) is stretched.
+    /// Draws a picture over the whole canvas. A picture of another size is resized: it is rendered at a smaller scale, or the
+    /// window has just been resized.
     pub(super) fn show(&mut self, picture: Picture<'_>) {
         if picture.rgb.len() != picture.width * picture.height * 3 || picture.rgb.is_empty() {
             return;
@@ -104,13 +104,13 @@ impl Canvas {
         }
     }
 
-    /// Colours the picture that is shown over the whole canvas: `rows` are the picture's, from the top.
+    /// Tints the rows of the picture that covers the canvas. `rows` are those of the picture, from the top.
     pub(super) fn tint(&mut self, rows: &[RowTint]) {
         let height = self.height;
         let mut above = None;
         for (y, pixels) in self.pixels.chunks_exact_mut(self.width.max(1)).enumerate() {
             let source = y * rows.len() / height.max(1);
-            // A row that is stretched over several lines has its edge once.
+            // A row that covers several lines has its edge once.
             let repeated = above.replace(source) == Some(source);
             match rows.get(source).copied().unwrap_or_default() {
                 RowTint::None => {}
@@ -133,7 +133,7 @@ impl Canvas {
         }
     }
 
-    /// Darkens a rectangle to a quarter, so that text on it can be read whatever the picture shows there.
+    /// Darkens a rectangle to a quarter, so that text on it is legible on any picture.
     pub(super) fn darken(&mut self, rect: Rect) {
         for y in rect.y..rect.y.saturating_add(rect.height).min(self.height) {
             let end = rect.x.saturating_add(rect.width).min(self.width);
@@ -146,7 +146,7 @@ impl Canvas {
         }
     }
 
-    /// Draws one line of text, its top left corner at (`x`, `y`), each dot `scale` pixels wide.
+    /// Draws one line of text with its top left corner at (`x`, `y`) and dots of `scale` pixels.
     pub(super) fn text(&mut self, x: usize, y: usize, scale: usize, color: u32, text: &str) {
         for (index, character) in text.chars().enumerate() {
             let left = x.saturating_add(index.saturating_mul(GLYPH * scale));
@@ -175,23 +175,23 @@ impl Canvas {
     }
 }
 
-/// No window and no picture has so many pixels a side that they would not fit.
+/// Converts a side, which fits for all windows and pictures.
 fn side(pixels: usize) -> u32 {
     u32::try_from(pixels).unwrap_or(u32::MAX)
 }
 
-/// Rows of dots, the lowest bit leftmost; characters that the font lacks are question marks.
+/// Rows of dots of a character, the lowest bit leftmost. A character that the font lacks is a question mark.
 fn glyph(character: char) -> [u8; GLYPH] {
     let fonts = || font8x8::BASIC_FONTS.get(character).or_else(|| font8x8::LATIN_FONTS.get(character));
     fonts().or_else(|| font8x8::BASIC_FONTS.get('?')).unwrap_or([0; GLYPH])
 }
 
-/// The mean of two colours.
+/// Mean of two colours.
 fn halfway(a: u32, b: u32) -> u32 {
     ((a >> 1) & 0x007f_7f7f) + ((b >> 1) & 0x007f_7f7f)
 }
 
-/// A colour, two fifths of it always and the rest as bright as `pixel` is.
+/// A colour at two fifths of its brightness, plus three fifths times the brightness of `pixel`.
 fn lit(color: u32, pixel: u32) -> u32 {
     let [_, r, g, b] = pixel.to_be_bytes().map(u32::from);
     // Rec. 601 luma in 256ths, then 0.4 + 0.6 of it.
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_whose_bytes_do_not_fit_is_not_shown() {
+    fn a_picture_whose_bytes_do_not_fit_is_not_drawn() {
         let mut canvas = canvas(2, 2, 7);
         canvas.show(Picture { width: 2, height: 2, rgb: &[0; 11] });
         canvas.show(Picture { width: 0, height: 0, rgb: &[] });
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn panels_darken_what_they_cover_and_nothing_else() {
+    fn panels_darken_only_their_rectangle() {
         let mut canvas = canvas(4, 4, 0x00ff_8040);
         canvas.darken(Rect { x: 2, y: 2, width: 9, height: usize::MAX });
         assert_eq!(canvas.pixels()[2 * 4 + 2], 0x003f_2010);

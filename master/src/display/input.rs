@@ -1,18 +1,20 @@
-//! What the user does at the window, as minifb tells it, and what of it the camera and the overlay want to know.
+//! Keyboard and mouse of the window, and their meaning for camera, overlay and workers.
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::time::Instant;
 
+use glam::DVec3;
 use minifb::{InputCallback, Key, MouseButton, MouseMode, Window};
 use raw_window_handle::{HasWindowHandle, RawWindowHandle};
 
-use crate::camera_control::{Held, Input};
+use crate::viewer::InputAction;
 
-/// Keys that went down or up, in order, since they were last asked for.
+/// Keys that were pressed (`true`) or released, in order, since the last update.
 type Edges = Rc<RefCell<Vec<(Key, bool)>>>;
 
-/// Hears every key, also one that is pressed and released between two updates: asking minifb which keys are down
-/// misses those.
+/// Receiver of every key, also of one that is pressed and released between two updates; minifb's list of pressed keys misses
+/// those.
 struct Listener(Edges);
 
 impl InputCallback for Listener {
@@ -30,47 +32,48 @@ pub(super) struct Controls {
     keyboard: Keyboard,
     mouse: Mouse,
     notches_per_unit: f64,
+    updated_at: Instant,
 }
 
-/// What happened since the last look.
+/// Input since the last update.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Happened {
-    /// For the camera.
-    pub(super) camera: Input,
-    /// H was pressed.
+pub(super) struct InputEvents {
+    /// Actions on the camera.
+    pub(super) camera: Vec<InputAction>,
+    /// H: shows or hides the list of keys.
     pub(super) toggle_help: bool,
-    /// O was pressed.
+    /// O: shows or hides the figures.
     pub(super) toggle_figures: bool,
-    /// F was pressed.
+    /// F: shows or hides the panel of workers.
     pub(super) toggle_accounts: bool,
-    /// How often C was pressed.
+    /// Presses of C: colours rows in the next way.
     pub(super) next_coloring: usize,
-    /// How often Tab was pressed.
+    /// Presses of Tab: selects the next worker.
     pub(super) select_next: usize,
-    /// P was pressed.
+    /// P: pauses or resumes workers.
     pub(super) toggle_pause: bool,
-    /// L was pressed.
-    pub(super) let_go: bool,
-    /// K was pressed.
+    /// L: drains the selected worker.
+    pub(super) drain: bool,
+    /// K: kicks the selected worker.
     pub(super) kick: bool,
-    /// B was pressed.
+    /// B: admits kicked workers again.
     pub(super) bring_back: bool,
-    /// Esc was pressed.
-    pub(super) end: bool,
-    /// A key is down or was, or the mouse has moved.
+    /// Esc: ends the viewer.
+    pub(super) quit: bool,
+    /// Whether a key was down or the mouse has moved.
     pub(super) any: bool,
 }
 
-impl Happened {
-    /// Whether workers are meant.
-    pub(super) fn steers(&self) -> bool {
-        let Self { toggle_accounts, select_next, toggle_pause, let_go, kick, bring_back, .. } = *self;
-        toggle_accounts || select_next > 0 || toggle_pause || let_go || kick || bring_back
+impl InputEvents {
+    /// Whether any of them concerns workers.
+    pub(super) fn concerns_workers(&self) -> bool {
+        let Self { toggle_accounts, select_next, toggle_pause, drain, kick, bring_back, .. } = *self;
+        toggle_accounts || select_next > 0 || toggle_pause || drain || kick || bring_back
     }
 }
 
 impl Controls {
-    /// Listens to `window` from now on.
+    /// Receives the input of `window` from now on.
     pub(super) fn of(window: &mut Window) -> Self {
         let edges = Edges::default();
         window.set_input_callback(Box::new(Listener(Rc::clone(&edges))));
@@ -80,11 +83,12 @@ impl Controls {
             keyboard: Keyboard::default(),
             mouse: Mouse::default(),
             notches_per_unit: system.map_or(1.0, notches_per_unit),
+            updated_at: Instant::now(),
         }
     }
 
-    /// What happened since the last look; once per update of the window.
-    pub(super) fn look(&mut self, window: &mut Window) -> Happened {
+    /// Input since the last call; once per update of the window.
+    pub(super) fn update(&mut self, window: &mut Window) -> InputEvents {
         let edges = std::mem::take(&mut *self.edges.borrow_mut());
         let strokes = self.keyboard.strokes(&edges, window.is_active());
         let at = window.get_unscaled_mouse_pos(MouseMode::Pass);
@@ -93,30 +97,55 @@ impl Controls {
         let wheel =
             window.get_scroll_wheel().map_or(0.0, |(_, units)| f64::from(units) * self.notches_per_unit);
         let moved = self.mouse.moved(window.get_unscaled_mouse_pos(MouseMode::Discard));
-        Happened {
+        let seconds = self.updated_at.elapsed().as_secs_f64();
+        self.updated_at = Instant::now();
+        InputEvents {
             any: moved || pressed || wheel != 0.0 || !strokes.held.is_empty(),
-            camera: Input {
-                held: held(&strokes.held),
-                drag,
-                wheel,
-                reset: strokes.pressed.contains(&Key::R),
-            },
+            camera: camera_actions(&strokes, drag, wheel, seconds),
             toggle_help: strokes.toggled(Key::H),
             toggle_figures: strokes.toggled(Key::O),
             toggle_accounts: strokes.toggled(Key::F),
             next_coloring: strokes.count(Key::C),
             select_next: strokes.count(Key::Tab),
             toggle_pause: strokes.toggled(Key::P),
-            let_go: strokes.pressed.contains(&Key::L),
+            drain: strokes.pressed.contains(&Key::L),
             kick: strokes.pressed.contains(&Key::K),
             bring_back: strokes.pressed.contains(&Key::B),
-            end: strokes.pressed.contains(&Key::Escape),
+            quit: strokes.pressed.contains(&Key::Escape),
         }
     }
 }
 
-/// minifb hands on what each window system calls a notch of the wheel away from the user: X and macOS 1, Windows 12,
-/// Wayland -10 (its axis points downwards, and compositors count ten to fifteen units a notch).
+/// Actions on the camera: R resets it, W A S D E Q move it, arrows turn it, a drag orbits, the wheel zooms. `drag` is in
+/// heights of the window, to the right and downwards.
+fn camera_actions(strokes: &Strokes, drag: (f64, f64), wheel: f64, seconds: f64) -> Vec<InputAction> {
+    let mut actions = Vec::new();
+    if strokes.pressed.contains(&Key::R) {
+        actions.push(InputAction::ResetCamera);
+    }
+    let axis = |positive, negative| {
+        let is_held = |key| i8::from(strokes.held.contains(&key));
+        f64::from(is_held(positive) - is_held(negative))
+    };
+    let direction = DVec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
+    if direction != DVec3::ZERO {
+        actions.push(InputAction::Move { direction, seconds });
+    }
+    let (right, up) = (axis(Key::Right, Key::Left), axis(Key::Up, Key::Down));
+    if (right, up) != (0.0, 0.0) {
+        actions.push(InputAction::Look { right, up, seconds });
+    }
+    if drag != (0.0, 0.0) {
+        actions.push(InputAction::Orbit { right: drag.0, down: drag.1 });
+    }
+    if wheel != 0.0 {
+        actions.push(InputAction::Zoom { notches: wheel });
+    }
+    actions
+}
+
+/// Notches per unit of the wheel, away from the user. minifb passes on the units of each window system: a notch is 1 on X
+/// and macOS, 12 on Windows and -10 on Wayland (its axis points downwards, and compositors count ten to fifteen units).
 fn notches_per_unit(system: RawWindowHandle) -> f64 {
     match system {
         RawWindowHandle::Wayland(_) => -1.0 / 10.0,
@@ -125,24 +154,24 @@ fn notches_per_unit(system: RawWindowHandle) -> f64 {
     }
 }
 
-/// Which keys are down.
+/// Keys that are down.
 #[derive(Debug, Default)]
 struct Keyboard {
     down: Vec<Key>,
     was_active: bool,
 }
 
-/// Keys of one look.
+/// Keys of one update.
 #[derive(Debug, Default, PartialEq)]
 struct Strokes {
-    /// Down at any moment since the last look.
+    /// Down at any moment since the last update.
     held: Vec<Key>,
-    /// Gone down since the last look, each time it did.
+    /// Pressed since the last update, once per press.
     pressed: Vec<Key>,
 }
 
 impl Strokes {
-    /// Whether a switch that `key` turns has turned: twice is back again.
+    /// Whether a switch of this key has changed: two presses cancel out.
     fn toggled(&self, key: Key) -> bool {
         self.count(key) % 2 == 1
     }
@@ -155,7 +184,7 @@ impl Strokes {
 impl Keyboard {
     fn strokes(&mut self, edges: &[(Key, bool)], active: bool) -> Strokes {
         if self.was_active && !active {
-            // The release of a held key goes to the window that has the keyboard now: nobody will tell us.
+            // The release of a held key goes to the window that has the keyboard now.
             self.down.clear();
         }
         self.was_active = active;
@@ -171,7 +200,7 @@ impl Keyboard {
                 (false, Some(place)) => {
                     self.down.swap_remove(place);
                 }
-                // A held key repeats itself; a key that was down when the window opened is released.
+                // A held key repeats; a key that was down when the window opened is released.
                 (true, Some(_)) | (false, None) => {}
             }
         }
@@ -179,23 +208,7 @@ impl Keyboard {
     }
 }
 
-fn held(keys: &[Key]) -> Held {
-    let is = |key| keys.contains(&key);
-    Held {
-        forward: is(Key::W),
-        back: is(Key::S),
-        left: is(Key::A),
-        right: is(Key::D),
-        up: is(Key::E),
-        down: is(Key::Q),
-        look_left: is(Key::Left),
-        look_right: is(Key::Right),
-        look_up: is(Key::Up),
-        look_down: is(Key::Down),
-    }
-}
-
-/// Where the mouse and a drag were last seen.
+/// Last position of the mouse, and of a drag.
 #[derive(Debug, Default)]
 struct Mouse {
     at: Option<(f32, f32)>,
@@ -203,12 +216,12 @@ struct Mouse {
 }
 
 impl Mouse {
-    /// Whether it has moved since the last look.
+    /// Whether the mouse has moved since the last update.
     fn moved(&mut self, at: Option<(f32, f32)>) -> bool {
         std::mem::replace(&mut self.at, at) != at
     }
 
-    /// How far the pressed mouse moved since the last look, as shares of the window's height.
+    /// Movement of the pressed mouse since the last update, to the right and downwards, in heights of the window.
     fn drag(&mut self, at: Option<(f32, f32)>, pressed: bool, window_height: usize) -> (f64, f64) {
         let to = if pressed { at } else { None };
         let from = std::mem::replace(&mut self.dragged_from, to);
@@ -233,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tap_between_two_looks_is_heard() {
+    fn a_tap_between_two_updates_counts() {
         let mut keyboard = Keyboard::default();
         let tap = keyboard.strokes(&[(Key::H, true), (Key::H, false)], false);
         assert!(tap.toggled(Key::H));
@@ -250,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_that_loses_the_keyboard_lets_go_of_all_keys() {
+    fn a_window_that_loses_the_keyboard_releases_all_keys() {
         let mut keyboard = Keyboard::default();
         keyboard.strokes(&[(Key::W, true)], true);
         assert_eq!(keyboard.strokes(&[], false), Strokes::default());
@@ -266,11 +279,34 @@ mod tests {
     #[test]
     fn each_key_has_its_own_movement() {
         let all = [Key::W, Key::S, Key::A, Key::D, Key::E, Key::Q, Key::Left, Key::Right, Key::Up, Key::Down];
-        let mut seen: Vec<Held> = all.iter().map(|&key| held(&[key])).collect();
-        assert!(seen.iter().all(|&one| one != Held::default()));
-        seen.dedup();
-        assert_eq!(seen.len(), all.len());
-        assert_eq!(held(&[Key::X, Key::Space]), Held::default());
+        let actions = |keys: &[Key]| {
+            let strokes = Strokes { held: keys.to_vec(), pressed: Vec::new() };
+            camera_actions(&strokes, (0.0, 0.0), 0.0, 0.01)
+        };
+        let seen: Vec<Vec<InputAction>> = all.iter().map(|&key| actions(&[key])).collect();
+        for (index, one) in seen.iter().enumerate() {
+            assert_eq!(one.len(), 1);
+            assert!(!seen[..index].contains(one), "{one:?}");
+        }
+        assert_eq!(actions(&[Key::X, Key::Space]), []);
+        assert_eq!(actions(&[Key::W, Key::S]), [], "opposite keys cancel out");
+        assert_eq!(actions(&[Key::W])[0], InputAction::Move { direction: DVec3::Z, seconds: 0.01 });
+    }
+
+    #[test]
+    fn all_actions_of_one_update_keep_their_order() {
+        let strokes = Strokes { held: vec![Key::Left, Key::W], pressed: vec![Key::R] };
+        let actions = camera_actions(&strokes, (0.25, -0.1), -2.0, 0.01);
+        assert_eq!(
+            actions,
+            [
+                InputAction::ResetCamera,
+                InputAction::Move { direction: DVec3::Z, seconds: 0.01 },
+                InputAction::Look { right: -1.0, up: 0.0, seconds: 0.01 },
+                InputAction::Orbit { right: 0.25, down: -0.1 },
+                InputAction::Zoom { notches: -2.0 },
+            ]
+        );
     }
 
     #[test]

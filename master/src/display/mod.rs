@@ -1,19 +1,40 @@
-//! Pictures on a screen.
+//! Displays: each shows a view and sends its input, over a [`ViewerHandle`].
 //!
-//! The window and its input live on the main thread, as window systems want it; the farm lives on tokio's threads.
-//! Between them stand a [`feed`]: the newest camera goes one way, the newest picture the other, and neither side ever
-//! waits for the other, so a slow farm does not freeze the window and a slow screen does not slow the farm.
+//! The window is one display; `render`, which writes frames to files, is another. The window and its input live on the main
+//! thread, as window systems require; the viewer runs on tokio's threads. Neither ever waits for the other.
 
 mod canvas;
-pub(crate) mod feed;
-pub(crate) mod frame_rate;
 mod input;
-mod latency;
-pub(crate) mod overlay;
-pub(crate) mod requests;
+pub(crate) mod numbers;
+mod overlay;
 mod screen;
-mod sight;
-mod steering;
 mod tint;
+mod visibility;
 mod watch;
-pub(crate) mod window;
+mod window;
+mod worker_selection;
+mod x11;
+
+pub(crate) use window::{SceneInfo, WindowDisplay};
+
+use crate::viewer::ViewerHandle;
+
+/// A display of a view.
+pub(crate) trait Display {
+    /// Shows the view until the user quits or the viewer ends. Blocks the calling thread.
+    ///
+    /// # Errors
+    /// A display that cannot go on.
+    fn run(self, viewer: ViewerHandle) -> Result<(), DisplayError>;
+}
+
+/// Reason for which a display ended early.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum DisplayError {
+    /// A screen that accepts no more pictures, or a file that cannot be written.
+    #[error("{0}")]
+    Failed(String),
+    /// Ctrl-C or SIGTERM came before the last frame.
+    #[error("interrupted")]
+    Interrupted,
+}

@@ -1,23 +1,22 @@
-//! Colours laid over the picture: who rendered its rows, or what they cost. Only the window shows them; the picture
-//! itself stays as it is.
+//! Tints over the picture: by the worker that rendered each row, or by its cost. Only the window shows them.
 
 use super::canvas::RowTint;
 use super::overlay::legend::Entry;
 use crate::accounting::{FrameAccount, SegmentNote, WorkerAccount};
 
-/// What the colours tell.
+/// Meaning of the tints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Coloring {
-    /// There are none.
+    /// No tints.
     #[default]
     Off,
-    /// Who rendered each segment.
+    /// Worker of each segment.
     ByWorker,
-    /// How long each segment took, per row.
+    /// Time of each segment, per row.
     ByCost,
 }
 
-/// One colour after the other for workers 1, 2, 3, ...; they repeat.
+/// Colours of workers 1, 2, 3, ...; they repeat.
 const WORKER_COLORS: [u32; 10] = [
     0x00ff_5a36,
     0x0033_8dff,
@@ -30,7 +29,7 @@ const WORKER_COLORS: [u32; 10] = [
     0x00ff_9d1f,
     0x008a_9bff,
 ];
-/// From cheap to dear.
+/// Colours from cheap to expensive.
 const HEAT: [[f64; 3]; 5] = [
     [70.0, 90.0, 235.0],
     [0.0, 180.0, 220.0],
@@ -38,11 +37,11 @@ const HEAT: [[f64; 3]; 5] = [
     [250.0, 220.0, 30.0],
     [240.0, 40.0, 20.0],
 ];
-/// Steps of the heat that the legend explains.
+/// Steps of `HEAT` in the legend.
 const HEAT_STEPS: u32 = 5;
 
 impl Coloring {
-    /// What the next press of the key shows.
+    /// The next meaning, by the key of the window.
     pub(super) fn next(self) -> Self {
         match self {
             Self::Off => Self::ByWorker,
@@ -51,13 +50,13 @@ impl Coloring {
         }
     }
 
-    /// The colour of each of `rows` rows; empty where there are none.
+    /// Tint of each of `rows` rows; empty without tints.
     pub(super) fn tints(self, account: &FrameAccount, rows: u32) -> Vec<RowTint> {
-        let dearest = dearest(account);
+        let highest = highest_cost(account);
         let color = |note: &SegmentNote| match self {
             Self::Off => None,
             Self::ByWorker => Some((worker_color(note.worker), false)),
-            Self::ByCost => Some((heat(ns_per_row(note) / dearest), true)),
+            Self::ByCost => Some((heat(ns_per_row(note) / highest), true)),
         };
         let mut tints = vec![RowTint::None; rows as usize];
         if self == Self::Off {
@@ -68,7 +67,7 @@ impl Coloring {
             let first = note.first_row as usize;
             let end = first.saturating_add(note.row_count as usize).min(tints.len());
             for (row, tint) in tints.iter_mut().enumerate().take(end).skip(first) {
-                // The first pixels of a row stay, and so does their colour.
+                // The first rendering of a row counts, so its tint does as well.
                 if *tint == RowTint::None {
                     *tint = match (grey, row == first) {
                         (_, true) => RowTint::Edge(color),
@@ -81,14 +80,14 @@ impl Coloring {
         tints
     }
 
-    /// What the colours mean: a title and the colours.
+    /// Legend of the colours: a title and the entries.
     pub(super) fn legend(self, account: &FrameAccount) -> Option<(&'static str, Vec<Entry>)> {
         match self {
             Self::Off => None,
             Self::ByWorker => {
                 Some(("rendered by", account.workers.iter().filter(|w| w.rows > 0).map(worker).collect()))
             }
-            Self::ByCost => Some(("us of tracing a row", heat_steps(dearest(account)))),
+            Self::ByCost => Some(("us of tracing a row", heat_steps(highest_cost(account)))),
         }
     }
 }
@@ -102,10 +101,10 @@ fn worker_color(id: u64) -> u32 {
     WORKER_COLORS[place]
 }
 
-fn heat_steps(dearest: f64) -> Vec<Entry> {
+fn heat_steps(highest: f64) -> Vec<Entry> {
     let step = |index: u32| {
         let share = f64::from(index) / f64::from(HEAT_STEPS - 1);
-        Entry { color: heat(share), label: format!("{:.0}", share * dearest / 1e3) }
+        Entry { color: heat(share), label: format!("{:.0}", share * highest / 1e3) }
     };
     (0..HEAT_STEPS).rev().map(step).collect()
 }
@@ -114,12 +113,12 @@ fn ns_per_row(note: &SegmentNote) -> f64 {
     note.trace_ns as f64 / f64::from(note.row_count.max(1))
 }
 
-/// Nanoseconds of the segment whose rows took longest; above zero.
-fn dearest(account: &FrameAccount) -> f64 {
+/// Nanoseconds per row of the most expensive segment; above zero.
+fn highest_cost(account: &FrameAccount) -> f64 {
     account.segments.iter().map(ns_per_row).fold(1.0, f64::max)
 }
 
-/// The colour of a share (0..=1) of the dearest.
+/// Colour of a part (0..=1) of the highest cost.
 fn heat(share: f64) -> u32 {
     let place = share.clamp(0.0, 1.0) * (HEAT.len() - 1) as f64;
     let below = (place as usize).min(HEAT.len() - 2);
@@ -146,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_bear_the_color_of_the_one_who_was_first() {
+    fn rows_have_the_colour_of_the_worker_of_their_first_rendering() {
         let tints = Coloring::ByWorker.tints(&account(), 6);
         let (one, two) = (worker_color(1), worker_color(2));
         let expected = [RowTint::Edge(one), RowTint::Blend(one), RowTint::Edge(two), RowTint::Blend(two)];
@@ -156,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_dearest_rows_are_hottest() {
+    fn the_most_expensive_rows_are_hottest() {
         let tints = Coloring::ByCost.tints(&account(), 5);
         assert_eq!(tints[3], RowTint::Grey(heat(1.0)));
         assert_eq!(tints[1], RowTint::Grey(heat(0.1)));
@@ -164,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn the_key_goes_round() {
+    fn the_key_cycles_through_all_meanings() {
         let mut coloring = Coloring::default();
         for shown in [Coloring::ByWorker, Coloring::ByCost, Coloring::Off] {
             coloring = coloring.next();
@@ -175,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn the_legend_names_those_who_rendered() {
+    fn the_legend_names_the_workers_that_rendered() {
         let (_, entries) = Coloring::ByWorker.legend(&account()).unwrap();
         assert_eq!(
             entries.iter().map(|entry| entry.label.as_str()).collect::<Vec<_>>(),

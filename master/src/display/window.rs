@@ -1,49 +1,43 @@
-//! The window: shows the newest picture with its figures, and turns keys and mouse into cameras.
+//! The window: shows the newest frame with its figures, and sends the input of keys and mouse.
 
-use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use minifb::Window;
 use rayfarm_tracer::image::MAX_SIDE;
-use rayfarm_tracer::scene::FrameView;
-use tokio::sync::watch;
-use tokio_util::sync::CancellationToken;
 
 use super::canvas::{Canvas, Picture};
-use super::feed::{Arrival, NewsDesk};
-use super::input::{Controls, Happened};
+use super::input::{Controls, InputEvents};
 use super::overlay::accounts::AccountPanel;
 use super::overlay::{self, Figures, Overlay};
-use super::requests::WindowState;
 use super::screen;
-use super::steering::{self, Steering};
 use super::tint::Coloring;
-use super::watch::Watch;
-use crate::camera_control::CameraControl;
-use crate::farm::{FarmControl, FarmStatus, FinishedFrame};
-use crate::wanted::WantedPicture;
+use super::watch::WindowWatch;
+use super::worker_selection::{self, WorkerSelection};
+use super::{Display, DisplayError};
+use crate::farm::FarmStatus;
+use crate::viewer::{InputAction, PresentedFrame, Statistics, ViewerHandle};
 
-/// This often the figures are looked at, and drawn if they have changed.
+/// Interval at which the figures are compared with those on the screen, and drawn if they differ.
 const FIGURES_EVERY: Duration = Duration::from_millis(200);
-/// The input is looked at this many times a second while something happens, while nothing does, and while the window
-/// is hidden.
+/// Updates of the window per second: while something happens, while nothing does, and while the window is hidden.
 const UPDATES: usize = 120;
 const RESTING_UPDATES: usize = 30;
 const HIDDEN_UPDATES: usize = 10;
-/// After the last input, something is expected to happen for this long.
+/// Time after the last input in which further input is expected.
 const ALERT: Duration = Duration::from_secs(1);
 const TITLE_EVERY: Duration = Duration::from_millis(500);
-/// A frame that takes longer than this is told how far it is.
-const PATIENCE: Duration = Duration::from_millis(700);
-/// Workers whose trouble is told before the first picture.
-const MAX_TROUBLES: usize = 4;
-/// What is seen before the first picture.
-const GROUND: u32 = 0x0020_2428;
+/// Frame time above which the figures include the progress of the frame.
+const SLOW_FRAME: Duration = Duration::from_millis(700);
+/// Workers whose problems are listed before the first picture.
+const MAX_PROBLEMS: usize = 4;
+/// Colour of the window before the first picture.
+const BACKGROUND: u32 = 0x0020_2428;
 
-/// What the window shows besides pictures.
+/// Facts about the scene and its farm that the window shows.
 #[derive(Clone, Debug)]
-pub(crate) struct About {
-    /// The scene's name, for the title.
+pub(crate) struct SceneInfo {
+    /// Name of the scene, for the title.
     pub(crate) name: String,
     /// Triangles over all instances.
     pub(crate) triangles: u64,
@@ -51,129 +45,120 @@ pub(crate) struct About {
     pub(crate) local_workers: u32,
 }
 
-/// A window on the screen that shows nothing yet.
-pub(crate) struct Display {
+/// A window on the screen.
+pub(crate) struct WindowDisplay {
     /// Dropped before the window that it watches.
-    watch: Watch,
+    watch: WindowWatch,
     window: Window,
     controls: Controls,
-    about: About,
+    info: SceneInfo,
     canvas: Canvas,
-    picture: Option<FinishedFrame>,
-    /// What is written over it on the screen.
-    shown: Overlay,
+    picture: Option<Arc<PresentedFrame>>,
+    /// Overlay on the screen.
+    drawn: Overlay,
     title: String,
-    /// What the dial says of it.
-    dial: Vec<String>,
-    /// When the picture was asked for, until it is on the screen.
-    asked_at: Option<Instant>,
+    /// Time of the input that the picture answers, until it is on the screen.
+    input_at: Option<Instant>,
     show_help: bool,
     show_figures: bool,
-    steering: Steering,
+    selection: WorkerSelection,
     coloring: Coloring,
+    /// Size and visibility as last sent to the viewer.
+    sent: Option<((u32, u32), bool)>,
 }
 
-/// The two ways between the window and the farm.
-pub(crate) struct Link {
-    /// Where the newest view goes.
-    pub(crate) wanted: watch::Sender<WindowState>,
-    /// Where the newest picture comes from.
-    pub(crate) desk: NewsDesk,
-    /// Where commands to workers go.
-    pub(crate) control: FarmControl,
-    /// Where workers connect.
-    pub(crate) address: SocketAddr,
-    /// Cancelled by either side to end.
-    pub(crate) stop: CancellationToken,
-}
-
-impl Display {
-    /// Opens a window of the given size.
+impl WindowDisplay {
+    /// Opens an empty window of the given size, in pixels.
     ///
     /// # Errors
-    /// Why there is no display.
-    pub(crate) fn open(about: About, width: u32, height: u32) -> Result<Self, String> {
-        let title = format!("rayfarm - {}", about.name);
+    /// The reason for which there is no display, in words for the user.
+    pub(crate) fn open(info: SceneInfo, width: u32, height: u32) -> Result<Self, String> {
+        let title = format!("rayfarm - {}", info.name);
         let mut window = screen::open(&title, width, height)?;
         let controls = Controls::of(&mut window);
         Ok(Self {
-            watch: Watch::of(&window),
+            watch: WindowWatch::of(&window),
             window,
             controls,
-            about,
+            info,
             canvas: Canvas::default(),
             picture: None,
-            shown: Overlay::default(),
+            drawn: Overlay::default(),
             title,
-            dial: Vec::new(),
-            asked_at: None,
+            input_at: None,
             show_help: false,
             show_figures: true,
-            steering: Steering::default(),
+            selection: WorkerSelection::default(),
             coloring: Coloring::default(),
+            sent: None,
         })
     }
+}
 
-    /// Shows pictures until the user ends it or `link.stop` is cancelled, and cancels that. Never waits for the farm.
-    ///
-    /// # Errors
-    /// A screen that takes no pictures any more.
-    pub(crate) fn run(
-        mut self,
-        wanted: WantedPicture,
-        mut camera: CameraControl,
-        link: &Link,
-    ) -> Result<(), String> {
-        // Whatever ends the window ends the farm: who waits for it waits in vain otherwise.
-        let _ended = link.stop.clone().drop_guard();
-        let (mut last_step, mut last_look, mut last_title) = (Instant::now(), None, Instant::now());
+impl Display for WindowDisplay {
+    fn run(mut self, mut viewer: ViewerHandle) -> Result<(), DisplayError> {
+        let (mut last_look, mut last_title) = (None, Instant::now());
         let mut last_input = Instant::now();
-        while self.window.is_open() && !link.stop.is_cancelled() {
-            let happened = self.controls.look(&mut self.window);
-            self.watch.look();
-            if happened.end {
+        while self.window.is_open() && viewer.is_running() {
+            let events = self.controls.update(&mut self.window);
+            self.watch.update();
+            if events.quit {
                 break;
             }
-            if happened.any {
+            if events.any {
                 last_input = Instant::now();
             }
-            camera.step(&happened.camera, last_step.elapsed().as_secs_f64());
-            last_step = Instant::now();
-            let view = FrameView { camera: camera.camera(), ..wanted.view };
-            self.ask_for(WantedPicture { view, ..wanted }, link);
+            self.send_view(&events, &viewer);
 
-            let fresh = self.take_news(&happened, link) | self.steer(&happened, link);
-            let fresh = fresh | (self.window.get_size() != (self.canvas.width(), self.canvas.height()));
+            let changed = self.apply(&events) | self.take_frame(&mut viewer) | self.command(&events, &viewer);
+            let changed = changed | (self.window.get_size() != (self.canvas.width(), self.canvas.height()));
             let stale = last_look.is_none_or(|then: Instant| then.elapsed() > FIGURES_EVERY);
-            if stale || fresh {
+            if stale || changed {
                 last_look = Some(Instant::now());
             }
-            self.set_pace(last_input.elapsed() < ALERT, link);
+            self.set_update_rate(last_input.elapsed() < ALERT, &viewer);
             let exposed = self.watch.take_exposed();
-            if self.watch.is_hidden() || !self.draw_if(fresh || exposed, stale, link)? {
+            if self.watch.is_hidden() || !self.draw_if(changed || exposed, stale, &viewer)? {
                 self.window.update();
             }
             if last_title.elapsed() > TITLE_EVERY {
-                self.set_title(link);
+                self.set_title(&viewer);
                 last_title = Instant::now();
             }
         }
+        // The viewer ends all the same when the handle is dropped.
+        viewer.send(vec![InputAction::Quit]);
         Ok(())
     }
+}
 
-    /// Wants a picture of the window's size; only a change of view is worth a message.
-    fn ask_for(&self, picture: WantedPicture, link: &Link) {
-        let (width, height) = self.window.get_size();
-        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(MAX_SIDE).clamp(1, MAX_SIDE);
-        let view = FrameView { width: side(width), height: side(height), ..picture.view };
-        let picture = WantedPicture { view, ..picture };
-        let state = WindowState { picture, hidden: self.watch.is_hidden() };
-        link.wanted.send_if_modified(|wanted| std::mem::replace(wanted, state) != state);
+impl WindowDisplay {
+    /// Sends camera actions, and size and visibility where they have changed. At rest nothing is sent.
+    fn send_view(&mut self, events: &InputEvents, viewer: &ViewerHandle) {
+        let mut actions = events.camera.clone();
+        let (size, visible) = (self.size(), !self.watch.is_hidden());
+        let (sent_size, sent_visible) = self.sent.unzip();
+        if sent_size != Some(size) {
+            actions.push(InputAction::Resize { width: size.0, height: size.1 });
+        }
+        if sent_visible != Some(visible) {
+            actions.push(InputAction::SetVisible(visible));
+        }
+        if !actions.is_empty() && viewer.send(actions) {
+            self.sent = Some((size, visible));
+        }
     }
 
-    /// Looks often where something happens, and seldom where nothing does: looking costs as well.
-    fn set_pace(&mut self, alert: bool, link: &Link) {
-        let updates = match (self.watch.is_hidden(), alert || link.desk.resting().is_none()) {
+    /// Size of the inside of the window, as far as pictures can be of that size.
+    fn size(&self) -> (u32, u32) {
+        let (width, height) = self.window.get_size();
+        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(MAX_SIDE).clamp(1, MAX_SIDE);
+        (side(width), side(height))
+    }
+
+    /// Sets the rate at which input is read: reading takes time as well.
+    fn set_update_rate(&mut self, alert: bool, viewer: &ViewerHandle) {
+        let updates = match (self.watch.is_hidden(), alert || !viewer.statistics().resting) {
             (true, _) => HIDDEN_UPDATES,
             (false, true) => UPDATES,
             (false, false) => RESTING_UPDATES,
@@ -181,47 +166,51 @@ impl Display {
         self.window.set_target_fps(updates);
     }
 
-    /// Whether there is something new to see.
-    fn take_news(&mut self, happened: &Happened, link: &Link) -> bool {
-        self.show_help ^= happened.toggle_help;
-        self.show_figures ^= happened.toggle_figures;
-        (0..happened.next_coloring).for_each(|_| self.coloring = self.coloring.next());
-        let mut fresh = happened.toggle_help || happened.toggle_figures || happened.next_coloring > 0;
-        if let Some(Arrival { frame, asked_at, dial }) = link.desk.take_picture() {
-            // What comes while the window is hidden is shown at some other time: that is no latency.
-            let asked_at = (!self.watch.is_hidden()).then_some(asked_at);
-            (self.picture, self.asked_at, self.dial) = (Some(frame), asked_at, dial);
-            fresh = true;
-        }
-        fresh
+    /// Applies the keys of the overlay. Returns whether the window looks different.
+    fn apply(&mut self, events: &InputEvents) -> bool {
+        self.show_help ^= events.toggle_help;
+        self.show_figures ^= events.toggle_figures;
+        (0..events.next_coloring).for_each(|_| self.coloring = self.coloring.next());
+        events.toggle_help || events.toggle_figures || events.next_coloring > 0
     }
 
-    /// Does what keys ask of workers. Whether that can be seen.
-    fn steer(&mut self, happened: &Happened, link: &Link) -> bool {
-        if !happened.steers() && self.steering.selected.is_none() {
+    /// Takes the newest frame. Returns whether there was one.
+    fn take_frame(&mut self, viewer: &mut ViewerHandle) -> bool {
+        let Some(frame) = viewer.new_frame() else { return false };
+        // A frame that arrives while the window is hidden is drawn later: that time is no latency.
+        self.input_at = (!self.watch.is_hidden()).then_some(frame.input_at);
+        self.picture = Some(frame);
+        true
+    }
+
+    /// Sends the commands of keys to workers. Returns whether the selection has changed.
+    fn command(&mut self, events: &InputEvents, viewer: &ViewerHandle) -> bool {
+        if !events.concerns_workers() && self.selection.selected.is_none() {
             return false;
         }
-        let before = self.steering;
-        let wishes = self.steering.step(happened, &link.desk.status());
-        wishes.iter().for_each(|wish| wish.perform(&link.control));
-        self.steering != before
+        let before = self.selection;
+        let commands = self.selection.apply(events, &viewer.status());
+        if !commands.is_empty() {
+            viewer.send(commands.into_iter().map(InputAction::Worker).collect());
+        }
+        self.selection != before
     }
 
-    /// Draws the window if it must be, or if it is time to look whether what is written on it has changed. Whether it was.
-    fn draw_if(&mut self, must: bool, look: bool, link: &Link) -> Result<bool, String> {
-        let overlay = (must || look).then(|| self.overlay(self.window.get_size(), link));
-        match overlay.filter(|overlay| must || *overlay != self.shown) {
-            Some(overlay) => self.draw(overlay, link).map(|()| true),
+    /// Draws the window if it must be, or if `look` and the overlay has changed. Returns whether it was drawn.
+    fn draw_if(&mut self, must: bool, look: bool, viewer: &ViewerHandle) -> Result<bool, DisplayError> {
+        let overlay = (must || look).then(|| self.overlay(self.window.get_size(), viewer));
+        match overlay.filter(|overlay| must || *overlay != self.drawn) {
+            Some(overlay) => self.draw(overlay, viewer).map(|()| true),
             None => Ok(false),
         }
     }
 
-    fn draw(&mut self, overlay: Overlay, link: &Link) -> Result<(), String> {
+    fn draw(&mut self, overlay: Overlay, viewer: &ViewerHandle) -> Result<(), DisplayError> {
         let (width, height) = self.window.get_size();
         self.canvas.resize(width, height);
-        match &self.picture {
-            None => self.canvas.fill(GROUND),
-            Some(frame) => {
+        match self.picture.as_deref() {
+            None => self.canvas.fill(BACKGROUND),
+            Some(PresentedFrame { frame, .. }) => {
                 self.canvas.show(Picture {
                     width: frame.view.width as usize,
                     height: frame.view.height as usize,
@@ -231,79 +220,80 @@ impl Display {
             }
         }
         overlay.draw(&mut self.canvas);
-        self.shown = overlay;
+        self.drawn = overlay;
         self.window
             .update_with_buffer(self.canvas.pixels(), width, height)
-            .map_err(|error| format!("the window takes no more pictures: {error}"))?;
+            .map_err(|error| DisplayError::Failed(format!("the window accepts no more pictures: {error}")))?;
         self.watch.drawn();
-        if let Some(asked_at) = self.asked_at.take() {
-            link.desk.shown(asked_at.elapsed());
+        if let Some(input_at) = self.input_at.take() {
+            viewer.send(vec![InputAction::Presented { latency: input_at.elapsed() }]);
         }
         Ok(())
     }
 
-    /// What is to be written over the picture in a window of `size`.
-    fn overlay(&self, size: (usize, usize), link: &Link) -> Overlay {
-        let status = link.desk.status();
+    /// The overlay of a window of `size`, in pixels.
+    fn overlay(&self, size: (usize, usize), viewer: &ViewerHandle) -> Overlay {
+        let (status, statistics) = (viewer.status(), viewer.statistics());
         let room_for_both = size.0 >= 640 && size.1 >= 480;
-        let figures = self.show_figures && self.picture.is_some() && (room_for_both || !self.show_help);
-        let selected = self.steering.selected;
+        let show_figures = self.show_figures && (room_for_both || !self.show_help);
+        let picture = self.picture.as_deref();
+        let WorkerSelection { shown, selected } = self.selection;
         Overlay {
-            figures: figures.then(|| self.figures(&status, link)),
-            legend: self.picture.as_ref().and_then(|frame| self.coloring.legend(&frame.account)),
-            accounts: self
-                .steering
-                .shown
-                .then(|| AccountPanel::new(size, &status, &link.desk.accounts(), selected)),
+            figures: picture
+                .filter(|_| show_figures)
+                .map(|picture| self.figures(picture, &status, &statistics)),
+            legend: picture.and_then(|picture| self.coloring.legend(&picture.frame.account)),
+            accounts: shown.then(|| AccountPanel::new(size, &status, &statistics.accounts, selected)),
             help: self.show_help,
-            message: self.message(&status, link),
+            message: self.message(&status, &statistics, viewer),
         }
     }
 
-    /// What the window waits for, if it does.
-    fn message(&self, status: &FarmStatus, link: &Link) -> Option<Vec<String>> {
+    /// The reason for which no picture or no progress is to be seen, if there is one.
+    fn message(
+        &self,
+        status: &FarmStatus,
+        statistics: &Statistics,
+        viewer: &ViewerHandle,
+    ) -> Option<Vec<String>> {
         if status.workers.is_empty() {
-            let trouble = link.desk.trouble();
-            let local = self.about.local_workers;
             return Some(overlay::waiting_for_workers(
-                link.address,
-                local,
-                trouble.as_deref(),
+                viewer.address(),
+                self.info.local_workers,
+                statistics.problem.as_deref(),
                 &status.banned,
             ));
         }
-        if steering::all_paused(status) {
+        if worker_selection::all_paused(status) {
             return Some(overlay::all_paused());
         }
         self.picture.is_none().then(|| first_picture(status))
     }
 
-    fn figures(&self, status: &FarmStatus, link: &Link) -> Figures {
-        let (fps, frame_time) = link.desk.rate();
-        let resting = link.desk.resting();
-        let wanted = link.wanted.borrow().picture;
-        let view = wanted.view;
-        let shown = self.picture.as_ref().map_or(wanted, |frame| wanted.shown_by(&frame.view));
-        let slow = frame_time.max(link.desk.since_last_frame()) > PATIENCE && !status.workers.is_empty();
+    fn figures(&self, picture: &PresentedFrame, status: &FarmStatus, statistics: &Statistics) -> Figures {
+        let Statistics { resting, frame_time, since_last_frame, .. } = *statistics;
+        let is_slow = frame_time.max(since_last_frame) > SLOW_FRAME && !status.workers.is_empty();
+        let quality = if resting { &statistics.quality } else { &picture.quality };
         Figures {
-            fps: resting.is_none().then_some(fps),
+            fps: (!resting).then_some(statistics.fps),
             frame_time,
-            latency: link.desk.latency(),
-            size: (view.width, view.height),
-            samples: shown.view.samples,
-            dial: resting.clone().unwrap_or_else(|| self.dial.clone()),
-            reductions: shown.reductions(),
+            latency: statistics.latency,
+            size: self.size(),
+            samples: picture.request.view.samples,
+            quality: quality.clone(),
+            reductions: picture.request.reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),
-            triangles: self.about.triangles,
-            progress: (slow && resting.is_none()).then(|| progress(status)),
+            triangles: self.info.triangles,
+            progress: (is_slow && !resting).then(|| progress(status)),
         }
     }
 
-    fn set_title(&mut self, link: &Link) {
-        let mut title = format!("rayfarm - {}", self.about.name);
-        if self.picture.is_some() {
-            title += &format!(" - {}", self.figures(&link.desk.status(), link).speed());
+    fn set_title(&mut self, viewer: &ViewerHandle) {
+        let mut title = format!("rayfarm - {}", self.info.name);
+        if let Some(picture) = self.picture.as_deref() {
+            let figures = self.figures(picture, &viewer.status(), &viewer.statistics());
+            title += &format!(" - {}", figures.speed());
         }
         if self.title != title {
             self.window.set_title(&title);
@@ -317,14 +307,14 @@ fn first_picture(status: &FarmStatus) -> Vec<String> {
         done if done > 0.0 => format!("Rendering the first picture: {:.0} %", done * 100.0),
         _ => "Sending the scene to the workers.".to_owned(),
     };
-    let troubles = status.workers.iter().filter_map(|worker| {
-        let trouble = worker.last_failure.as_ref()?;
-        Some(format!("{} cannot render it: {trouble}", worker.name))
+    let problems = status.workers.iter().filter_map(|worker| {
+        let problem = worker.last_failure.as_ref()?;
+        Some(format!("{} cannot render it: {problem}", worker.name))
     });
-    std::iter::once(first).chain(troubles.take(MAX_TROUBLES)).collect()
+    std::iter::once(first).chain(problems.take(MAX_PROBLEMS)).collect()
 }
 
-/// How much of the frame being rendered is done: 0..=1.
+/// Completed part of the frame being rendered: 0..=1.
 fn progress(status: &FarmStatus) -> f64 {
     f64::from(status.rows_done) / f64::from(status.rows.max(1))
 }

@@ -54,9 +54,10 @@ pub struct Outcome {
     pub drained: bool,
 }
 
-/// RGB8 pixels of rows: a function of the view, x and y, as in any picture.
+/// The pixels of rows: a function of the view, x and y, like any picture.
 pub fn pixels(view: &FrameView, rows: Range<u32>) -> Vec<u8> {
-    let pixel = |x: u32, y: u32| [x as u8, y as u8, (view.spin as u32 + x * y) as u8];
+    let seed = view.spin as u32 + (view.camera.position.x * 1e4).abs() as u32;
+    let pixel = |x: u32, y: u32| [x as u8, y as u8, (seed + x * y) as u8];
     rows.flat_map(|y| (0..view.width).flat_map(move |x| pixel(x, y))).collect()
 }
 

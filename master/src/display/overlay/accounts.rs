@@ -1,33 +1,34 @@
-//! The panel of workers: what each does with its time, and which one is selected.
+//! Panel of workers: the use of each worker's time, and the selected worker.
 
-use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, grouped, kicked};
+use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, kicked};
 use crate::accounting::{Fading, PART_COUNT, Smoothed};
 use crate::display::canvas::Canvas;
+use crate::display::numbers::grouped;
 use crate::farm::{FarmStatus, Verification, WorkerState};
 
-/// What the parts are called where there is room for words, and where there is not.
+/// Names of the parts of thread time, from wide to narrow layouts.
 const WORDS: [&str; PART_COUNT] = ["trace", "wait", "encode", "send", "decode", "tail", "scene"];
 const SHORT: [&str; PART_COUNT] = ["trc", "wait", "enc", "send", "dec", "tail", "scn"];
 const SHORTEST: [&str; PART_COUNT] = ["trc", "wai", "enc", "snd", "dec", "tai", "scn"];
-const HINT: &str = "% of thread time  Tab select  P pause  L let go  K kick";
+const HINT: &str = "% of thread time  Tab select  P pause  L drain  K kick";
 const SHORT_HINT: &str = "Tab P L K: see H";
-/// Characters of a name.
+/// Width of the column of names, in characters.
 const NAMES: std::ops::RangeInclusive<usize> = 8..=24;
 
-/// How the columns are laid out.
+/// Widths of the columns, in characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Layout {
     name: usize,
     part: usize,
-    /// Digits behind the point of a percentage.
+    /// Decimals of a percentage.
     digits: usize,
     words: [&'static str; PART_COUNT],
-    /// Widths of rows per second and kilobytes per frame, where they are shown.
+    /// Widths of the columns of rows per second and kilobytes per frame, where they are shown.
     figures: Option<(usize, usize)>,
     hint: &'static str,
 }
 
-/// From the widest to the narrowest.
+/// Layouts from the widest to the narrowest.
 const LAYOUTS: [Layout; 3] = [
     Layout { name: 8, part: 7, digits: 1, words: WORDS, figures: Some((11, 11)), hint: HINT },
     Layout { name: 8, part: 5, digits: 0, words: SHORT, figures: Some((8, 7)), hint: HINT },
@@ -35,7 +36,7 @@ const LAYOUTS: [Layout; 3] = [
 ];
 
 impl Layout {
-    /// The widest that fits, with as much of the names as fits.
+    /// The widest layout that fits, with as much of the names as fits.
     fn of(columns: usize) -> Self {
         let [.., narrowest] = LAYOUTS;
         let layout = LAYOUTS.into_iter().find(|layout| layout.columns() <= columns).unwrap_or(narrowest);
@@ -43,7 +44,7 @@ impl Layout {
         Self { name: (NAMES.start() + spare).min(*NAMES.end()), ..layout }
     }
 
-    /// The largest text that leaves room for speeds and bytes in a window of this size, and what fits beside it.
+    /// Layout and text scale for a window of this size: the largest text with which speeds and bytes fit.
     fn fit((width, height): (usize, usize)) -> (Self, usize) {
         let columns = |scale: usize| (width / (GLYPH * scale)).saturating_sub(2);
         let [_, medium, _] = LAYOUTS;
@@ -64,7 +65,7 @@ impl Layout {
         format!("  {:name$}{words}{}", "worker", figures.unwrap_or_default(), name = self.name)
     }
 
-    /// A worker's line. `state`: what keeps it from working, in place of its shares; dashes where nothing is known.
+    /// Line of a worker. `state` replaces the percentages of a worker that does not render; dashes replace unknown ones.
     fn line(
         &self,
         mark: char,
@@ -92,8 +93,7 @@ impl Layout {
     }
 }
 
-/// The panel's lines, each with its colour: a header, the workers that there is room for (among them the selected
-/// one), their sum, a hint.
+/// Lines of the panel, each with its colour: a header, the workers that fit (with the selected one), their sum, and hints.
 fn lines(
     layout: &Layout,
     status: &FarmStatus,
@@ -129,14 +129,14 @@ fn lines(
         lines.push((text, if mismatches > 0 { WHITE } else { SOFT }));
     }
     if !status.banned.is_empty() {
-        let text = format!("  {} (B: bring back)", kicked::told(&status.banned));
+        let text = format!("  {} (B: bring back)", kicked::list(&status.banned));
         lines.push((text.chars().take(layout.columns()).collect(), SOFT));
     }
     lines.push((layout.hint.to_owned(), SOFT));
     lines
 }
 
-/// The panel as it is shown in a window of a certain size.
+/// The panel for a window of a certain size.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::display) struct AccountPanel {
     /// Each line with its colour.
@@ -145,7 +145,7 @@ pub(in crate::display) struct AccountPanel {
 }
 
 impl AccountPanel {
-    /// For a window of `size`, pixels per row and rows.
+    /// The panel for a window of `size`: pixels per row, and rows.
     pub(in crate::display) fn new(
         size: (usize, usize),
         status: &FarmStatus,
@@ -157,7 +157,7 @@ impl AccountPanel {
         Self { lines: lines(&layout, status, accounts, selected, room), scale }
     }
 
-    /// Draws it in the lower left corner.
+    /// Draws the panel in the lower left corner.
     pub(super) fn draw(&self, canvas: &mut Canvas) {
         let (lines, colors): (Vec<String>, Vec<u32>) = self.lines.iter().cloned().unzip();
         let panel = Panel { lines, scale: self.scale };
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_tells_name_shares_speed_and_bytes() {
+    fn a_line_has_name_percentages_speed_and_bytes() {
         let texts = texts(2, Some(2), 120, 20);
         let words = |index: usize| texts[index].split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(words(0), "worker trace wait encode send decode tail scene rows/s KB/fr");
@@ -212,16 +212,16 @@ mod tests {
     }
 
     #[test]
-    fn what_was_verified_is_told_where_it_is() {
+    fn counts_of_verification_have_a_line() {
         let counts = Verification { percent: 5, verified: 1234, mismatches: 2, ..Verification::default() };
         let status = FarmStatus { verification: Some(counts), ..status(1) };
         let lines = lines(&Layout::of(120), &status, &accounts(), None, 20);
-        let told: Vec<_> = lines.iter().filter(|(text, _)| text.contains("verified")).collect();
-        assert_eq!(told, [&("  verified 1,234, wrong 2".to_owned(), WHITE)]);
+        let verified: Vec<_> = lines.iter().filter(|(text, _)| text.contains("verified")).collect();
+        assert_eq!(verified, [&("  verified 1,234, wrong 2".to_owned(), WHITE)]);
     }
 
     #[test]
-    fn columns_stand_below_their_words_however_narrow_the_window_is() {
+    fn columns_are_aligned_with_their_words_in_any_width() {
         for columns in [38, 39, 58, 61, 64, 80, 88, 200] {
             let texts = texts(3, None, columns, 20);
             assert!(texts.iter().all(|line| line.chars().count() <= columns), "{columns}: {texts:#?}");
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_that_does_not_work_keeps_its_name_however_narrow_the_window_is() {
+    fn a_worker_that_does_not_render_keeps_its_name_in_any_width() {
         let states = [WorkerState::Paused, WorkerState::Draining, WorkerState::Resting, WorkerState::Silent];
         for (columns, state) in
             [38, 61, 120].into_iter().flat_map(|columns| states.map(|state| (columns, state)))
@@ -251,8 +251,8 @@ mod tests {
             .to_vec();
         let status = FarmStatus { banned: kicked, ..status(1) };
         let lines = lines(&Layout::of(120), &status, &accounts(), None, 20);
-        let told = "  Kicked and kept out: mill, barn (B: bring back)";
-        assert!(lines.iter().any(|(text, _)| text == told), "{lines:#?}");
+        let expected = "  Kicked: mill, barn (B: bring back)";
+        assert!(lines.iter().any(|(text, _)| text == expected), "{lines:#?}");
     }
 
     #[test]
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn the_selected_worker_is_always_in_sight() {
+    fn the_selected_worker_is_always_visible() {
         for selected in 1..=50 {
             let texts = texts(50, Some(selected), 120, 12);
             assert!(texts.len() <= 12 && texts.iter().any(|line| line.starts_with('>')), "{texts:#?}");

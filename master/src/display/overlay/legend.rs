@@ -1,14 +1,14 @@
-//! What the colours over the picture mean.
+//! Legend of the colours over the picture.
 
 use super::{GLYPH, LINE, MARGIN, Panel, WHITE};
 use crate::display::canvas::{Canvas, Rect};
 
-/// Colours that are explained at most.
+/// Largest number of colours in the legend.
 const MAX_ENTRIES: usize = 16;
 /// Characters of a label.
 const MAX_LABEL: usize = 20;
 
-/// A colour and what it stands for.
+/// A colour and its meaning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::display) struct Entry {
     pub(in crate::display) color: u32,
@@ -29,7 +29,7 @@ pub(super) fn draw_legend(canvas: &mut Canvas, title: &str, entries: &[Entry]) {
     let y = MARGIN * scale;
     panel.draw_in(canvas, x, y, |_| WHITE);
     if panel.lines.len() != lines.len() {
-        return; // lines were broken: colours would stand beside the wrong ones
+        return; // lines were broken, so the swatches would be next to other lines
     }
     for (index, entry) in entries.iter().take(MAX_ENTRIES).enumerate() {
         let top = y + (MARGIN + (index + 1) * LINE) * scale;

@@ -14,7 +14,7 @@ fn figures() -> Figures {
         latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
         samples: 4,
-        dial: Vec::new(),
+        quality: Vec::new(),
         reductions: Vec::new(),
         workers: 2,
         threads: 4,
@@ -23,7 +23,7 @@ fn figures() -> Figures {
     }
 }
 
-/// The text that stands on the canvas in `color`, found glyph by glyph at `scale`, from (`x`, `y`).
+/// Text on the canvas in `color`, read glyph by glyph at `scale`, from (`x`, `y`).
 fn read(canvas: &Canvas, x: usize, y: usize, scale: usize, characters: usize, color: u32) -> String {
     let drawn = |column: usize, character: char| {
         let mut expected = Canvas::default();
@@ -43,7 +43,7 @@ fn read(canvas: &Canvas, x: usize, y: usize, scale: usize, characters: usize, co
 }
 
 #[test]
-fn figures_can_be_read_off_the_canvas() {
+fn figures_are_legible_on_the_canvas() {
     let mut canvas = canvas(1024, 768);
     draw_figures(&mut canvas, &figures());
     let (scale, at) = (2, 2 * MARGIN * 2);
@@ -58,28 +58,28 @@ fn figures_can_be_read_off_the_canvas() {
 }
 
 #[test]
-fn the_dial_and_every_knob_that_is_not_at_full_have_a_line() {
+fn the_quality_controller_and_every_reduced_knob_have_a_line() {
     let reductions = vec!["scale 1/2".to_owned(), "no shadows".to_owned()];
-    let dial = vec!["moving: loses FLIP 0.050".to_owned()];
-    let lines = Figures { dial: dial.clone(), reductions: reductions.clone(), ..figures() }.lines();
-    let expected = [&figures().lines()[..2], &dial, &reductions, &figures().lines()[2..]].concat();
+    let quality = vec!["moving: loses FLIP 0.050".to_owned()];
+    let lines = Figures { quality: quality.clone(), reductions: reductions.clone(), ..figures() }.lines();
+    let expected = [&figures().lines()[..2], &quality, &reductions, &figures().lines()[2..]].concat();
     assert_eq!(lines, expected);
 }
 
 #[test]
-fn at_rest_there_is_no_rate_but_what_the_last_frame_took() {
+fn at_rest_the_time_of_the_last_frame_replaces_the_rate() {
     assert_eq!(Figures { fps: None, ..figures() }.speed(), "at rest  32.1 ms");
     assert_eq!(figures().speed(), "31.2 FPS  32.1 ms");
 }
 
 #[test]
-fn a_worker_that_was_kicked_is_no_dead_end() {
+fn the_message_about_a_kicked_worker_says_how_to_bring_it_back() {
     let kicked = [kicked("local-1")];
     let address = SocketAddr::from(([127, 0, 0, 1], 7117));
     let message = waiting_for_workers(address, 1, Some("local worker 1 has left in order"), &kicked);
     let expected = [
         "Waiting for a worker: local worker 1 has left in order.",
-        "Kicked and kept out: local-1",
+        "Kicked: local-1",
         "",
         "B: bring back",
         "",
@@ -100,10 +100,9 @@ fn contrast(a: u32, b: u32) -> f64 {
     (a.max(b) + 0.05) / (a.min(b) + 0.05)
 }
 
-/// Colours of letters, and those behind them, wherever a panel is: a letter's dots are those that differ from what the
-/// same panel shows without text.
+/// The dots of letters are all pixels that are neither of the picture nor of a panel.
 #[test]
-fn text_can_be_read_on_any_picture_also_where_the_window_waits() {
+fn text_is_legible_on_any_picture_and_below_messages() {
     use crate::accounting::Fading;
     use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
     let worker = |id, state| WorkerStatus {
@@ -131,7 +130,7 @@ fn text_can_be_read_on_any_picture_also_where_the_window_waits() {
             let mut canvas = canvas(1024, 768);
             canvas.fill(picture);
             overlay.draw(&mut canvas);
-            // Panels darken to a quarter, once or twice; anything else that is there is a letter.
+            // Panels darken to a quarter, once or twice; all other pixels are of letters.
             let quarter = |color: u32| color >> 2 & 0x003f_3f3f;
             let grounds = [picture, quarter(picture), quarter(quarter(picture))];
             let letters: std::collections::BTreeSet<u32> =
@@ -168,7 +167,7 @@ fn every_window_size_can_be_drawn_on() {
 }
 
 #[test]
-fn the_list_of_keys_stands_on_a_dark_panel_whatever_is_below() {
+fn the_list_of_keys_is_on_a_dark_panel() {
     let mut canvas = canvas(640, 480);
     canvas.fill(0x00ff_ffff);
     draw_help(&mut canvas);
@@ -217,12 +216,6 @@ fn the_waiting_message_says_how_to_start_a_worker() {
     let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2, None, &[]);
     assert_eq!(elsewhere[2], "To start one on any machine:");
     assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
-}
-
-#[test]
-fn numbers_are_short() {
-    assert_eq!([grouped(0), grouped(999), grouped(1000), grouped(99_938)], ["0", "999", "1,000", "99,938"]);
-    assert_eq!([three_digits(0.254), three_digits(31.25), three_digits(240.4)], ["0.25", "31.2", "240"]);
 }
 
 fn kicked(name: &str) -> crate::farm::BannedWorker {

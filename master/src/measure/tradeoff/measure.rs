@@ -11,7 +11,7 @@ use super::setting::Setting;
 use super::table::Row;
 use crate::error::CommandError;
 use crate::in_process::trace;
-use crate::report::{percentile, round_to_us};
+use crate::quantile::{percentile, round_to_us};
 
 /// A scene with the view and the threads that it is measured with.
 pub(crate) struct MeasureContext<'a> {

@@ -2,6 +2,7 @@
 //! reference ([`measure`]), a check of the reference ([`oracle`]), the Pareto front ([`pareto`]), and the table of
 //! all of it, which can be read back ([`table`]). [`report`] formats it as a page and a plot.
 
+pub(crate) mod ladder;
 pub(crate) mod measure;
 pub(crate) mod oracle;
 pub(crate) mod pareto;

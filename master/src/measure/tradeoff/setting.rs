@@ -7,7 +7,7 @@ use rayfarm_tracer::scene::{
     ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
 };
 
-use crate::wanted::WantedPicture;
+use crate::viewer::view_request::ViewRequest;
 
 /// Features of a scene that knobs depend on: a knob for an absent feature does not apply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ struct Knob {
     name: &'static str,
     /// Whether it can change the picture of a scene with these features.
     matters: fn(SceneFeatures) -> bool,
-    apply: fn(&mut WantedPicture),
+    apply: fn(&mut ViewRequest),
 }
 
 /// A setting: some knobs changed, the others at full quality.
@@ -155,10 +155,10 @@ impl Setting {
 
     /// The request for a picture of `view` under this setting. Knobs of `view` are reset, except dither, which
     /// loses nothing.
-    pub(crate) fn applied_to(&self, view: &FrameView) -> WantedPicture {
+    pub(crate) fn applied_to(&self, view: &FrameView) -> ViewRequest {
         let quality = Quality { dither: view.quality.dither, ..Quality::default() };
         let view = FrameView { samples: 1, quality, ..*view };
-        let mut picture = WantedPicture { view, scale: RenderScale::Full };
+        let mut picture = ViewRequest { view, scale: RenderScale::Full };
         for knob in self.knobs {
             (knob.apply)(&mut picture);
         }
@@ -215,8 +215,7 @@ mod tests {
         let view = crate::test_scene::view();
         let turned =
             FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
-        let pictures: Vec<WantedPicture> =
-            SETTINGS.iter().map(|setting| setting.applied_to(&turned)).collect();
+        let pictures: Vec<ViewRequest> = SETTINGS.iter().map(|setting| setting.applied_to(&turned)).collect();
         for (index, picture) in pictures.iter().enumerate() {
             assert!(picture.rendered().validate().is_ok() && picture.view.camera == view.camera);
             assert!(!pictures[..index].contains(picture), "{}", SETTINGS[index].name());

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::progress;
+use crate::log_bar;
 
 /// Time between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -27,7 +27,7 @@ impl Steps {
             false => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target(Some(0), target).with_style(style());
-        progress::stand_below_the_log(&bar);
+        log_bar::show_below_log(&bar);
         Self { bar, quiet, last_line: Mutex::new(Instant::now()) }
     }
 
@@ -66,7 +66,7 @@ impl Steps {
 impl Drop for Steps {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
-        progress::nothing_below_the_log();
+        log_bar::show_nothing_below_log();
     }
 }
 

@@ -1,0 +1,225 @@
+//! `render`: frames to files, without a screen.
+
+use std::time::Duration;
+
+use rayfarm_tracer::scene::FrameView;
+use tokio::runtime::Runtime;
+use tokio_util::sync::CancellationToken;
+
+use files::{FileDisplay, FrameFiles};
+use repair::named;
+use totals::Totals;
+
+use super::interrupt::cancelled_by_signals;
+use super::observability::Observability;
+use super::quality::within_error;
+use super::source::{Source, animation};
+use crate::app::cli::RenderArgs;
+use crate::app::output::{FrameWriter, OutputPattern, check_writable};
+use crate::app::plan::{Existing, Plan};
+use crate::app::progress::Progress;
+use crate::app::reports::{RenderReport, print_json};
+use crate::display::Display;
+use crate::error::CommandError;
+use crate::farm::{Farm, FarmOptions, FarmScene};
+use crate::viewer::orbit::Animation;
+use crate::viewer::view_request::ViewRequest;
+use crate::viewer::{FrameLogFile, Viewer};
+
+mod files;
+mod repair;
+#[cfg(test)]
+mod tests;
+mod totals;
+
+/// Time that local workers have to connect before the run begins without them, and the interval of looking for them.
+const STARTUP_TIMEOUT: Duration = Duration::from_secs(5);
+const STARTUP_POLL: Duration = Duration::from_millis(2);
+
+/// Renders all frames and writes them.
+///
+/// # Errors
+/// A wrong scene or output, found before anything is rendered; a farm that cannot listen or go on; a full disk; an
+/// interruption; frames with wrong pixels that could not be rendered again.
+pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
+    let pattern = OutputPattern::parse(&args.output, args.frames)?;
+    pattern.path(args.first_frame.into()).as_deref().map(check_writable).transpose()?;
+    let source = Source::load(&args.scene, args.models, args.picture.size)?;
+    let request = within_error(&args.error, &source, source.request(&args.picture)?)?;
+    let plan = plan(&args, &pattern, &request)?;
+    let triangles = source.compiled()?.triangle_count();
+    let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
+    let observability = Observability::new(&args.observability)?;
+    let totals = Totals::new(triangles, log);
+    let run = Run {
+        animation: animation(&args.picture, args.frames),
+        wait_for_workers: args.wait_for_workers,
+        files: FrameFiles::new(request, plan, FrameWriter::new(pattern), totals),
+        observability,
+    };
+    let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
+    let report = match run.files.plan.frames.is_empty() {
+        true => run.nothing_to_do()?,
+        false => run.carry_out(&super::runtime()?, args.farm.options(), scene)?,
+    };
+    if args.json {
+        print_json(&report)?;
+    }
+    match report.verification.map(|verification| verification.wrong_frames).unwrap_or_default().as_slice() {
+        [] => Ok(()),
+        wrong => Err(CommandError::Failed(format!(
+            "frames {} have rows of workers that sent wrong pixels, and could not be rendered again: render them with \
+             other workers",
+            named(wrong)
+        ))),
+    }
+}
+
+/// The frames to render.
+fn plan(args: &RenderArgs, pattern: &OutputPattern, request: &ViewRequest) -> Result<Plan, CommandError> {
+    let FrameView { width, height, .. } = request.view;
+    let existing = match (args.resume, args.skip_existing) {
+        (true, _) => Existing::Resume { width, height },
+        (_, true) => Existing::Skip,
+        _ => Existing::Replace,
+    };
+    Plan::new(args.first_frame.into(), args.frames.into(), existing, pattern)
+}
+
+/// One run of `render`.
+struct Run {
+    animation: Animation,
+    /// Number of workers that must be connected before the run begins, however long that takes.
+    wait_for_workers: Option<u32>,
+    files: FrameFiles,
+    observability: Observability,
+}
+
+impl Run {
+    /// Starts a farm, renders everything with it, and shuts it down whatever happened.
+    fn carry_out(
+        mut self,
+        runtime: &Runtime,
+        options: FarmOptions,
+        scene: FarmScene,
+    ) -> Result<RenderReport, CommandError> {
+        let interrupted = runtime.block_on(async { cancelled_by_signals() });
+        let local_workers = options.local_workers;
+        let farm = runtime.block_on(self.start(options, scene, &interrupted))?;
+        let mut progress = Progress::new(self.files.count(), farm.address(), local_workers);
+        runtime.block_on(self.await_workers(&farm, local_workers, &mut progress, &interrupted));
+        let (farm, rendered) = self.render(runtime, farm, &mut progress, &interrupted)?;
+        runtime.block_on(self.conclude(farm, rendered, &mut progress, &interrupted))
+    }
+
+    async fn start(
+        &self,
+        options: FarmOptions,
+        scene: FarmScene,
+        interrupted: &CancellationToken,
+    ) -> Result<Farm, CommandError> {
+        let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
+        if let Err(error) = self.observability.begin(&farm, interrupted) {
+            farm.shut_down().await;
+            return Err(error);
+        }
+        farm.expect_frames(self.files.count());
+        Ok(farm)
+    }
+
+    /// Waits until the workers are connected, so that figures are of the requested number of workers and do not include the
+    /// start of processes. A missing local worker is not awaited for long.
+    async fn await_workers(
+        &self,
+        farm: &Farm,
+        local_workers: u32,
+        progress: &mut Progress,
+        interrupted: &CancellationToken,
+    ) {
+        let (count, timeout) =
+            self.wait_for_workers.map_or((local_workers, STARTUP_TIMEOUT), |count| (count, Duration::MAX));
+        let all_connected = async {
+            let mut status = farm.status();
+            while status.workers.len() < count as usize {
+                progress.update(&status);
+                tokio::time::sleep(STARTUP_POLL).await;
+                status = farm.status();
+            }
+        };
+        tokio::select! {
+            () = interrupted.cancelled() => {}
+            _ = tokio::time::timeout(timeout, all_connected) => {}
+        }
+    }
+
+    /// Renders the plan with a viewer on the runtime and the files as its display on this thread. Returns the farm for the
+    /// frames that must be rendered again.
+    ///
+    /// # Errors
+    /// A viewer that panicked.
+    fn render(
+        &mut self,
+        runtime: &Runtime,
+        farm: Farm,
+        progress: &mut Progress,
+        interrupted: &CancellationToken,
+    ) -> Result<(Farm, Result<(), CommandError>), CommandError> {
+        let files = &mut self.files;
+        let (viewer, handle, sequence) =
+            Viewer::sequence(farm, files.request, self.animation, &files.plan.frames);
+        files.totals.begin();
+        let stop = interrupted.clone();
+        let rendering = runtime.spawn(async move { viewer.run(&stop).await });
+        let display = FileDisplay { runtime, files, sequence, progress, interrupted };
+        let written = display.run(handle).map_err(CommandError::from);
+        let (farm, rendered) = runtime.block_on(rendering).map_err(CommandError::failed)?;
+        Ok((farm, rendered.map_err(CommandError::from).and(written)))
+    }
+
+    /// Finishes files, verification and reports, and shuts the farm down.
+    async fn conclude(
+        mut self,
+        mut farm: Farm,
+        rendered: Result<(), CommandError>,
+        progress: &mut Progress,
+        interrupted: &CancellationToken,
+    ) -> Result<RenderReport, CommandError> {
+        let files = &mut self.files;
+        let written = files.writer.finish().await;
+        let FrameFiles { totals, writer, plan, .. } = files;
+        progress.finish(&totals.summary(writer.written(), plan, writer.has_files()));
+        let verifies = farm.status().verification.is_some();
+        if verifies && rendered.is_ok() && written.is_ok() {
+            self.repair(&mut farm, interrupted).await;
+        }
+        self.files.totals.verification = self.verification(&farm);
+        farm.shut_down().await;
+        let observed = self.observability.end();
+        match rendered.and(written).and(observed) {
+            Err(CommandError::Interrupted(_)) => Err(CommandError::Interrupted(self.so_far())),
+            result => result.map(|()| self.report()),
+        }
+    }
+
+    /// Progress of an interrupted run.
+    fn so_far(&self) -> String {
+        let FrameFiles { writer, totals, plan, .. } = &self.files;
+        let frames = self.files.count();
+        if !writer.has_files() {
+            return format!("{} of {frames} frames are rendered", totals.frames());
+        }
+        let resume = if frames > 1 { "; the same command with --resume goes on" } else { "" };
+        format!("{} of {frames} frames are written{}{resume}", writer.written(), plan.already())
+    }
+
+    /// Report of a run whose files all exist.
+    fn nothing_to_do(mut self) -> Result<RenderReport, CommandError> {
+        tracing::info!("all {} frames are there already: nothing to render", self.files.plan.skipped);
+        self.observability.end()?;
+        Ok(self.report())
+    }
+
+    fn report(&self) -> RenderReport {
+        self.files.totals.report(&self.files.request, &self.files.plan)
+    }
+}

@@ -1,0 +1,139 @@
+//! Runs with workers that send wrong pixels: files and exit status.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
+use tokio::task::JoinHandle;
+
+use super::*;
+use crate::app::cli::Invocation;
+use crate::fake_worker::{self, Script};
+
+/// Far beyond what any of these tests takes.
+const PATIENCE: Duration = Duration::from_secs(120);
+const SCENE: &str = r#"
+[render]
+width = 32
+height = 64
+
+[camera]
+position = [0.0, 0.0, 3.0]
+look_at = [0.0, 0.0, 0.0]
+fov = 45.0
+
+[[light]]
+kind = "point"
+position = [2.0, 3.0, 4.0]
+
+[material.clay]
+diffuse = [0.7, 0.4, 0.3]
+
+[[sphere]]
+center = [0.0, 0.0, 0.0]
+radius = 1.0
+material = "clay"
+"#;
+
+/// Runs of `render` in a folder, and the address of their workers.
+struct Renders {
+    folder: tempfile::TempDir,
+    address: SocketAddr,
+}
+
+impl Renders {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+        let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        Self { folder, address }
+    }
+
+    fn file(&self, name: &str, index: u32) -> PathBuf {
+        self.folder.path().join(format!("{name}-{index}.ppm"))
+    }
+
+    /// Renders frames to `NAME-0.ppm` and so on, one segment each, all verified.
+    fn start(&self, name: &str, frames: u32) -> JoinHandle<Result<(), CommandError>> {
+        let path = |file: &str| self.folder.path().join(file).display().to_string();
+        let words = format!(
+            "rayfarm-master render {} -o {} --frames {frames} --segment static:64 --verify 100 --wait-for-workers 1 \
+             --no-local-workers --listen {}",
+            path("scene.toml"),
+            path(&format!("{name}-%d.ppm")),
+            self.address
+        );
+        let parsed = Invocation::parse(words.split(' ').map(Into::into)).unwrap();
+        let Invocation::Command(command, _) = parsed else { panic!("no command") };
+        tokio::task::spawn_blocking(|| crate::app::commands::run(*command))
+    }
+
+    /// Waits until the run listens.
+    async fn ready(&self) {
+        while tokio::net::TcpStream::connect(self.address).await.is_err() {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    }
+
+    /// Starts a worker that renders the scene.
+    fn real_worker(&self) -> JoinHandle<()> {
+        let options = WorkerOptions {
+            master: self.address.to_string(),
+            threads: Some(1),
+            name: "honest".to_owned(),
+            reconnect: false,
+            once: true,
+            asset_cache_bytes: 1 << 20,
+            disk_cache: None,
+            compress: None,
+            share: Share::Off,
+        };
+        tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) })
+    }
+}
+
+fn bytes(path: &Path) -> Vec<u8> {
+    std::fs::read(path).unwrap()
+}
+
+async fn in_time<T>(what: impl Future<Output = T>) -> T {
+    tokio::time::timeout(PATIENCE, what).await.expect("it never comes to pass")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_with_wrong_rows_are_rendered_again_and_their_files_are_replaced() {
+    let renders = Renders::new();
+    let run = renders.start("right", 3);
+    renders.ready().await;
+    renders.real_worker();
+    in_time(run).await.unwrap().unwrap();
+
+    // The pixels of a fake worker are not those of this scene.
+    let run = renders.start("repaired", 3);
+    renders.ready().await;
+    let worker = fake_worker::start(renders.address, Script::Correct).await;
+    in_time(worker).await.unwrap();
+    renders.real_worker();
+    in_time(run).await.unwrap().unwrap();
+    for index in 0..3 {
+        assert!(
+            bytes(&renders.file("repaired", index)) == bytes(&renders.file("right", index)),
+            "frame {index}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_that_cannot_render_its_frames_again_names_them_and_fails() {
+    let renders = Renders::new();
+    let run = renders.start("wrong", 1);
+    renders.ready().await;
+    // The only segment is the frame: it is complete before it is verified.
+    let worker = fake_worker::start(renders.address, Script::Correct).await;
+    in_time(worker).await.unwrap();
+    let error = in_time(run).await.unwrap().unwrap_err();
+    assert_eq!(error.exit_code(), std::process::ExitCode::from(1));
+    assert!(error.to_string().contains("frames 0 have rows of workers that sent wrong pixels"), "{error}");
+    assert!(renders.file("wrong", 0).exists());
+}

@@ -1,0 +1,119 @@
+//! `view`: a window on the main thread over a viewer on the runtime.
+
+use std::sync::Arc;
+
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+use super::interrupt::cancelled_by_signals;
+use super::observability::Observability;
+use super::quality::view_quality;
+use super::source::{Source, animation, default_scene};
+use crate::app::cli::ViewArgs;
+use crate::display::{Display, SceneInfo, WindowDisplay};
+use crate::error::CommandError;
+use crate::farm::as_text;
+use crate::farm::{Farm, FarmControl, FarmScene};
+use crate::viewer::{
+    CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
+};
+
+/// Frames of one turn of `--orbit` without `--frames`.
+const FRAMES_PER_ORBIT: u32 = 360;
+
+/// Shows a scene until the user ends it, or `--frames` are complete.
+///
+/// # Errors
+/// A wrong scene; no display; a farm that cannot listen or go on.
+pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
+    let path = args.scene.clone().map_or_else(default_scene, Ok)?;
+    let source = Source::load(&path, args.models, args.picture.size)?;
+    let requested = source.request(&args.picture)?;
+    let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
+    let (request, controller) =
+        view_quality(&args.quality_control, &source, requested, animation.is_moving())?;
+    let view = request.view;
+    let compiled = source.compiled()?;
+    let info = SceneInfo {
+        name: source.name.clone(),
+        triangles: compiled.triangle_count(),
+        local_workers: args.farm.local_workers(),
+    };
+    let camera = CameraControl::new(view.camera, compiled.bounds());
+    drop(compiled);
+    let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
+    let mut observability = Observability::new(&args.observability)?;
+    let display = WindowDisplay::open(info, view.width, view.height).map_err(|problem| {
+        CommandError::Failed(format!(
+            "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
+            path.display()
+        ))
+    })?;
+
+    let limit = args.frames.map(u64::from);
+    // A number of frames is for measuring: they are rendered although nothing changes.
+    let policy = RequestPolicy { animation, limit, continuous: args.continuous || limit.is_some() };
+    let config = ViewerConfig { request, camera, policy, log, controller };
+    let runtime = super::runtime()?;
+    let interrupted = runtime.block_on(async { cancelled_by_signals() });
+    let stop = interrupted.child_token();
+    let (viewer, handle, control) = runtime.block_on(start(&args, source, config, &observability, &stop))?;
+    let statistics = handle.statistics_receiver();
+    let rendering = runtime.spawn(async move {
+        let (farm, result) = viewer.run(&stop).await;
+        farm.shut_down().await;
+        result
+    });
+    let shown = display.run(handle).map_err(CommandError::from);
+    let rendered = runtime.block_on(rendering).map_err(CommandError::failed)?;
+    rendered.map_err(CommandError::from).and(shown).and(observability.end())?;
+    check_frames(&control)?;
+    check_count(&args, &statistics, &interrupted)
+}
+
+/// Starts the farm and a viewer over it.
+async fn start(
+    args: &ViewArgs,
+    source: Source,
+    config: ViewerConfig,
+    observability: &Observability,
+    stop: &CancellationToken,
+) -> Result<(Viewer, ViewerHandle, FarmControl), CommandError> {
+    let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
+    let farm = Farm::start(args.farm.options(), scene).await.map_err(CommandError::failed)?;
+    if let Some(frames) = args.frames {
+        farm.expect_frames(frames.into());
+    }
+    observability.begin(&farm, stop)?;
+    let control = farm.control();
+    let (viewer, handle) = Viewer::interactive(farm, config);
+    Ok((viewer, handle, control))
+}
+
+/// Fails if frames were shown that have rows of workers which sent wrong pixels.
+fn check_frames(control: &FarmControl) -> Result<(), CommandError> {
+    let wrong = control.wrong_frames();
+    if wrong.count() == 0 {
+        return Ok(());
+    }
+    Err(CommandError::Failed(format!(
+        "{} of the frames that were shown have rows of workers that sent wrong pixels: {}",
+        wrong.count(),
+        as_text(wrong.runs())
+    )))
+}
+
+/// Fails if a signal came before all frames of `--frames`. Closing the window is no failure.
+fn check_count(
+    args: &ViewArgs,
+    statistics: &watch::Receiver<Arc<Statistics>>,
+    interrupted: &CancellationToken,
+) -> Result<(), CommandError> {
+    let completed = statistics.borrow().completed;
+    match args.frames.map(u64::from) {
+        Some(frames) if interrupted.is_cancelled() && completed < frames => {
+            Err(CommandError::Interrupted(format!("{completed} of {frames} frames were shown")))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,101 @@
+//! Commands and their syntax.
+
+use rayfarm_text::printable;
+
+/// A command of one line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Command {
+    /// Lists the workers.
+    Workers,
+    /// Reports the progress of the run.
+    Status,
+    /// Lists the commands.
+    Help,
+    /// Ends the run, as Ctrl-C does.
+    Quit,
+    /// Disconnects a worker after it has finished its leases.
+    Drain(WorkerSelector),
+    /// Disconnects a worker at once and refuses it from then on.
+    Kick(WorkerSelector),
+    /// Grants a worker no more leases.
+    Pause(WorkerSelector),
+    /// Grants a worker leases again.
+    Resume(WorkerSelector),
+    /// Admits a kicked worker again, by number or by name.
+    Allow(String),
+}
+
+/// Workers that a command applies to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum WorkerSelector {
+    /// All connected workers.
+    All,
+    /// One worker, by number or by name.
+    One(String),
+}
+
+/// Syntax and effect of each command.
+pub(super) const COMMANDS: [(&str, &str); 9] = [
+    ("workers", "list the connected workers"),
+    ("status", "report the progress of the run"),
+    ("drain ID|NAME", "disconnect a worker after it has finished its leases"),
+    ("kick ID|NAME", "disconnect a worker at once and refuse it from then on"),
+    ("allow ID|NAME", "admit a kicked worker again"),
+    ("pause [ID|NAME]", "grant a worker, or all, no more leases"),
+    ("resume [ID|NAME]", "grant a paused worker, or all, leases again"),
+    ("help", "print this list"),
+    ("quit", "end the run"),
+];
+
+impl Command {
+    /// Parses a line. A name may contain spaces.
+    ///
+    /// # Errors
+    /// The mistake in the line, and the expected syntax.
+    pub(super) fn parse(line: &str) -> Result<Self, String> {
+        let line = line.trim();
+        let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let rest = rest.trim();
+        let command = match word {
+            "workers" => Self::Workers,
+            "status" => Self::Status,
+            "help" => Self::Help,
+            "quit" => Self::Quit,
+            "drain" => return Ok(Self::Drain(one(word, rest)?)),
+            "kick" => return Ok(Self::Kick(one(word, rest)?)),
+            "allow" => return kicked(word, rest).map(Self::Allow),
+            "pause" => return Ok(Self::Pause(one_or_all(rest))),
+            "resume" => return Ok(Self::Resume(one_or_all(rest))),
+            "" => return Err("an empty line; help lists the commands".to_owned()),
+            other => {
+                let other = printable(other);
+                return Err(format!("there is no command \"{other}\"; help lists the commands"));
+            }
+        };
+        if rest.is_empty() {
+            Ok(command)
+        } else {
+            Err(format!("{word} takes no argument, but \"{}\" follows it", printable(rest)))
+        }
+    }
+}
+
+fn kicked(word: &str, rest: &str) -> Result<String, String> {
+    match rest {
+        "" => Err(format!(
+            "{word} needs an argument: the number or name of a worker; status lists the kicked ones"
+        )),
+        worker => Ok(worker.to_owned()),
+    }
+}
+
+fn one(word: &str, rest: &str) -> Result<WorkerSelector, String> {
+    match rest {
+        "" => Err(format!("{word} needs an argument: the number or name of a worker; workers lists them")),
+        worker => Ok(WorkerSelector::One(worker.to_owned())),
+    }
+}
+
+fn one_or_all(rest: &str) -> WorkerSelector {
+    if rest.is_empty() { WorkerSelector::All } else { WorkerSelector::One(rest.to_owned()) }
+}

@@ -1,0 +1,10 @@
+//! The application around viewer and farm: command line, commands, control of a run, files, reports and the log.
+
+pub(crate) mod cli;
+pub(crate) mod commands;
+pub(crate) mod control;
+pub(crate) mod logging;
+pub(crate) mod output;
+pub(crate) mod plan;
+pub(crate) mod progress;
+pub(crate) mod reports;

@@ -1,0 +1,130 @@
+//! Progress of a `render` run: a bar where standard error is a terminal, a line of the log now and then where it is not.
+
+use std::io::{self, IsTerminal};
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::accounting::duration_text;
+use crate::farm::FarmStatus;
+use crate::farm::Reachable;
+use crate::log_bar::{show_below_log, show_nothing_below_log};
+
+/// Interval of the lines without a terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+/// Time without any worker before the first warning, where a local one needs a moment to start, and before each further one.
+const STARTUP_TIME: Duration = Duration::from_secs(3);
+const REMIND_EVERY: Duration = Duration::from_secs(30);
+
+/// Progress of one run.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    frames: u64,
+    done: u64,
+    fps: f64,
+    left: Option<Duration>,
+    address: SocketAddr,
+    local_workers: u32,
+    alone_since: Option<Instant>,
+    next_reminder: Duration,
+    last_line: Instant,
+    quiet: bool,
+}
+
+impl Progress {
+    /// Progress of a run of `frames` frames, rendered by workers that connect to `address`.
+    pub(crate) fn new(frames: u64, address: SocketAddr, local_workers: u32) -> Self {
+        let quiet = !tracing::enabled!(tracing::Level::INFO);
+        let target = match io::stderr().is_terminal() && !quiet {
+            true => ProgressDrawTarget::stderr(),
+            false => ProgressDrawTarget::hidden(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(frames), target).with_style(style());
+        show_below_log(&bar);
+        let now = Instant::now();
+        Self {
+            bar,
+            frames,
+            done: 0,
+            fps: 0.0,
+            left: None,
+            address,
+            local_workers,
+            alone_since: None,
+            next_reminder: startup_time(local_workers),
+            last_line: now,
+            quiet,
+        }
+    }
+
+    /// Records that `done` frames are complete, at the current rate of `fps`.
+    pub(crate) fn completed(&mut self, done: u64, fps: f64) {
+        (self.done, self.fps) = (done, fps);
+        self.bar.set_position(done);
+    }
+
+    /// Shows the state of the farm. To be called several times a second.
+    pub(crate) fn update(&mut self, status: &FarmStatus) {
+        self.left = status.totals.left;
+        let left = self.left.map_or(String::new(), |left| format!("{} left, ", duration_text(left)));
+        self.bar.set_message(format!("{left}{}", message(status, self.fps)));
+        self.remind_of_workers(status.workers.is_empty());
+        if self.bar.is_hidden() && !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
+            self.last_line = Instant::now();
+            tracing::info!("{}", self.line(status));
+        }
+    }
+
+    /// Removes the bar and logs the summary of the run.
+    pub(crate) fn finish(&mut self, summary: &str) {
+        self.bar.finish_and_clear();
+        show_nothing_below_log();
+        tracing::info!("{summary}");
+    }
+
+    fn remind_of_workers(&mut self, alone: bool) {
+        if !alone {
+            self.alone_since = None;
+            self.next_reminder = startup_time(self.local_workers);
+            return;
+        }
+        let since = *self.alone_since.get_or_insert_with(Instant::now);
+        if since.elapsed() >= self.next_reminder {
+            self.next_reminder += REMIND_EVERY;
+            let worker = if self.local_workers == 0 { "a worker" } else { "this machine's worker" };
+            tracing::warn!("waiting for {worker}; {}", Reachable::of(self.address).for_log());
+        }
+    }
+
+    fn line(&self, status: &FarmStatus) -> String {
+        let left = self.left.map_or(String::new(), |left| format!(", {} left", duration_text(left)));
+        format!("{} of {} frames{left}; {}", self.done, self.frames, message(status, self.fps))
+    }
+}
+
+fn startup_time(local_workers: u32) -> Duration {
+    if local_workers == 0 { Duration::ZERO } else { STARTUP_TIME }
+}
+
+fn style() -> ProgressStyle {
+    ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+fn message(status: &FarmStatus, fps: f64) -> String {
+    let workers = match status.workers.len() {
+        0 => "waiting for a worker".to_owned(),
+        1 => "1 worker".to_owned(),
+        n => format!("{n} workers"),
+    };
+    let workers = match status.transfers.to_text() {
+        Some(transfers) => format!("{workers}, {transfers}"),
+        None => workers,
+    };
+    if fps >= 1.0 {
+        return format!("{fps:.1} FPS, {workers}");
+    }
+    let percent = 100.0 * f64::from(status.rows_done) / f64::from(status.rows.max(1));
+    format!("{fps:.2} FPS, {workers}, frame {percent:.0} %")
+}

@@ -1,0 +1,234 @@
+//! The viewer: owns camera, quality controller, requests and statistics, and runs the frame loop over the farm.
+//!
+//! Input of all displays arrives as actions. Snapshots of frames, farm and statistics go out, and no display is waited for.
+//! While something moves, [`OPEN_REQUESTS`](super::requests::OPEN_REQUESTS) frames are in flight, and a moved camera
+//! replaces the last one as long as it has not begun. At rest the picture is requested once; from then on the loop only
+//! looks at the farm ten times a second.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use rayfarm_tracer::image::MAX_SIDE;
+use rayfarm_tracer::scene::FrameView;
+use tokio_util::sync::CancellationToken;
+
+use super::camera_control::CameraControl;
+use super::error::ViewerError;
+use super::frame_log::FrameLogFile;
+use super::handle::{Channels, PresentedFrame, ViewerHandle};
+use super::input_action::InputAction;
+use super::orbit::Animation;
+use super::quality_controller::QualityController;
+use super::requests::{Answered, RequestPolicy, Requests, ViewState};
+use super::sequence::{FrameSequence, SequenceFrame, SequencePlan, SequenceSender};
+use super::statistics::ViewerState;
+use super::view_request::ViewRequest;
+use crate::farm::{Farm, FarmError, FinishedFrame};
+
+/// Interval at which displays receive the state of the farm.
+const STATUS_EVERY: Duration = Duration::from_millis(100);
+/// Actions that are applied together at most, before the next request.
+const MAX_ACTIONS: usize = 64;
+
+/// Configuration of an interactive viewer.
+pub(crate) struct ViewerConfig {
+    /// The first view.
+    pub(crate) request: ViewRequest,
+    /// Camera that input moves; at first, that of `request`.
+    pub(crate) camera: CameraControl,
+    /// Rules by which frames are requested.
+    pub(crate) policy: RequestPolicy,
+    /// Log with a line per frame.
+    pub(crate) log: Option<FrameLogFile>,
+    /// Controller that holds a frame rate.
+    pub(crate) controller: Option<QualityController>,
+}
+
+/// The owner of a view over a farm.
+///
+/// An interactive viewer publishes the newest frame, which replaces its predecessor (latest wins). A viewer of a sequence
+/// has a second delivery instead, bounded and lossless: each frame of a plan arrives once and in order, and as long as the
+/// display holds too many of them none is requested.
+pub(crate) struct Viewer {
+    farm: Farm,
+    state: ViewState,
+    camera: CameraControl,
+    requests: Requests,
+    figures: ViewerState,
+    log: Option<FrameLogFile>,
+    channels: Channels,
+    sequence: Option<SequenceSender>,
+}
+
+impl Viewer {
+    /// A viewer of a view that input changes, and the handle for its displays.
+    pub(crate) fn interactive(farm: Farm, config: ViewerConfig) -> (Self, ViewerHandle) {
+        let ViewerConfig { request, camera, policy, log, controller } = config;
+        let (channels, handle) = Channels::new(farm.address(), farm.status());
+        let viewer = Self {
+            farm,
+            state: ViewState { request, hidden: false },
+            camera,
+            requests: Requests::new(policy, controller),
+            figures: ViewerState::new(),
+            log,
+            channels,
+            sequence: None,
+        };
+        (viewer, handle)
+    }
+
+    /// A viewer that renders the frames `numbers` of an animation, in order. Their display reads them from the sequence.
+    pub(crate) fn sequence(
+        farm: Farm,
+        request: ViewRequest,
+        animation: Animation,
+        numbers: &[u64],
+    ) -> (Self, ViewerHandle, FrameSequence) {
+        let (plan, sender, sequence) = SequencePlan::new(numbers);
+        let (channels, handle) = Channels::new(farm.address(), farm.status());
+        let viewer = Self {
+            farm,
+            state: ViewState { request, hidden: false },
+            camera: CameraControl::new(request.view.camera, None),
+            requests: Requests::of_sequence(animation, plan),
+            figures: ViewerState::new(),
+            log: None,
+            channels,
+            sequence: Some(sender),
+        };
+        (viewer, handle, sequence)
+    }
+
+    /// Renders until `stop` is cancelled, a display quits, no display is left, or the last frame is complete. Returns the
+    /// farm, still running.
+    ///
+    /// # Errors
+    /// A farm that cannot go on, or a frame log that cannot be written.
+    pub(crate) async fn run(mut self, stop: &CancellationToken) -> (Farm, Result<(), ViewerError>) {
+        let result = self.render(stop).await;
+        self.channels.publish_statistics(self.figures.snapshot());
+        (self.farm, result)
+    }
+
+    async fn render(&mut self, stop: &CancellationToken) -> Result<(), ViewerError> {
+        let mut tick = tokio::time::interval(STATUS_EVERY);
+        let mut actions = Vec::new();
+        self.requests.fill(&self.farm, &self.state);
+        loop {
+            self.figures.set_resting(self.requests.at_rest());
+            tokio::select! {
+                biased;
+                () = stop.cancelled() => return Ok(()),
+                frame = self.farm.finished() => {
+                    if self.finish(frame)?.is_break() {
+                        return Ok(());
+                    }
+                }
+                count = self.channels.input.recv_many(&mut actions, MAX_ACTIONS) => {
+                    if count == 0 || self.apply_all(actions.drain(..)).is_break() {
+                        return Ok(());
+                    }
+                }
+                () = until(self.requests.rests_at()) => self.requests.rest(&self.farm, &self.state),
+                () = self.requests.slot_is_free() => self.requests.fill(&self.farm, &self.state),
+                _ = tick.tick() => self.publish(),
+            }
+        }
+    }
+
+    fn publish(&mut self) {
+        self.figures.refresh_accounts();
+        self.channels.publish_status(self.farm.status());
+        self.channels.publish_statistics(self.figures.snapshot());
+    }
+
+    /// Delivers a finished frame and requests the next one. Breaks after the last frame.
+    fn finish(&mut self, frame: Result<FinishedFrame, FarmError>) -> Result<ControlFlow<()>, ViewerError> {
+        let frame = match frame {
+            Ok(frame) => frame,
+            // A worker may connect later; until then the displays show the reason.
+            Err(FarmError::NoWorkers { reason, .. }) if self.sequence.is_none() => {
+                self.figures.set_problem(Some(reason));
+                return Ok(ControlFlow::Continue(()));
+            }
+            Err(error) => return Err(error.into()),
+        };
+        let answered = self.requests.finished(frame.frame, &frame.view, frame.elapsed, &frame.account);
+        let line = self.figures.add(&frame);
+        self.deliver(frame, answered);
+        if let Some(log) = &mut self.log {
+            log.add(&line)?;
+        }
+        if self.requests.limit() == Some(self.figures.completed()) {
+            return Ok(ControlFlow::Break(()));
+        }
+        self.requests.after_finish(&self.farm, &self.state);
+        Ok(ControlFlow::Continue(()))
+    }
+
+    fn deliver(&self, frame: FinishedFrame, answered: Answered) {
+        let Answered { request, input_at, number, slot, quality } = answered;
+        let presented = PresentedFrame { frame, request, input_at, completed_at: Instant::now(), quality };
+        // Statistics come first, so that a display which draws the frame has those that include it.
+        self.channels.publish_statistics(self.figures.snapshot());
+        match &self.sequence {
+            Some(sequence) => sequence.deliver(SequenceFrame { number, presented, slot }),
+            None => self.channels.publish_frame(presented),
+        }
+    }
+
+    /// Applies actions in order, then replaces the last request if they changed the view. Breaks at [`InputAction::Quit`].
+    fn apply_all(&mut self, actions: impl Iterator<Item = InputAction>) -> ControlFlow<()> {
+        let mut state = self.state;
+        for action in actions {
+            if apply(action, &mut self.camera, &mut state, &mut self.figures, &self.farm).is_break() {
+                return ControlFlow::Break(());
+            }
+        }
+        state.request.view = FrameView { camera: self.camera.camera(), ..state.request.view };
+        if self.state != state {
+            self.state = state;
+            self.requests.replace(&self.farm, &self.state);
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// Applies one action to camera, view, statistics or workers.
+fn apply(
+    action: InputAction,
+    camera: &mut CameraControl,
+    state: &mut ViewState,
+    figures: &mut ViewerState,
+    farm: &Farm,
+) -> ControlFlow<()> {
+    match action {
+        InputAction::Move { direction, seconds } => camera.fly(direction, seconds),
+        InputAction::Look { right, up, seconds } => camera.look(right, up, seconds),
+        InputAction::Orbit { right, down } => camera.orbit(right, down),
+        InputAction::Zoom { notches } => camera.zoom(notches),
+        InputAction::ResetCamera => camera.reset(),
+        InputAction::Resize { width, height } => {
+            let side = |pixels: u32| pixels.clamp(1, MAX_SIDE);
+            let view = state.request.view;
+            state.request.view = FrameView { width: side(width), height: side(height), ..view };
+        }
+        InputAction::SetVisible(visible) => state.hidden = !visible,
+        InputAction::Presented { latency } => figures.presented(latency),
+        InputAction::Worker(command) => command.perform(&farm.control()),
+        InputAction::Quit => return ControlFlow::Break(()),
+    }
+    ControlFlow::Continue(())
+}
+
+/// Waits until a time; for ever where there is none.
+async fn until(at: Option<Instant>) {
+    match at {
+        Some(at) => tokio::time::sleep_until(at.into()).await,
+        None => std::future::pending().await,
+    }
+}
+
+#[cfg(test)]
+mod tests;

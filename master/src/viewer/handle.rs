@@ -1,0 +1,195 @@
+//! The displays' end of a viewer: snapshots to read and a channel for input.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tokio::sync::{mpsc, watch};
+
+use super::input_action::InputAction;
+use super::statistics::Statistics;
+use super::view_request::ViewRequest;
+use crate::farm::{FarmStatus, FinishedFrame};
+
+/// Actions that wait for the viewer at most. Further ones are dropped until it has caught up.
+const MAX_WAITING_ACTIONS: usize = 256;
+
+/// A finished frame with the request that it answers.
+#[derive(Debug)]
+pub(crate) struct PresentedFrame {
+    /// Pixels, costs and accounts.
+    pub(crate) frame: FinishedFrame,
+    /// Request that the frame answers, after the quality controller.
+    pub(crate) request: ViewRequest,
+    /// Time of the input that the frame answers.
+    pub(crate) input_at: Instant,
+    /// Time at which the last row arrived at the viewer.
+    pub(crate) completed_at: Instant,
+    /// Lines of the quality controller about this frame; empty without a controller.
+    pub(crate) quality: Vec<String>,
+}
+
+/// A display's access to the viewer.
+///
+/// Snapshots are shared and the newest one replaces its predecessor, so no display ever waits for the farm and a slow
+/// display loses only intermediate frames. A display that needs every frame reads a
+/// [`FrameSequence`](super::sequence::FrameSequence) instead.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewerHandle {
+    frames: watch::Receiver<Option<Arc<PresentedFrame>>>,
+    status: watch::Receiver<Arc<FarmStatus>>,
+    stats: watch::Receiver<Arc<Statistics>>,
+    input: mpsc::Sender<InputAction>,
+    address: SocketAddr,
+}
+
+impl ViewerHandle {
+    /// The newest frame, if this handle has not returned it before.
+    pub(crate) fn new_frame(&mut self) -> Option<Arc<PresentedFrame>> {
+        let newest = self.frames.borrow_and_update();
+        if newest.has_changed() { newest.clone() } else { None }
+    }
+
+    /// The newest snapshot of the farm, at most about 100 ms old.
+    pub(crate) fn status(&self) -> Arc<FarmStatus> {
+        self.status.borrow().clone()
+    }
+
+    /// The newest statistics.
+    pub(crate) fn statistics(&self) -> Arc<Statistics> {
+        self.stats.borrow().clone()
+    }
+
+    /// Statistics beyond the life of this handle: a receiver does not keep the viewer running.
+    pub(crate) fn statistics_receiver(&self) -> watch::Receiver<Arc<Statistics>> {
+        self.stats.clone()
+    }
+
+    /// Address at which workers connect.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Whether the viewer still takes input.
+    pub(crate) fn is_running(&self) -> bool {
+        !self.input.is_closed()
+    }
+
+    /// Sends actions of one moment together, without waiting. Returns `false` where the viewer has ended or is too far
+    /// behind; then none of the actions is sent.
+    pub(crate) fn send(&self, actions: Vec<InputAction>) -> bool {
+        match self.input.try_reserve_many(actions.len()) {
+            Ok(permits) => {
+                permits.zip(actions).for_each(|(permit, action)| permit.send(action));
+                true
+            }
+            Err(_) => false,
+        }
+    }
+}
+
+/// The viewer's end: publishes snapshots and receives input.
+#[derive(Debug)]
+pub(super) struct Channels {
+    /// Input of all displays; closed when the last handle is dropped.
+    pub(super) input: mpsc::Receiver<InputAction>,
+    frames: watch::Sender<Option<Arc<PresentedFrame>>>,
+    status: watch::Sender<Arc<FarmStatus>>,
+    stats: watch::Sender<Arc<Statistics>>,
+}
+
+impl Channels {
+    /// Both ends, for a farm of this status whose workers connect to `address`.
+    pub(super) fn new(address: SocketAddr, status: FarmStatus) -> (Self, ViewerHandle) {
+        let (frames, frames_out) = watch::channel(None);
+        let (status, status_out) = watch::channel(Arc::new(status));
+        let (stats, stats_out) = watch::channel(Arc::default());
+        let (input_in, input) = mpsc::channel(MAX_WAITING_ACTIONS);
+        let handle = ViewerHandle {
+            frames: frames_out,
+            status: status_out,
+            stats: stats_out,
+            input: input_in,
+            address,
+        };
+        (Self { input, frames, status, stats }, handle)
+    }
+
+    /// Replaces the newest frame.
+    pub(super) fn publish_frame(&self, frame: PresentedFrame) {
+        self.frames.send_replace(Some(Arc::new(frame)));
+    }
+
+    /// Replaces the snapshot of the farm.
+    pub(super) fn publish_status(&self, status: FarmStatus) {
+        self.status.send_replace(Arc::new(status));
+    }
+
+    /// Replaces the statistics, unless the picture rests and they say the same.
+    pub(super) fn publish_statistics(&self, statistics: Statistics) {
+        self.stats.send_if_modified(|newest| {
+            let differs = statistics.differs_from(newest);
+            if differs {
+                *newest = Arc::new(statistics);
+            }
+            differs
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channels() -> (Channels, ViewerHandle) {
+        Channels::new(SocketAddr::from(([127, 0, 0, 1], 9)), FarmStatus::default())
+    }
+
+    #[test]
+    fn actions_arrive_together_and_in_order() {
+        let (mut channels, handle) = channels();
+        assert!(handle.send(vec![InputAction::ResetCamera, InputAction::Quit]));
+        assert!(handle.send(Vec::new()));
+        assert_eq!(channels.input.try_recv(), Ok(InputAction::ResetCamera));
+        assert_eq!(channels.input.try_recv(), Ok(InputAction::Quit));
+        assert!(channels.input.try_recv().is_err());
+    }
+
+    #[test]
+    fn a_viewer_that_is_behind_receives_all_actions_of_a_moment_or_none() {
+        let (mut channels, handle) = channels();
+        assert!(handle.send(vec![InputAction::ResetCamera; MAX_WAITING_ACTIONS - 1]));
+        assert!(!handle.send(vec![InputAction::Quit; 2]));
+        assert!(handle.send(vec![InputAction::Quit]));
+        let mut actions = Vec::new();
+        while let Ok(action) = channels.input.try_recv() {
+            actions.push(action);
+        }
+        assert_eq!(actions.len(), MAX_WAITING_ACTIONS);
+        assert_eq!(actions.last(), Some(&InputAction::Quit));
+    }
+
+    #[test]
+    fn a_handle_outlives_its_viewer() {
+        let (channels, mut handle) = channels();
+        assert!(handle.is_running());
+        channels.publish_statistics(Statistics { completed: 3, ..Statistics::default() });
+        drop(channels);
+        assert!(!handle.is_running() && !handle.send(vec![InputAction::Quit]));
+        assert!(handle.new_frame().is_none());
+        assert_eq!(handle.statistics().completed, 3);
+    }
+
+    #[test]
+    fn equal_statistics_at_rest_wake_no_display() {
+        let (channels, handle) = channels();
+        let mut stats = handle.statistics_receiver();
+        let rest = Statistics { completed: 1, resting: true, ..Statistics::default() };
+        channels.publish_statistics(rest.clone());
+        assert!(stats.borrow_and_update().resting);
+        channels.publish_statistics(rest.clone());
+        assert!(!stats.has_changed().unwrap());
+        channels.publish_statistics(Statistics { completed: 2, ..rest });
+        assert!(stats.has_changed().unwrap());
+    }
+}

@@ -1,0 +1,60 @@
+//! Actions that displays send to the viewer.
+
+use std::time::Duration;
+
+use glam::DVec3;
+
+use super::worker_command::WorkerCommand;
+
+/// One input of a display. The display decides which key or gesture means which action; the viewer decides its effect.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum InputAction {
+    /// Moves the camera and its look-at point.
+    Move {
+        /// Right, up and forward, each in -1..=1.
+        direction: DVec3,
+        /// Time for which the movement was held, in seconds.
+        seconds: f64,
+    },
+    /// Turns the camera in place.
+    Look {
+        /// To the right, in -1..=1.
+        right: f64,
+        /// Upwards, in -1..=1.
+        up: f64,
+        /// Time for which the turn was held, in seconds.
+        seconds: f64,
+    },
+    /// Turns the camera about its look-at point.
+    Orbit {
+        /// Drag to the right, in heights of the display.
+        right: f64,
+        /// Drag downwards, in heights of the display.
+        down: f64,
+    },
+    /// Moves the camera towards its look-at point.
+    Zoom {
+        /// Notches of a wheel; positive values move nearer.
+        notches: f64,
+    },
+    /// Restores the camera of the scene.
+    ResetCamera,
+    /// Changes the size of the picture.
+    Resize {
+        /// Pixels per row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Reports whether any part of the display can be seen. No frame is requested for a hidden display.
+    SetVisible(bool),
+    /// Reports that a frame is on the screen.
+    Presented {
+        /// Time from the input that the frame answers to its presentation.
+        latency: Duration,
+    },
+    /// Commands workers.
+    Worker(WorkerCommand),
+    /// Ends the viewer.
+    Quit,
+}

@@ -1,0 +1,33 @@
+//! The viewer: camera, view requests, quality controller and statistics, the same for every display.
+//!
+//! [`frame_loop`] runs over the farm. Displays hold a [`ViewerHandle`]: they read snapshots and send [`InputAction`]s.
+//! Nothing in here knows a window, a terminal or a command line.
+
+mod camera_control;
+mod error;
+pub(crate) mod frame_counts;
+mod frame_log;
+mod frame_loop;
+mod frame_rate;
+mod handle;
+mod input_action;
+mod latency;
+pub(crate) mod orbit;
+pub(crate) mod quality_controller;
+mod requests;
+mod sequence;
+mod statistics;
+pub(crate) mod view_request;
+mod worker_command;
+
+pub(crate) use camera_control::CameraControl;
+pub(crate) use error::ViewerError;
+pub(crate) use frame_log::{FrameLine, FrameLogError, FrameLogFile};
+pub(crate) use frame_loop::{Viewer, ViewerConfig};
+pub(crate) use frame_rate::FrameRate;
+pub(crate) use handle::{PresentedFrame, ViewerHandle};
+pub(crate) use input_action::InputAction;
+pub(crate) use requests::{OPEN_REQUESTS, RequestPolicy};
+pub(crate) use sequence::{FrameSequence, SequenceFrame, Slot};
+pub(crate) use statistics::Statistics;
+pub(crate) use worker_command::{KICK_REASON, WorkerCommand};
