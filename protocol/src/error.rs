@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::PROTOCOL_VERSION;
 use crate::codec::CodecError;
-use crate::envelope::Kind;
+use crate::kind::Kind;
 
 /// One of the two ends of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -49,6 +49,7 @@ mod error;
 #[cfg(feature = "transport")]
 pub mod handshake;
 mod ids;
+mod kind;
 pub mod limits;
 pub mod message;
 pub mod peer;

@@ -1,15 +1,13 @@
 //! Rendering: rows of a frame as pixels.
 //!
 //! ```text
-//!   context    a tile of rays, from its hits to its colours
-//!   direct     the shading of a tile: direct light, shadows, emission
+//!   direct     a tile of rays, from its hits to its colours: direct light, shadows, emission
 //!   regular    bands of tiles with the same samples in every pixel
 //!   adaptive   bands of tiles with few samples where the picture is smooth, all of them elsewhere
 //!   stage      the stages of a tile, for benchmarks
 //! ```
 
 mod adaptive;
-mod context;
 mod direct;
 mod regular;
 mod stage;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::context::TileContext;
+use super::direct::TileContext;
 use super::stage::{Stage, Watch};
 use crate::cancel::Cancelled;
 use crate::film::{Means, PixelBytes, TilePixels, write_samples};

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::context::TileContext;
+use super::super::direct::TileContext;
 use super::super::regular::lanes_of;
 use super::super::stage::{Stage, Watch};
 use super::BAND;

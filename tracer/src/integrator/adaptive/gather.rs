@@ -1,6 +1,6 @@
 //! Tiles of samples gathered from single pixels.
 
-use super::super::context::TileContext;
+use super::super::direct::TileContext;
 use super::super::stage::Watch;
 use crate::cancel::Cancelled;
 use crate::rays::{BLOCKS, EyeTile, TileColors, TileRays};

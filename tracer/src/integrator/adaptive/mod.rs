@@ -17,7 +17,7 @@ mod tests;
 
 use std::ops::Range;
 
-use super::context::TileContext;
+use super::direct::TileContext;
 use super::stage::{Stage, Watch};
 use crate::cancel::Cancelled;
 use crate::film::{Dither, Means, PixelBytes, write_corner_means};

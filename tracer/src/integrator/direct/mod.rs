@@ -8,18 +8,19 @@
 //! S_j from [`crate::intersect::tile`].
 //!
 //! ```text
+//!   context      a tile of rays, from its hits to its colours
 //!   background   rays without a hit
 //!   emission     unlit materials, and light that surfaces emit
 //!   shadow       S_j
 //! ```
 
 mod background;
+mod context;
 mod emission;
 mod shadow;
 #[cfg(test)]
 mod tests;
 
-use super::context::TileContext;
 use super::stage::{Stage, Watch};
 use crate::bsdf;
 use crate::frame::PreparedFrame;
@@ -28,6 +29,7 @@ use crate::rays::{BLOCKS, EyeTile, TileColors};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat, three};
 use crate::surface::{Materials, Surfaces};
+pub(super) use context::TileContext;
 
 /// Least contribution of a light to any channel; a light that adds less is skipped, with its shadow ray: a thousand of them
 /// add less than a quarter of the darkest step of the 8-bit picture.

@@ -1,7 +1,7 @@
 //! The tiles of a band: what they share, and the way of each from rays to colours.
 
-use super::direct;
-use super::stage::{Stage, Watch};
+use super::super::stage::{Stage, Watch};
+use super::{Scratch, shade};
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::intersect::tile;
@@ -23,7 +23,7 @@ pub(crate) struct TileContext<'a, W> {
     pub surfaces: Surfaces,
     /// Memory of intersections and of shading.
     pub tile: tile::Scratch,
-    pub direct: direct::Scratch,
+    pub direct: Scratch,
 }
 
 impl<'a, W: Watch> TileContext<'a, W> {
@@ -37,7 +37,7 @@ impl<'a, W: Watch> TileContext<'a, W> {
             hits: std::array::from_fn(|_| HitBlock::NONE),
             surfaces: Surfaces::empty(frame),
             tile: tile::Scratch::new(),
-            direct: direct::Scratch::new(),
+            direct: Scratch::new(),
         }
     }
 
@@ -62,7 +62,7 @@ impl<'a, W: Watch> TileContext<'a, W> {
                 self.watch.enter(Stage::Surfaces);
                 self.surfaces.find(simd, tile, &self.hits);
                 self.watch.enter(Stage::Shading);
-                direct::shade(simd, tile, self);
+                shade(simd, tile, self);
             },
         );
         Ok(())
