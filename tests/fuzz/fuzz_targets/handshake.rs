@@ -26,7 +26,9 @@ fuzz_target!(|data: &[u8]| {
         let taken = handshake::as_master(&mut Peer(&bytes), |_| Ok(Welcome { worker: 1 })).await;
         if let Ok(hello) = taken {
             assert!((1..=MAX_THREADS).contains(&hello.threads));
-            assert!([&hello.name, &hello.simd, &hello.software].iter().all(|text| text.len() <= MAX_NAME_BYTES));
+            assert!(
+                [&hello.name, &hello.simd, &hello.software].iter().all(|text| text.len() <= MAX_NAME_BYTES)
+            );
         }
         let bytes = from(MASTER);
         let hello = Hello { name: "a".into(), threads: 1, simd: "b".into(), software: "c".into() };
