@@ -152,7 +152,7 @@ fn a_block_without_live_rays_hits_nothing() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(256))]
 
     /// Rays from anywhere, then bounces from their hits, which start on primitives.
     #[test]
