@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Checks that comments, messages and documents use no word of scripts/words.txt.
 
-Without options, prints file, line, word and replacement of each finding in the sections `prose` and `names`, and ends with
-status 1 if there is one. `--report` counts the findings of all sections by folder, and ends with status 0.
+Prints file, line, word and replacement of each finding, and ends with status 1 if there is one. `--report` counts the findings
+by folder and by word instead, and ends with status 0.
 """
 
 import argparse
@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LIST = ROOT / "scripts" / "words.txt"
 # The list itself, and the checks, which quote it.
 LEFT_OUT = {"scripts/words.txt", "scripts/check_words.py"}
-SECTION = re.compile(r"\[(prose|names)( reported)?\]$")
+SECTION = re.compile(r"\[(prose|names)(?: except (\S+))?\]$")
 # A space of a pattern: spaces, or the end of a line and what begins the next one.
 GAP = r"(?:[ ]+|[ ]*\n[ ]*)"
 FENCE = re.compile(r"^( *)(```|~~~).*?(?:^ *\2[`~]*[ ]*$|\Z)", re.MULTILINE | re.DOTALL)
@@ -42,7 +42,11 @@ class Word:
     source: str
     instead: str
     is_name: bool
-    is_reported_only: bool
+    # A folder in which the word is allowed.
+    exception: str = ""
+
+    def is_refused_in(self, file):
+        return not (self.exception and Path(file).is_relative_to(self.exception))
 
 
 @dataclass(frozen=True)
@@ -60,13 +64,13 @@ class Finding:
 
 def read_list(text):
     """The words of a list in the format of words.txt."""
-    words, kind, reported = [], None, False
+    words, kind, exception = [], None, ""
     for number, line in enumerate(text.splitlines(), 1):
         line = line.strip()
         if not line or line.startswith("#"):
             continue
         if section := SECTION.match(line):
-            kind, reported = section[1], bool(section[2])
+            kind, exception = section[1], section[2] or ""
             continue
         source, arrow, instead = (part.strip() for part in line.partition(" => "))
         if not arrow or not instead or kind is None:
@@ -75,7 +79,7 @@ def read_list(text):
             re.compile(source)
         except re.error as error:
             raise BadList(f"words.txt:{number}: {error}") from error
-        words.append(Word(source, instead, kind == "names", reported))
+        words.append(Word(source, instead, kind == "names", exception))
     return words
 
 
@@ -149,6 +153,8 @@ class Search:
             for text in parts:
                 for match in pattern.finditer(text):
                     word = words[int(match.lastgroup.removeprefix("word"))]
+                    if not word.is_refused_in(name):
+                        continue
                     line = text.count("\n", 0, match.start()) + 1
                     found.append(Finding(name, line, re.sub(r"\s+", " ", match.group()), word))
         return sorted(found, key=lambda finding: finding.line)
@@ -188,12 +194,14 @@ def report(findings, words):
         counts = [(by_word[word], word) for word in words if word.is_name == is_name]
         print(f"\n{kind}: {sum(count for count, _ in counts)}")
         for count, word in sorted(counts, key=lambda entry: -entry[0]):
-            print(f"{count:>6}  {word.source}" + ("" if word.is_reported_only else "  (refused)"))
+            print(f"{count:>6}  {word.source}")
 
 
 def self_test():
     """Tries the check on made-up files."""
-    search = Search(read_list("[prose]\nwhoever => the worker\ngiven up => dropped\n(?<!Blinn-)Phong => Blinn-Phong\n[names]\nDesk => State\n"))
+    search = Search(read_list("[prose]\nwhoever => the worker\ngiven up => dropped\n(?<!Blinn-)Phong => Blinn-Phong\n"
+                              "[names]\nDesk => State\n"
+                              "[prose except a/b]\nstands => is\n"))
     cases = [
         ("a.rs", "// Whoever comes\n", [(1, "Whoever")]),
         ("a.rs", "//! is given\n//! up here\n", [(1, "given up")]),
@@ -210,6 +218,8 @@ def self_test():
         ("a.py", 'whoever = 1  # whoever\n"""Given\n    up."""\n', [(1, "whoever"), (2, "Given up")]),
         ("a.sh", "whoever=1 # whoever\n", [(1, "whoever")]),
         ("a.toml", "a = 'given up' # so\n", []),
+        ("a/b/c.md", "whoever stands\n", [(1, "whoever")]),
+        ("a/bc.md", "whoever stands\n", [(1, "whoever"), (1, "stands")]),
     ]
     failed = 0
     for name, source, expected in cases:
@@ -229,16 +239,13 @@ def self_test():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--report", action="store_true", help="count the findings of all sections by folder")
-    parser.add_argument("--all", action="store_true", help="refuse what is only reported as well")
+    parser.add_argument("--report", action="store_true", help="count the findings by folder and by word")
     parser.add_argument("--self-test", action="store_true", help="try the check on made-up files")
     parser.add_argument("paths", nargs="*", help="only files below these, seen from the root")
     arguments = parser.parse_args()
     if arguments.self_test:
         return 1 if self_test() else 0
     words = read_list(LIST.read_text(encoding="utf-8"))
-    if not (arguments.report or arguments.all):
-        words = [word for word in words if not word.is_reported_only]
     search, findings = Search(words), []
     for name in files(ROOT):
         if arguments.paths and not any(Path(name).is_relative_to(path) for path in arguments.paths):
