@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# rayfarm beside Embree: the same scenes, rendered in turn on this machine. See --help.
+# Compares rayfarm with Embree: the same scenes, rendered in turn on this machine. See --help.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -13,7 +13,7 @@ usage: scripts/bench_peers.sh [OPTION ...]
 Renders the same scenes with rayfarm and with a small tracer on Embree 3 (packets of 16 rays, coherent), in turn, checks that
 both give the same picture, and prints milliseconds per frame and their ratio. Building trees is not in the times.
 
-  --workloads DIR  folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads beside this repository). Where it does not
+  --workloads DIR  folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads, seen from this repository). Where it does not
                    exist, models/room.toml and models/instances.toml are rendered, reduced to what both tracers have:
                    flat normals, one material a model, one point light
   --scene FILE     render this scene instead, reduced in the same way; may be given several times

@@ -16,7 +16,7 @@ instructions per ray, which do not depend on what else the machine does. Valgrin
 
   --short            fewer scenes (room, textured, w1) and repeats: some minutes
   --no-instructions  leave valgrind out
-  --workloads DIR    folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads beside this repository)
+  --workloads DIR    folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads, seen from this repository)
   --csv FILE         write all figures there as well
   --keep DIR         leave what criterion and callgrind wrote there; a new or an empty folder
   --help             this text
@@ -91,7 +91,7 @@ commit=$(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)
 say "building"
 (cd "$root" && cargo bench --package rayfarm-tracer --no-run >&2)
 
-# What cargo is told besides.
+# Further options of cargo.
 options=()
 
 # bench NAME ARGUMENT...: one of the benchmarks in tracer/benches.

@@ -4,7 +4,7 @@ from scene_file import Model
 
 
 def bake(scene, stem):
-    """Writes STEM-MATERIAL.obj for each material in use, and returns the models that stand for all of the scene's."""
+    """Writes STEM-MATERIAL.obj for each material in use, and returns the models that replace all of the scene."""
     by_material = {}
     for model in scene.models:
         by_material.setdefault(model.material, []).append(model)
