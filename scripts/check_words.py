@@ -24,7 +24,7 @@ LIST = ROOT / "scripts" / "words.txt"
 # The list itself, and the checks, which quote it.
 LEFT_OUT = {"scripts/words.txt", "scripts/check_words.py"}
 SECTION = re.compile(r"\[(prose|names)(?: except (\S+))?\]$")
-# A space of a pattern: spaces, or the end of a line and what begins the next one.
+# A space of a pattern: spaces, or a line break with indentation.
 GAP = r"(?:[ ]+|[ ]*\n[ ]*)"
 FENCE = re.compile(r"^( *)(```|~~~).*?(?:^ *\2[`~]*[ ]*$|\Z)", re.MULTILINE | re.DOTALL)
 INLINE_CODE = re.compile(r"(`+)(?!`).+?(?<!`)\1(?!`)", re.DOTALL)
@@ -32,7 +32,7 @@ LINK_TARGET = re.compile(r"\]\([^)\s]*\)")
 
 
 class BadList(Exception):
-    """A line of words.txt is not understood."""
+    """An invalid line of words.txt."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def rust_prose(source):
     comments = rust_text.only(source, {rust_text.COMMENT})
     comments = re.sub(r"^( *)(//[/!]?|/\*+!?|\*(?!/))", lambda mark: " " * len(mark.group()), comments, flags=re.MULTILINE)
     strings = rust_text.only(source, {rust_text.STRING})
-    # A string that goes on in the next line.
+    # A string that continues in the next line.
     return without_code(comments), strings.replace("\\\n", " \n")
 
 
@@ -114,7 +114,8 @@ def python_prose(source):
 def texts(file, source):
     """(prose texts, code) of a file; positions in them are those in the file."""
     suffix = file.suffix
-    if suffix == ".rs":
+    # The comments and strings of C++ are near enough to those of Rust.
+    if suffix in (".rs", ".cpp", ".hpp"):
         return rust_prose(source), rust_text.only(source, {rust_text.CODE})
     if suffix == ".py":
         return (python_prose(source),), ""
@@ -129,7 +130,7 @@ def texts(file, source):
 
 
 class Search:
-    """Finds the words of a list. One expression looks for all of a kind: a search for each would take minutes."""
+    """Finds the words of a list. One expression looks for all of a kind: a separate search for each would take minutes."""
 
     def __init__(self, words):
         self.prose = self.expression([word for word in words if not word.is_name], re.IGNORECASE)
@@ -161,7 +162,7 @@ class Search:
 
 
 def files(base):
-    """The files that git knows or would take, as paths below `base`."""
+    """The files that git tracks or would add, as paths below `base`."""
     listed = subprocess.run(
         ["git", "-C", str(base), "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         check=True,
@@ -172,12 +173,12 @@ def files(base):
         path = base / name
         if not name or name in LEFT_OUT or not path.is_file():
             continue
-        if path.suffix in (".rs", ".md", ".py", ".sh", ".toml", ".yml") or name in (".ci/run", "justfile"):
+        if path.suffix in (".rs", ".cpp", ".hpp", ".md", ".py", ".sh", ".toml", ".yml") or name in (".ci/run", "justfile"):
             yield name
 
 
 def folder_of(name):
-    """The folder by which a file is counted: three names deep for sources, so that owners see their own."""
+    """The folder by which a file is counted: up to three names deep."""
     parts = Path(name).parts[:-1]
     return "/".join(parts[:3]) or "."
 
@@ -198,7 +199,7 @@ def report(findings, words):
 
 
 def self_test():
-    """Tries the check on made-up files."""
+    """Runs the check on examples."""
     search = Search(read_list("[prose]\nwhoever => the worker\ngiven up => dropped\n(?<!Blinn-)Phong => Blinn-Phong\n"
                               "[names]\nDesk => State\n"
                               "[prose except a/b]\nstands => is\n"))
@@ -240,7 +241,7 @@ def self_test():
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--report", action="store_true", help="count the findings by folder and by word")
-    parser.add_argument("--self-test", action="store_true", help="try the check on made-up files")
+    parser.add_argument("--self-test", action="store_true", help="run the check on examples")
     parser.add_argument("paths", nargs="*", help="only files below these, seen from the root")
     arguments = parser.parse_args()
     if arguments.self_test:

@@ -43,7 +43,7 @@ class Run:
         return ["render", self.scene, "-o", "none", *workers, *frames, *reports]
 
     def picture(self):
-        """Key of the last picture. Runs with the same key must end with the same bytes: trees of a model have the same file name."""
+        """Key of the last picture. Runs with the same key must end with the same bytes: trees of a model share a file name."""
         return (self.scene.name, self.frames, self.options)
 
     def __str__(self):
@@ -142,7 +142,7 @@ def numbers(report, skip, prefix=""):
 
 
 def measure(master, runs, repeats):
-    """A row for each run and repeat. All runs are repeated in turn, so that a pause of the machine does not affect one run only."""
+    """A row for each run and repeat. All runs are repeated in turn, so that a pause of the machine affects several runs."""
     rows, total = [], len(runs) * repeats
     for repeat in range(repeats):
         for run in runs:

@@ -1,4 +1,4 @@
-"""Instances become plain meshes: every model's triangles in the world's place, one OBJ a material."""
+"""Conversion of instances to plain meshes: all triangles in world space, one OBJ per material."""
 
 from scene_file import Model
 
