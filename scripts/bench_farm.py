@@ -3,9 +3,9 @@
 and the scheduler with up to 1,024 simulated workers.
 
 Writes a CSV table and plots (SVG, PNG) for each experiment and a report.md with all of them. Workers are processes of this
-machine. Let nothing else run meanwhile. Needs Rust (unless --programs is given) and Python 3.8 or later, and nothing else.
+machine. The machine must be idle otherwise. Needs Rust (unless --programs is given) and Python 3.8 or later, and nothing else.
 
-Exit status: 0 measured; 1 something failed; 2 wrong use.
+Exit status: 0 measured; 1 failure; 2 wrong use.
 """
 
 import argparse
@@ -18,11 +18,11 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from farm import experiments, report  # noqa: E402  (they lie beside this file)
+from farm import experiments, report  # noqa: E402  (in the folder of this file)
 from farm.runs import Failure, Master  # noqa: E402
 
 SIZES = [1, 2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256]
-# Of another folder beside this one, where it is: the frames that other figures of the project are of.
+# A folder next to that of the project, which may be absent: scenes and models of other published figures.
 SHARED = ROOT.parent / "shared"
 
 
@@ -40,15 +40,15 @@ def numbers(text):
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "target/bench_farm", help="folder for everything (%(default)s)")
-    parser.add_argument("--only", metavar="NAME,...", help=f"of {', '.join(experiments.ALL)}")
-    parser.add_argument("--quick", action="store_true", help="few and small frames: to see that it works, not to measure")
-    parser.add_argument("--dry-run", action="store_true", help="print the calls, and make none")
+    parser.add_argument("--out", type=Path, default=ROOT / "target/bench_farm", help="output folder (%(default)s)")
+    parser.add_argument("--only", metavar="NAME,...", help=f"experiments to run, of {', '.join(experiments.ALL)}")
+    parser.add_argument("--quick", action="store_true", help="few and small frames: tests the script, measures nothing")
+    parser.add_argument("--dry-run", action="store_true", help="print the commands without running them")
     parser.add_argument("--programs", type=Path, help="folder of a built rayfarm-master; without it, it is built")
-    parser.add_argument("--scene", type=Path, help="what is rendered (w1.toml beside the project, or models/instances.toml)")
-    parser.add_argument("--model", type=Path, help="the .obj that turns (a bust beside the project, or models/camera/camera.obj)")
-    parser.add_argument("--frames", type=int, help="of a run (100)")
-    parser.add_argument("--repeats", type=int, help="of each run (3)")
+    parser.add_argument("--scene", type=Path, help="scene to render (w1.toml in ../shared/workloads, else models/instances.toml)")
+    parser.add_argument("--model", type=Path, help="OBJ file to rotate (a bust in ../shared/models, else models/camera/camera.obj)")
+    parser.add_argument("--frames", type=int, help="frames of a run (100)")
+    parser.add_argument("--repeats", type=int, help="repeats of each run (3)")
     parser.add_argument("--workers", type=numbers, metavar="N,...", help="numbers of workers (1,2,3,4)")
     parser.add_argument("--threads", type=numbers, metavar="N,...", help="numbers of threads (1,2,3,4, and all cores)")
     parser.add_argument("--simulated", type=numbers, metavar="N,...", help="numbers of simulated workers (1,2,4,...,1024)")
@@ -62,35 +62,35 @@ def built(given):
         given = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
     program = given.resolve() / "rayfarm-master"
     if not program.is_file():
-        raise Failure(f"{program}: is not there; build it with cargo build --release, or name its folder with --programs")
+        raise Failure(f"{program} does not exist; build it with cargo build --release, or name its folder with --programs")
     return program
 
 
-def bench(asked):
-    """What was asked for, with the rest as it is usual."""
+def bench(options):
+    """The parameters of a run: options of the command line, and defaults for those that are absent."""
     cores = os.cpu_count() or 1
-    quick = asked.quick
+    quick = options.quick
     models = ROOT / "models"
     pawn = models / "chess/pawn.obj"
     scene = pawn if quick else first_there(SHARED / "workloads/w1.toml", models / "instances.toml")
     model = pawn if quick else first_there(SHARED / "models/nefertiti.obj", models / "camera/camera.obj")
-    # The camera moves, as it does for somebody who looks at a scene.
-    options = ("--orbit", "36", *(("--size", "160x120") if quick else ()))
+    # The camera moves, as in interactive use.
+    camera = ("--orbit", "36", *(("--size", "160x120") if quick else ()))
     return experiments.Bench(
-        master=Master(built(asked.programs), asked.dry_run),
-        folder=asked.out.resolve(),
-        scene=(asked.scene or scene).resolve(),
-        model=(asked.model or model).resolve(),
-        frames=asked.frames or (6 if quick else 100),
+        master=Master(built(options.programs), options.dry_run),
+        folder=options.out.resolve(),
+        scene=(options.scene or scene).resolve(),
+        model=(options.model or model).resolve(),
+        frames=options.frames or (6 if quick else 100),
         turns=12 if quick else 500,
-        repeats=asked.repeats or (1 if quick else 3),
+        repeats=options.repeats or (1 if quick else 3),
         sizes=[1, 16, 128] if quick else SIZES,
-        workers=asked.workers or ([1, 2] if quick else [1, 2, 3, 4]),
-        threads=asked.threads or ([1, 2] if quick else sorted({1, 2, 3, 4, cores})),
+        workers=options.workers or ([1, 2] if quick else [1, 2, 3, 4]),
+        threads=options.threads or ([1, 2] if quick else sorted({1, 2, 3, 4, cores})),
         few_sizes=[16] if quick else [4, 16, 64],
-        options=options,
+        options=camera,
         cores=cores,
-        simulated=asked.simulated or ([1, 8] if quick else [2**power for power in range(11)]),
+        simulated=options.simulated or ([1, 8] if quick else [2**power for power in range(11)]),
     )
 
 
@@ -106,18 +106,18 @@ def chosen(only):
 
 
 def main():
-    asked = arguments()
-    wanted = chosen(asked.only)
-    facts = report.machine(ROOT)  # before this makes the machine busy
-    what = bench(asked)
-    what.folder.mkdir(parents=True, exist_ok=True)
+    options = arguments()
+    experiments_to_run = chosen(options.only)
+    facts = report.machine(ROOT)  # before the measurement loads the machine
+    parameters = bench(options)
+    parameters.folder.mkdir(parents=True, exist_ok=True)
     sections = []
-    for name, experiment in wanted.items():
+    for name, experiment in experiments_to_run.items():
         print(f"== {name}", file=sys.stderr)
-        sections.append(experiment(what))
-    if not asked.dry_run:
-        report.write(what.folder / "report.md", what, facts, [found for found in sections if found], asked.quick)
-        print(what.folder / "report.md")
+        sections.append(experiment(parameters))
+    if not options.dry_run:
+        report.write(parameters.folder / "report.md", parameters, facts, [found for found in sections if found], options.quick)
+        print(parameters.folder / "report.md")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# rayfarm beside Embree: the same scenes, rendered in turn on this machine. See --help.
+# Compares rayfarm with Embree: the same scenes, rendered in turn on this machine. See --help.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -11,23 +11,23 @@ usage() {
 usage: scripts/bench_peers.sh [OPTION ...]
 
 Renders the same scenes with rayfarm and with a small tracer on Embree 3 (packets of 16 rays, coherent), in turn, checks that
-both give the same picture, and prints milliseconds per frame and their ratio. Building trees is not in the times.
+both give the same picture, and prints milliseconds per frame and their ratio. The times exclude the building of trees.
 
-  --workloads DIR  folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads beside this repository). Where it does not
-                   exist, models/room.toml and models/instances.toml are rendered, reduced to what both tracers have:
+  --workloads DIR  folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads, seen from here).
+                   Where it does not exist, models/room.toml and models/instances.toml are rendered, reduced to features of both tracers:
                    flat normals, one material a model, one point light
   --scene FILE     render this scene instead, reduced in the same way; may be given several times
-  --rounds N       times that both are measured (default 5)
+  --rounds N       measurements of both tracers (default 5)
   --frames N       frames a round (default 20)
   --threads LIST   thread counts (default "1 2")
   --rays           measure 1,000,000 single random rays as well
   --only-rays      measure nothing else
-  --csv FILE       write the table there as well
-  --keep DIR       leave scenes, pictures and all figures there
+  --csv FILE       write the table to FILE as well
+  --keep DIR       keep scenes, pictures and all figures in DIR
   --help           this text
 
-Needs Rust, python3 3.11, g++ and Embree 3 (libembree-dev of Debian 12, which is installed where apt-get and root are at hand).
-Exit status: 0 measured; 1 something failed, or the pictures differ; 2 wrong use; 77 something is missing.
+Needs Rust, python3 3.11, g++ and Embree 3 (libembree-dev of Debian 12, installed where apt-get exists and the user is root).
+Exit status: 0 measured; 1 failure, or the pictures differ; 2 wrong use; 77 a program is missing.
 TEXT
 }
 
@@ -62,7 +62,7 @@ while [ $# -gt 0 ]; do
     shift 2
 done
 
-# --- what is needed ---------------------------------------------------------------------------------------------------
+# --- requirements -----------------------------------------------------------------------------------------------------
 
 have_embree() { echo '#include <embree3/rtcore.h>' | g++ -E -x c++ - >/dev/null 2>&1; }
 
@@ -85,10 +85,10 @@ need() {
 
 need
 
-# Before this script's own builds make it busy.
+# Before the builds of this script load the machine.
 load=$(cut -d ' ' -f 1 /proc/loadavg 2>/dev/null || echo unknown)
 if [ "$load" != unknown ] && awk -v load="$load" 'BEGIN { exit !(load > 0.5) }'; then
-    say "the machine is busy (load $load): these figures, of several threads above all, will be of what is left of it"
+    say "the machine is busy (load $load): all figures are too slow, above all those of several threads"
 fi
 
 if [ -n "$keep" ]; then
@@ -102,7 +102,7 @@ trap 'say "interrupted"; exit 130' INT TERM
 
 # --- building both ----------------------------------------------------------------------------------------------------
 
-# Of what is built now, whatever is committed meanwhile.
+# Read before the build: commits may be added while it runs.
 commit=$(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)
 say "building rayfarm"
 (cd "$root" && cargo build --release --package rayfarm-master >&2)
@@ -123,7 +123,7 @@ g++ -std=c++17 -O3 -march=native -mprefer-vector-width=512 -ffast-math -Wall -We
 
 names=()
 
-# prepare NAME SCENE OPTION...: writes NAME.toml and NAME.txt and remembers the name.
+# prepare NAME SCENE OPTION...: writes NAME.toml and NAME.txt, and adds NAME to names.
 prepare() {
     local name=$1 scene=$2
     shift 2
@@ -133,11 +133,11 @@ prepare() {
     names+=("$name")
 }
 
-# Baked models are compiled: reading a large OBJ takes seconds, and nothing here measures it.
+# Compiles baked models: reading a large OBJ takes seconds and is not measured.
 compile_models() {
     local obj
     for obj in "$work/$1"-*.obj; do
-        # Names of scenes may begin alike.
+        # The name of a scene may begin with that of another scene.
         grep -qF "\"$obj\"" "$work/$1.toml" || continue
         "$rayfarm" compile "$obj" -o "${obj%.obj}.mesh" --quiet >&2
         sed -i "s|\"$obj\"|\"${obj%.obj}.mesh\"|" "$work/$1.toml"
@@ -188,7 +188,7 @@ fi
 runs=$work/runs.tsv
 : >"$runs"
 
-# record PART NAME THREADS ROUND TRACER COMMAND...: the command's line of JSON, with what it is about.
+# record PART NAME THREADS ROUND TRACER COMMAND...: adds the command's line of JSON, with its key.
 record() {
     local json
     json=$("${@:6}")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What the tracer costs on this machine: frames, stages, features, instructions. See --help.
+# Measures the tracer on this machine: frames, stages, features, instructions. See --help.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -9,19 +9,19 @@ usage() {
     cat <<'TEXT'
 usage: scripts/bench_tracer.sh [OPTION ...]
 
-Measures the tracer alone, without a farm around it, and prints tables in Markdown: whole frames of the project's scenes (and
-of w1.toml, w2.toml and w3.toml where they are) at 1 and 4 samples on 1 and 2 threads; where the time goes, stage by stage;
-what each feature of a scene costs, and that one which is not asked for costs nothing; and, where valgrind is installed,
-instructions per ray, which do not depend on what else the machine does. Valgrind hides AVX-512: they are of AVX2 there.
+Measures the tracer alone, without a farm, and prints tables in Markdown: whole frames of the project's scenes (and of
+w1.toml, w2.toml and w3.toml where they exist) at 1 and 4 samples on 1 and 2 threads; the time of each stage; the cost of each
+feature of a scene, and that an unused feature costs nothing; and, where valgrind is installed, instructions per ray, which do
+not depend on other load of the machine. Valgrind hides AVX-512, so instructions are those of AVX2.
 
   --short            fewer scenes (room, textured, w1) and repeats: some minutes
-  --no-instructions  leave valgrind out
-  --workloads DIR    folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads beside this repository)
-  --csv FILE         write all figures there as well
-  --keep DIR         leave what criterion and callgrind wrote there; a new or an empty folder
+  --no-instructions  do not run valgrind
+  --workloads DIR    folder of w1.toml, w2.toml and w3.toml (default ../shared/workloads, seen from this repository)
+  --csv FILE         write all figures to FILE as well
+  --keep DIR         keep the files of criterion and callgrind in DIR, a new or empty folder
   --help             this text
 
-Needs Rust and python3. Exit status: 0 measured; 1 something failed; 2 wrong use; 77 something is missing.
+Needs Rust and python3. Exit status: 0 measured; 1 failure; 2 wrong use; 77 a program is missing.
 TEXT
 }
 
@@ -57,10 +57,10 @@ if [ "$instructions" = yes ] && ! command -v valgrind >/dev/null; then
     instructions=no
 fi
 
-# Before this script's own builds make it busy.
+# Before the builds of this script load the machine.
 load=$(cut -d ' ' -f 1 /proc/loadavg 2>/dev/null || echo unknown)
 if [ "$load" != unknown ] && awk -v load="$load" 'BEGIN { exit !(load > 0.5) }'; then
-    say "the machine is busy (load $load): all figures but instructions will be of what is left of it"
+    say "the machine is busy (load $load): all figures but instructions are too slow"
 fi
 
 if [ -n "$keep" ]; then
@@ -86,16 +86,15 @@ only=$(IFS='|'; echo "${scenes[*]}")
 
 # --- measuring --------------------------------------------------------------------------------------------------------
 
-# Of what is built now, whatever is committed meanwhile.
+# Read before the build: commits may be added while it runs.
 commit=$(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)
 say "building"
 (cd "$root" && cargo bench --package rayfarm-tracer --no-run >&2)
 
-# What cargo is told besides.
+# Further options of cargo.
 options=()
 
-# bench NAME ARGUMENT...: one of the benchmarks in tracer/benches.
-# With names and lines, which callgrind and perf need and programs to copy do not have.
+# bench NAME ARGUMENT...: runs a benchmark of tracer/benches. The profile keeps names and lines, which callgrind and perf need.
 bench() { (cd "$root" && cargo bench --quiet --profile profiling "${options[@]}" --package rayfarm-tracer --bench "$1" -- "${@:2}"); }
 
 export CRITERION_HOME=$work/criterion

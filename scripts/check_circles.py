@@ -3,7 +3,7 @@
 
 At each level of a crate, the modules of one folder (files and folders) are points, and an arrow leads from one to another
 where a `use` or a path in the code of the first (or of anything below it) leads to the second. Re-exports are followed. A
-circle with a folder in it is an error; circles of files of one folder are left alone (`--files` shows them as well). Arrows
+circle with a folder in it is an error; circles of files of one folder are allowed (`--files` shows them as well). Arrows
 between a folder's mod.rs and what is in the folder do not count, and nor do tests.
 """
 
@@ -79,7 +79,7 @@ def below(root, level):
 
 
 def check(file, base, files_too, all_lines):
-    """Prints the circles of one crate; returns how many there are."""
+    """Prints the circles of one crate; returns their number."""
     root = modules.read_crate(file)
     count = 0
     for level, edges in sorted(arrows(root).items()):
@@ -93,7 +93,7 @@ def check(file, base, files_too, all_lines):
             names = ", ".join(name + "/" * here.children[name].is_folder for name in group)
             print(f"{place}: a circle of {len(group)}: {names}")
             inside = [(edge, lines) for edge, lines in edges.items() if set(edge) <= set(group)]
-            # The thinnest arrows first: they are the ones to remove.
+            # Arrows with the fewest uses first: they are the easiest to remove.
             for (source, target), lines in sorted(inside, key=lambda arrow: (len(arrow[1]), arrow[0])):
                 print(f"  {source} -> {target}: {len(lines)} " + ("line" if len(lines) == 1 else "lines"))
                 for (where, line), path in itertools.islice(lines.items(), None if all_lines else LINES_OF_AN_ARROW):
@@ -106,7 +106,7 @@ def check_all(base, files_too=False, all_lines=False):
 
 
 def self_test():
-    """Tries the check on made-up crates."""
+    """Runs the check on examples."""
     clean = {
         "lib.rs": "mod a; mod b; pub use b::Deep;",
         "a/mod.rs": "mod inner; use crate::b::Deep; pub(in crate::b) struct Own; // use crate::b::c",

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Checks the walls between crates that Cargo cannot enforce. Cargo itself keeps apart what depends on nothing: a crate can name
-# only what its Cargo.toml lists. Left for this script:
-# - the dependency lists themselves: tracer and protocol do not know each other, the scheduler has no async runtime and no tracer;
+# Checks walls between crates that Cargo does not enforce. Cargo refuses uses of crates that a Cargo.toml does not list. This
+# script checks:
+# - the dependency lists themselves: tracer and protocol do not depend on each other, the scheduler has no async runtime and no tracer;
 # - parts of the standard library: sockets, clocks and threads;
-# - rooms inside a crate: the accounting of the farm is pure.
+# - folders inside a crate: the accounting of the farm is pure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -34,9 +34,9 @@ forbid_dependency tracer 'rayfarm-(protocol|scheduler|farm|master|worker)|tokio|
 forbid_dependency protocol 'rayfarm-(tracer|scheduler|farm|master|worker)|image|glam' \
     'protocol: carries scenes and pixels as bytes and interprets neither'
 forbid_dependency protocol/text 'rayfarm-.*' \
-    'text: knows no other crate of the farm'
+    'text: depends on no other crate of the farm'
 forbid_dependency worker 'rayfarm-(scheduler|farm|master)|minifb' \
-    'worker: knows tracer and protocol only'
+    'worker: depends on tracer and protocol only'
 forbid_dependency master/scheduler 'rayfarm-(tracer|farm|master|worker)|tokio.*|minifb' \
     'scheduler: pure; pixels bypass it'
 forbid_dependency master/farm 'rayfarm-master|clap|minifb' \

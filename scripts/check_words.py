@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Checks that comments, messages and documents use no word of scripts/words.txt.
 
-Without options, prints file, line, word and replacement of each finding in the sections `prose` and `names`, and ends with
-status 1 if there is one. `--report` counts the findings of all sections by folder, and ends with status 0.
+Prints file, line, word and replacement of each finding, and ends with status 1 if there is one. `--report` counts the findings
+by folder and by word instead, and ends with status 0.
 """
 
 import argparse
@@ -23,8 +23,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LIST = ROOT / "scripts" / "words.txt"
 # The list itself, and the checks, which quote it.
 LEFT_OUT = {"scripts/words.txt", "scripts/check_words.py"}
-SECTION = re.compile(r"\[(prose|names)( reported)?\]$")
-# A space of a pattern: spaces, or the end of a line and what begins the next one.
+SECTION = re.compile(r"\[(prose|names)(?: except (\S+))?\]$")
+# A space of a pattern: spaces, or a line break with indentation.
 GAP = r"(?:[ ]+|[ ]*\n[ ]*)"
 FENCE = re.compile(r"^( *)(```|~~~).*?(?:^ *\2[`~]*[ ]*$|\Z)", re.MULTILINE | re.DOTALL)
 INLINE_CODE = re.compile(r"(`+)(?!`).+?(?<!`)\1(?!`)", re.DOTALL)
@@ -32,7 +32,7 @@ LINK_TARGET = re.compile(r"\]\([^)\s]*\)")
 
 
 class BadList(Exception):
-    """A line of words.txt is not understood."""
+    """An invalid line of words.txt."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,11 @@ class Word:
     source: str
     instead: str
     is_name: bool
-    is_reported_only: bool
+    # A folder in which the word is allowed.
+    exception: str = ""
+
+    def is_refused_in(self, file):
+        return not (self.exception and Path(file).is_relative_to(self.exception))
 
 
 @dataclass(frozen=True)
@@ -60,13 +64,13 @@ class Finding:
 
 def read_list(text):
     """The words of a list in the format of words.txt."""
-    words, kind, reported = [], None, False
+    words, kind, exception = [], None, ""
     for number, line in enumerate(text.splitlines(), 1):
         line = line.strip()
         if not line or line.startswith("#"):
             continue
         if section := SECTION.match(line):
-            kind, reported = section[1], bool(section[2])
+            kind, exception = section[1], section[2] or ""
             continue
         source, arrow, instead = (part.strip() for part in line.partition(" => "))
         if not arrow or not instead or kind is None:
@@ -75,7 +79,7 @@ def read_list(text):
             re.compile(source)
         except re.error as error:
             raise BadList(f"words.txt:{number}: {error}") from error
-        words.append(Word(source, instead, kind == "names", reported))
+        words.append(Word(source, instead, kind == "names", exception))
     return words
 
 
@@ -91,7 +95,7 @@ def rust_prose(source):
     comments = rust_text.only(source, {rust_text.COMMENT})
     comments = re.sub(r"^( *)(//[/!]?|/\*+!?|\*(?!/))", lambda mark: " " * len(mark.group()), comments, flags=re.MULTILINE)
     strings = rust_text.only(source, {rust_text.STRING})
-    # A string that goes on in the next line.
+    # A string that continues in the next line.
     return without_code(comments), strings.replace("\\\n", " \n")
 
 
@@ -110,7 +114,8 @@ def python_prose(source):
 def texts(file, source):
     """(prose texts, code) of a file; positions in them are those in the file."""
     suffix = file.suffix
-    if suffix == ".rs":
+    # The comments and strings of C++ are near enough to those of Rust.
+    if suffix in (".rs", ".cpp", ".hpp"):
         return rust_prose(source), rust_text.only(source, {rust_text.CODE})
     if suffix == ".py":
         return (python_prose(source),), ""
@@ -125,7 +130,7 @@ def texts(file, source):
 
 
 class Search:
-    """Finds the words of a list. One expression looks for all of a kind: a search for each would take minutes."""
+    """Finds the words of a list. One expression looks for all of a kind: a separate search for each would take minutes."""
 
     def __init__(self, words):
         self.prose = self.expression([word for word in words if not word.is_name], re.IGNORECASE)
@@ -149,13 +154,15 @@ class Search:
             for text in parts:
                 for match in pattern.finditer(text):
                     word = words[int(match.lastgroup.removeprefix("word"))]
+                    if not word.is_refused_in(name):
+                        continue
                     line = text.count("\n", 0, match.start()) + 1
                     found.append(Finding(name, line, re.sub(r"\s+", " ", match.group()), word))
         return sorted(found, key=lambda finding: finding.line)
 
 
 def files(base):
-    """The files that git knows or would take, as paths below `base`."""
+    """The files that git tracks or would add, as paths below `base`."""
     listed = subprocess.run(
         ["git", "-C", str(base), "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         check=True,
@@ -166,12 +173,12 @@ def files(base):
         path = base / name
         if not name or name in LEFT_OUT or not path.is_file():
             continue
-        if path.suffix in (".rs", ".md", ".py", ".sh", ".toml", ".yml") or name in (".ci/run", "justfile"):
+        if path.suffix in (".rs", ".cpp", ".hpp", ".md", ".py", ".sh", ".toml", ".yml") or name in (".ci/run", "justfile"):
             yield name
 
 
 def folder_of(name):
-    """The folder by which a file is counted: three names deep for sources, so that owners see their own."""
+    """The folder by which a file is counted: up to three names deep."""
     parts = Path(name).parts[:-1]
     return "/".join(parts[:3]) or "."
 
@@ -188,12 +195,14 @@ def report(findings, words):
         counts = [(by_word[word], word) for word in words if word.is_name == is_name]
         print(f"\n{kind}: {sum(count for count, _ in counts)}")
         for count, word in sorted(counts, key=lambda entry: -entry[0]):
-            print(f"{count:>6}  {word.source}" + ("" if word.is_reported_only else "  (refused)"))
+            print(f"{count:>6}  {word.source}")
 
 
 def self_test():
-    """Tries the check on made-up files."""
-    search = Search(read_list("[prose]\nwhoever => the worker\ngiven up => dropped\n(?<!Blinn-)Phong => Blinn-Phong\n[names]\nDesk => State\n"))
+    """Runs the check on examples."""
+    search = Search(read_list("[prose]\nwhoever => the worker\ngiven up => dropped\n(?<!Blinn-)Phong => Blinn-Phong\n"
+                              "[names]\nDesk => State\n"
+                              "[prose except a/b]\nstands => is\n"))
     cases = [
         ("a.rs", "// Whoever comes\n", [(1, "Whoever")]),
         ("a.rs", "//! is given\n//! up here\n", [(1, "given up")]),
@@ -210,6 +219,8 @@ def self_test():
         ("a.py", 'whoever = 1  # whoever\n"""Given\n    up."""\n', [(1, "whoever"), (2, "Given up")]),
         ("a.sh", "whoever=1 # whoever\n", [(1, "whoever")]),
         ("a.toml", "a = 'given up' # so\n", []),
+        ("a/b/c.md", "whoever stands\n", [(1, "whoever")]),
+        ("a/bc.md", "whoever stands\n", [(1, "whoever"), (1, "stands")]),
     ]
     failed = 0
     for name, source, expected in cases:
@@ -229,16 +240,13 @@ def self_test():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--report", action="store_true", help="count the findings of all sections by folder")
-    parser.add_argument("--all", action="store_true", help="refuse what is only reported as well")
-    parser.add_argument("--self-test", action="store_true", help="try the check on made-up files")
+    parser.add_argument("--report", action="store_true", help="count the findings by folder and by word")
+    parser.add_argument("--self-test", action="store_true", help="run the check on examples")
     parser.add_argument("paths", nargs="*", help="only files below these, seen from the root")
     arguments = parser.parse_args()
     if arguments.self_test:
         return 1 if self_test() else 0
     words = read_list(LIST.read_text(encoding="utf-8"))
-    if not (arguments.report or arguments.all):
-        words = [word for word in words if not word.is_reported_only]
     search, findings = Search(words), []
     for name in files(ROOT):
         if arguments.paths and not any(Path(name).is_relative_to(path) for path in arguments.paths):

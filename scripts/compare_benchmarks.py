@@ -24,7 +24,7 @@ HIGHER_IS_BETTER = ("fps", "per second", "rays/s", "psnr", "ssim", "efficiency",
 
 
 class WrongUse(Exception):
-    """A file that cannot be compared; the text says why."""
+    """A file that cannot be compared; the text has the reason."""
 
 
 class Record:

@@ -14,24 +14,25 @@ Runs a rayfarm-worker on each machine that the file HOSTS names, one a line:
 
     [user@]host [threads [port]]      # what follows a # is a comment
 
-threads is a number, or - for all cores; port is the one that ssh asks. A machine that is named twice gets two workers.
+threads is a number, or - for all cores; port is that of ssh. A machine that is named twice runs two workers.
 The file may have Windows line ends; an IPv6 address is written with or without brackets (fe80::1%eth0).
-The machines need sh and a log-in over ssh that asks nothing (a key); not root, and nothing installed. What is put there
-is in ~/.rayfarm: the program, and for each worker NAME.pid and NAME.log. The program is copied where it is absent or
-another one: without its symbols (where strip is at hand), and compressed (where gzip is, here and there). A copy that was
-interrupted goes on where it ended. Workers stay when this script, the connection and their master end: they wait for the
-next master at that address. They end by stop, or with their master where "-- --once" is added.
+The machines need sh and a log-in over ssh by key; neither root nor other software. The script writes to ~/.rayfarm there:
+the program, and for each worker NAME.pid and NAME.log. The program is copied where it is absent or different: without
+symbols (where strip exists here), and compressed (where gzip exists here and there). An interrupted copy continues where
+it ended. Workers survive this script, the connection and their master: they wait for the next master at that address.
+They end by stop, or with their master where "-- --once" is added.
 
   --master HOST:PORT  start: where the master listens, as the machines see it (it needs --listen 0.0.0.0:PORT)
   --worker FILE       start: the program to run there (default: target/release/rayfarm-worker of this folder)
-  --jobs N            so many machines at a time (default 16)
-  --timeout SECONDS   how long one machine may be silent, or a copy make no progress (default 60)
-  --ssh COMMAND       what is run in place of "ssh -o BatchMode=yes -o ConnectTimeout=10"; its words are split at
-                      spaces, and [-p PORT] HOST and one command line follow
-  --dry-run           print what would be done, and touch no machine
+  --jobs N            number of machines at a time (default 16)
+  --timeout SECONDS   longest time without an answer of a machine or progress of a copy (default 60)
+  --ssh COMMAND       command in place of "ssh" with its default options, split at spaces;
+                      [-p PORT] HOST and one command line are appended
+  --dry-run           print the actions without connecting to a machine
   --help              this text
 
-A line per worker is printed, and the progress of copies that take their time. Exit status: 0 all well (status: all run); 1 not with each; 2 wrong use.
+Prints a line per worker, and the progress of long copies. Exit status: 0 success for all (status: all run); 1 failure for
+some; 2 wrong use.
 Needs bash 4.4 or later.
 TEXT
 }
@@ -40,9 +41,9 @@ say() { printf '%s\n' "$*" >&2; }
 fail() { say "workers.sh: $1"; exit "${2:-1}"; }
 wrong() { fail "$1; see --help" 2; }
 
-# --- what is asked for ------------------------------------------------------------------------------------------------
+# --- options ----------------------------------------------------------------------------------------------------------
 
-action="" hosts_file="" master="" worker="" jobs=16 patience=60 dry_run=no
+action="" hosts_file="" master="" worker="" jobs=16 timeout_seconds=60 dry_run=no
 read -ra ssh_words <<<"ssh -o BatchMode=yes -o ConnectTimeout=10 -o ServerAliveInterval=5"
 worker_options=()
 
@@ -66,7 +67,7 @@ while [ $# -gt 0 ]; do
         --master) master=$2 ;;
         --worker) worker=$2 ;;
         --jobs) whole_number "$1" "$2"; jobs=$2 ;;
-        --timeout) whole_number "$1" "$2"; patience=$2 ;;
+        --timeout) whole_number "$1" "$2"; timeout_seconds=$2 ;;
         --ssh) read -ra ssh_words <<<"$2" ;;
     esac
     shift 2
@@ -86,18 +87,18 @@ if [ ! -r "$hosts_file" ] || [ -d "$hosts_file" ]; then fail "$hosts_file: canno
 
 hosts=() threads=() ports=() names=()
 
-# shown WORD: in quotes, and nothing in it that a terminal would obey.
+# shown WORD: the word in quotes, without control characters.
 shown() {
     local word=${1//[[:cntrl:]]/?}
     printf '"%s"' "${word:0:80}"
 }
 
-# add_host LINE-NUMBER HOST THREADS PORT: checks one line, and gives the worker a name of its own.
+# add_host LINE-NUMBER HOST THREADS PORT: checks one line, and gives the worker a unique name.
 add_host() {
     local where="$hosts_file, line $1" host=$2 name count=1
-    # An IPv6 address in brackets, which ssh does not know there.
+    # An IPv6 address in brackets: ssh accepts it without them only.
     [[ $host =~ ^(.*@)?\[([0-9A-Fa-f:]+(%[A-Za-z0-9_.-]+)?)\]$ ]] && host=${BASH_REMATCH[1]}${BASH_REMATCH[2]}
-    # Nothing that a shell or ssh would take for something else.
+    # No word that a shell or ssh would interpret as something else.
     [[ $host =~ ^[A-Za-z0-9_:][A-Za-z0-9_.@:%-]*$ ]] || fail "$where: $(shown "$host") is no [user@]host" 2
     [[ $3 =~ ^(-|[1-9][0-9]{0,3})$ ]] || fail "$where: $(shown "$3") is no number of threads (or - for all cores)" 2
     [[ $4 =~ ^(|[1-9][0-9]{0,4})$ ]] || fail "$where: $(shown "$4") is no port" 2
@@ -138,14 +139,14 @@ read_hosts
 
 # --- the program ------------------------------------------------------------------------------------------------------
 
-# Of standard input, in hexadecimal, by whichever program is there.
+# SHA-256 of standard input, in hexadecimal.
 hash_here() {
     if command -v sha256sum >/dev/null; then sha256sum; else shasum -a 256; fi | cut -d ' ' -f 1
 }
 
 size_here() { wc -c <"$1" | tr -d ' '; }
 
-# kind_of FILE: the kind of machine that an ELF program is for, as uname names it; nothing where that is not known.
+# kind_of FILE: the kind of machine that an ELF program is for, as uname names it; empty where it is unknown.
 kind_of() {
     local head
     head=$(od -An -tx1 -N20 "$1" | tr -d ' \n')
@@ -157,11 +158,11 @@ kind_of() {
     esac
 }
 
-# Programs to copy, and what comes of each machine; gone when this script ends.
+# Programs to copy, and results of each machine; removed when this script ends.
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# prepare: sets program (without symbols where strip knows its kind), hash, plain_size, packed, packed_size and machine.
+# prepare: sets program (without symbols where strip supports its architecture), hash, plain_size, packed, packed_size and machine.
 hash="" plain_size=0 packed="" packed_size=0 machine=""
 prepare() {
     program=$work/rayfarm-worker
@@ -171,7 +172,7 @@ prepare() {
     hash=$(hash_here <"$program")
     plain_size=$(size_here "$program")
     machine=$(kind_of "$program")
-    # Without a name and a time in it: what is sent on two days fits together.
+    # Without name and time in the header, so that a copy can be resumed on another day.
     if command -v gzip >/dev/null && gzip -n -6 <"$program" >"$work/packed"; then
         packed=$work/packed
         packed_size=$(size_here "$packed")
@@ -196,14 +197,14 @@ quote() {
     printf '%s' "${quoted[*]}"
 }
 
-# options_of INDEX: what the worker's command line shall be, as words for a shell.
+# options_of INDEX: the worker's options, as words for a shell.
 options_of() {
     local words=(--master "$master" --name "${names[$1]}")
     [ "${threads[$1]}" = - ] || words+=(--threads "${threads[$1]}")
     quote "${words[@]}" "${worker_options[@]}"
 }
 
-# script_for INDEX: what sh shall read there. Everything that varies comes first, in quotes.
+# script_for INDEX: the script that sh runs there. Variables come first, in quotes.
 script_for() {
     printf 'action=%s name=%s hash=%s\n' "$action" "$(quote "${names[$1]}")" "$(quote "$hash")"
     printf 'machine=%s plain_size=%s packed_size=%s\n' "$(quote "$machine")" "$plain_size" "$packed_size"
@@ -211,29 +212,29 @@ script_for() {
     cat "$root/scripts/workers/remote.sh"
 }
 
-# ssh_to INDEX: sets command to what runs a command line there.
+# ssh_to INDEX: sets command to the words in front of a command line to run there.
 ssh_to() {
     command=("${ssh_words[@]}")
     [ -z "${ports[$1]}" ] || command+=(-p "${ports[$1]}")
     command+=("${hosts[$1]}")
 }
 
-# ask INDEX: has remote.sh do the action there; sets said and status.
-ask() {
+# run_remote INDEX: runs remote.sh there; sets said and status.
+run_remote() {
     local command
     ssh_to "$1"
-    if command -v timeout >/dev/null; then command=(timeout "$patience" "${command[@]}"); fi
+    if command -v timeout >/dev/null; then command=(timeout "$timeout_seconds" "${command[@]}"); fi
     status=0
     said=$(script_for "$1" | "${command[@]}" "sh -s" 2>"$work/errors.$1" 3>&-) || status=$?
-    # What ssh or a shell adds (a banner, a new host key) counts only where something went wrong.
+    # Other output of ssh or a shell (a banner, a new host key) matters only on failure.
     [ "$status" = 0 ] || said="$said $(cat "$work/errors.$1")"
 }
 
-# Bytes between two looks at how far a copy is.
+# Bytes of a copy between two updates of its progress.
 CHUNK=131072
 
-# feed FILE FROM SIZE MARK: the file from some byte on; how far it is goes to the file MARK.
-feed() {
+# send_file FILE FROM SIZE MARK: prints a file from a byte on, and writes the position reached to the file MARK.
+send_file() {
     local at=$2 next
     while [ "$at" -lt "$3" ]; do
         next=$(((at / CHUNK + 1) * CHUNK))
@@ -250,13 +251,14 @@ feed() {
 
 megabytes() { printf '%d.%d MB' $(($1 / 1000000)) $(($1 / 100000 % 10)); }
 
-# copy_to INDEX HOW FROM: sends the rest of the program; sets said and status. Ended when nothing moves for too long.
+# copy_to INDEX HOW FROM: sends the rest of the program; sets said and status. Ends when
+# there is no progress for timeout_seconds.
 copy_to() {
     local command file=$program size=$plain_size mark=$work/mark.$1 at=$3 seen pid quiet_since=$SECONDS reported=$SECONDS
     [ "$2" = plain ] || { file=$packed size=$packed_size; }
     ssh_to "$1"
     echo "$at" >"$mark"
-    feed "$file" "$at" "$size" "$mark" 2>/dev/null |
+    send_file "$file" "$at" "$size" "$mark" 2>/dev/null |
         "${command[@]}" "umask 077; cat >>.rayfarm/rayfarm-worker.$hash.$2.${names[$1]}.part" \
             >"$work/said.$1" 2>"$work/errors.$1" 3>&- &
     pid=$!
@@ -264,7 +266,7 @@ copy_to() {
         sleep 0.2
         seen=$(cat "$mark")
         if [ "$seen" != "$at" ]; then at=${seen:-$at} quiet_since=$SECONDS; fi
-        if [ $((SECONDS - quiet_since)) -gt "$patience" ]; then
+        if [ $((SECONDS - quiet_since)) -gt "$timeout_seconds" ]; then
             kill "$pid" 2>/dev/null || true
             wait "$pid" 2>/dev/null || true
             status=124 said="the copy stopped at $((100 * at / size)) % of $(megabytes "$size")"
@@ -282,32 +284,33 @@ copy_to() {
 }
 REPORT_EVERY=2
 
-# What remote.sh exits with when the program, or a part of it, is to be copied first.
+# Exit status of remote.sh where the program, or a part of it, must be copied first.
 COPY_FIRST=9
 
-# attempt INDEX: does what is wanted there; sets said and status. A copy that breaks off goes on as long as it gets on.
+# attempt INDEX: performs the action there; sets said and status. Resumes an interrupted copy as long as each attempt
+# transfers more.
 attempt() {
     local how from before=-1 problem="" problem_status=1
-    ask "$1"
+    run_remote "$1"
     while [ "$status" = "$COPY_FIRST" ]; do
         if ! [[ $said =~ rayfarm-copy\ (gzip|plain)\ ([0-9]+) ]]; then
-            said="an answer that is not understood: $said" status=1
+            said="invalid answer: $said" status=1
             return
         fi
         how=${BASH_REMATCH[1]} from=${BASH_REMATCH[2]}
         if [ "$from" -le "$before" ]; then
-            said=${problem:-the copy does not arrive whole} status=$problem_status
+            said=${problem:-the copy does not arrive complete} status=$problem_status
             return
         fi
         before=$from
         copy_to "$1" "$how" "$from"
-        # ssh's own failures and silence may pass; what a program there says does not.
+        # Failures of ssh and timeouts may be temporary; failures of programs there are not.
         case $status in
             0 | 124 | 255) problem=$said problem_status=$status ;;
             *) said="the program cannot be copied: ${said:-exit status $status}"; return ;;
         esac
         [ "$status" != 0 ] || problem="" problem_status=1
-        ask "$1"
+        run_remote "$1"
     done
 }
 
@@ -319,10 +322,10 @@ visit() {
     said=${said# } said=${said% }
     case $status in
         0) printf '%-24s ok      %s\n' "${names[$1]}" "$copied$said"; return 0 ;;
-        124) said="no answer within $patience s${said:+: $said}" ;;
+        124) said="no answer within $timeout_seconds s${said:+: $said}" ;;
         255)
             case $said in
-                *"Permission denied"*) said="ssh may not log in there: $said" ;;
+                *"Permission denied"*) said="ssh is not allowed to log in: $said" ;;
                 *) said="cannot be reached: ${said:-ssh says nothing}" ;;
             esac
             ;;
@@ -331,29 +334,30 @@ visit() {
     return 1
 }
 
-tell() {
+# describe INDEX: prints the action without performing it.
+describe() {
     printf '%s: %s' "${names[$1]}" "$action"
     if [ "$action" = start ]; then
         printf ' rayfarm-worker %s\n' "$(options_of "$1")"
         printf '    after a copy of %s (%s) to ~/.rayfarm/rayfarm-worker, unless its SHA-256 is %s' \
             "$worker" "$(megabytes "$([ -n "$packed" ] && echo "$packed_size" || echo "$plain_size")")" "$hash"
     fi
-    printf '\n    by: %s\n' "${ssh_words[*]}${ports[$1]:+ -p ${ports[$1]}} ${hosts[$1]} \"sh -s\""
+    printf '\n    command: %s\n' "${ssh_words[*]}${ports[$1]:+ -p ${ports[$1]}} ${hosts[$1]} \"sh -s\""
 }
 
-# --- all of them ------------------------------------------------------------------------------------------------------
+# --- all machines -----------------------------------------------------------------------------------------------------
 
 if [ "$dry_run" = yes ]; then
-    for index in "${!hosts[@]}"; do tell "$index"; done
+    for index in "${!hosts[@]}"; do describe "$index"; done
     exit 0
 fi
 
 outcomes=$work/outcomes
 mkdir "$outcomes"
-# Progress is told while the rest is kept for the machine's line.
+# Progress is printed at once, other output with the line of the machine.
 exec 3>&2
-# Jobs in the background do not hear Ctrl-C themselves.
-trap 'kill $(jobs -p) 2>/dev/null; say "interrupted: what was begun there goes on, and a copy the next time"; exit 130' INT TERM
+# Jobs in the background do not receive Ctrl-C.
+trap 'kill $(jobs -p) 2>/dev/null; say "interrupted: actions that were started there continue, and a copy continues with the next start"; exit 130' INT TERM
 
 for index in "${!hosts[@]}"; do
     [ "$index" -lt "$jobs" ] || wait -n || true
@@ -361,6 +365,6 @@ for index in "${!hosts[@]}"; do
 done
 wait
 
-well=$(find "$outcomes" -type f | wc -l)
-say "$action: $((well)) of ${#hosts[@]} ok"
-[ "$well" -eq ${#hosts[@]} ]
+succeeded=$(find "$outcomes" -type f | wc -l)
+say "$action: $((succeeded)) of ${#hosts[@]} ok"
+[ "$succeeded" -eq ${#hosts[@]} ]

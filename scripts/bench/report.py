@@ -94,7 +94,7 @@ class Report:
             self.keep("features", name, "least ms", least, threads=1)
         print_table(
             "What each feature costs, 1 thread (least times, because they are compared; ratio: of the two frames)",
-            ["variant", "ms", "million rays/s", "beside", "ratio"],
+            ["variant", "ms", "million rays/s", "compared with", "ratio"],
             rows,
         )
 
@@ -109,7 +109,7 @@ class Report:
             self.keep("instructions", name, "instructions per ray", count / int(rays))
         print_table(
             "Instructions, by callgrind, of smaller frames (ratio: of the two frames)",
-            ["scene or variant", "rays", "instructions per ray", "beside", "ratio"],
+            ["scene or variant", "rays", "instructions per ray", "compared with", "ratio"],
             rows,
         )
 

@@ -1,6 +1,6 @@
-"""The experiments: each measures, writes its table and its plots, and says what it is about.
+"""The experiments: each measures, writes its table and plots, and describes them.
 
-A function takes a Bench and returns a Section, or None where it cannot be done.
+A function takes a Bench and returns a Section, or None in a dry run.
 """
 
 import json
@@ -18,7 +18,7 @@ SPIN = "1.44"
 
 @dataclass
 class Section:
-    """What the report says about an experiment."""
+    """Section of the report about an experiment."""
 
     title: str
     text: str
@@ -30,7 +30,7 @@ class Section:
 
 @dataclass
 class Bench:
-    """What is measured, how often, and where it goes."""
+    """Parameters of all experiments, and the output folder."""
 
     master: object
     folder: Path
@@ -42,14 +42,14 @@ class Bench:
     sizes: list
     workers: list
     threads: list
-    few_sizes: list  # of segments, where not all of them are asked for
+    few_sizes: list  # of segments, for experiments that do not use all sizes
     options: tuple
     cores: int
     simulated: list  # numbers of workers
     kept: list = None
 
     def farm(self):
-        """Every number of workers, policy and segment size; measured once, for all experiments that look at it."""
+        """Every number of workers, policy and segment size; measured once, for all experiments that use it."""
         if self.kept is None:
             self.kept = measure(self.master, self.farm_runs(), self.repeats)
         return self.kept
@@ -113,7 +113,7 @@ def segment_size(bench):
 def segment_size_by_workers(bench):
     rows, plots = bench.farm(), []
     table = bench.folder / "segment-size-by-workers.csv"
-    # Adaptive beside each: a level in the colour of the same number of workers.
+    # Adaptive next to each: a level in the colour of the same number of workers.
     named = [{**row, "series": f"{row['workers']} worker{'s' * (row['workers'] > 1)}"} for row in rows]
     if not bench.master.dry_run:
         write_csv(table, named)
@@ -171,7 +171,7 @@ def threads(bench):
     found = medians(rows, "series", "threads")
     names = list(dict.fromkeys(name for name, _ in found))
     lines = [[name, *(f"{found[name, count]:.1f}" for count in bench.threads)] for name in names]
-    text = "One worker over TCP, beside the same tracer in one process without a farm (`rayfarm-master bench`)."
+    text = "One worker over TCP, compared with the same tracer in one process without a farm (`rayfarm-master bench`)."
     return Section(title, text, ["threads"], ["FPS with threads:", *bench.threads], lines, ["threads"])
 
 

@@ -1,4 +1,4 @@
-"""The report in Markdown, and what it says about the machine."""
+"""The report in Markdown, with facts about the machine."""
 
 import os
 import platform
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def machine(root):
-    """(what, value) of the machine and of what was built on it."""
+    """(fact, value) pairs about the machine and the build."""
     return [
         ("processor", processor()),
         ("cores", os.cpu_count()),
@@ -51,12 +51,12 @@ def section(found):
 
 
 def write(path, bench, facts, sections, quick):
-    lines = ["# How the farm does", ""]
+    lines = ["# Measurements of the farm", ""]
     if quick:
-        lines += ["**A quick run, to see that everything works: its figures say nothing.**", ""]
+        lines += ["**A quick run that tests the script: its figures are no measurements.**", ""]
     lines += [
         f"`{bench.scene.name}`, {bench.frames} frames a run, each run {bench.repeats} times; points are medians, bars reach from "
-        "the least to the greatest. A worker is a process of one thread that stands for a machine; the workers are all on "
+        "the least to the greatest. A worker is a process of one thread that represents a machine; the workers are all on "
         f"the machine below, so that more than {bench.cores} share its cores, with the master. The first frame of a run "
         "carries the scene and does not count. Every run of a scene ended with the same picture, byte for byte.",
         *table(["", ""], facts),

@@ -10,17 +10,18 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-# Frame times are told for so many frames in a row: two frames may come at nearly the same moment, after a pause of two.
+# Frames over which a rate is averaged. The rate of a single frame says little: two frames may arrive almost simultaneously after
+# a pause.
 WINDOW = 10
 
 
 class Failure(Exception):
-    """A program did not do what it was run for; the text says which and why."""
+    """A program failed; the text names the program and the reason."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One `render`: who renders what, cut how."""
+    """One call of `render`: workers, frames and segments."""
 
     scene: Path
     frames: int
@@ -28,21 +29,21 @@ class Run:
     threads: int
     policy: str  # static, smart or adaptive
     rows: int = 0  # of a segment; none for adaptive
-    options: tuple = ()  # what moves, and the size
+    options: tuple = ()  # of movement and size
 
     @property
     def segment(self):
         return f"{self.policy}:{self.rows}" if self.rows else self.policy
 
     def arguments(self):
-        who = ["--local-workers", self.workers, "--wait-for-workers", self.workers, "--threads", self.threads]
-        what = ["--frames", self.frames, "--segment", self.segment, *self.options]
-        # A port of its own, so that runs do not meet.
-        how = ["--listen", "127.0.0.1:0", "--json", "--quiet"]
-        return ["render", self.scene, "-o", "none", *who, *what, *how]
+        workers = ["--local-workers", self.workers, "--wait-for-workers", self.workers, "--threads", self.threads]
+        frames = ["--frames", self.frames, "--segment", self.segment, *self.options]
+        # A free port, so that runs do not disturb each other.
+        reports = ["--listen", "127.0.0.1:0", "--json", "--quiet"]
+        return ["render", self.scene, "-o", "none", *workers, *frames, *reports]
 
     def picture(self):
-        """All runs with the same one must end with the same bytes: trees of a model have the same file name."""
+        """Key of the last picture. Runs with the same key must end with the same bytes: trees of a model share a file name."""
         return (self.scene.name, self.frames, self.options)
 
     def __str__(self):
@@ -50,7 +51,7 @@ class Run:
 
 
 class Master:
-    """The program. With `dry_run` it prints what it would be told, and makes up nothing: every result is empty."""
+    """The program rayfarm-master. With `dry_run` it prints the commands, and every result is empty."""
 
     def __init__(self, program, dry_run=False):
         self.program = program
@@ -108,12 +109,12 @@ class Master:
 
     def compile(self, model, output, quality):
         """Seconds that reading a model and building its tree took; None in a dry run."""
-        said = self.call("compile", model, "-o", output, "--quality", quality)
-        return float(re.search(r"read and built in ([\d.]+) s", said)[1]) if said else None
+        output_text = self.call("compile", model, "-o", output, "--quality", quality)
+        return float(re.search(r"read and built in ([\d.]+) s", output_text)[1]) if output_text else None
 
 
 def pick(options, names):
-    """Of options and their values in turn, those with such names."""
+    """Options with their values, of which only those in `names` are kept."""
     pairs = zip(options[::2], options[1::2])
     return [word for pair in pairs if pair[0] in names for word in pair]
 
@@ -124,13 +125,13 @@ def rate(seconds):
 
 
 def rates(seconds):
-    """Frames per second of each WINDOW frames in a row (fewer where there are not so many)."""
+    """Frames per second of each WINDOW frames in a row (of all frames where there are fewer)."""
     span = min(WINDOW, len(seconds) - 1)
     return [rate(seconds[start : start + span + 1]) for start in range(len(seconds) - span)]
 
 
 def numbers(report, skip, prefix=""):
-    """All single figures of a report, with dots in the names of those that lie deeper."""
+    """All single figures of a report, with dots in the names of nested ones."""
     found = {}
     for name, value in report.items():
         if isinstance(value, dict):
@@ -141,8 +142,7 @@ def numbers(report, skip, prefix=""):
 
 
 def measure(master, runs, repeats):
-    """A row for each run and repeat. Repeats are spread over the whole time, so that a pause of the machine does not
-    hit one run only."""
+    """A row for each run and repeat. All runs are repeated in turn, so that a pause of the machine affects several runs."""
     rows, total = [], len(runs) * repeats
     for repeat in range(repeats):
         for run in runs:

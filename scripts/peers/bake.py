@@ -1,10 +1,10 @@
-"""Instances become plain meshes: every model's triangles in the world's place, one OBJ a material."""
+"""Conversion of instances to plain meshes: all triangles in world space, one OBJ per material."""
 
 from scene_file import Model
 
 
 def bake(scene, stem):
-    """Writes STEM-MATERIAL.obj for each material in use, and returns the models that stand for all of the scene's."""
+    """Writes STEM-MATERIAL.obj for each material in use, and returns the models that replace all of the scene."""
     by_material = {}
     for model in scene.models:
         by_material.setdefault(model.material, []).append(model)

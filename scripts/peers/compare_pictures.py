@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Counts the pixels of two pictures (binary PPM) that differ; fails where they are too many.
+"""Counts the pixels of two pictures (binary PPM) that differ, and fails above a limit.
 
 Two tracers see different sides of an edge where rounding decides: single pixels differ, and they must be few.
 """
@@ -23,8 +23,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("one")
     parser.add_argument("other")
-    parser.add_argument("--steps", type=int, default=2, help="a pixel differs beyond so many of 255 steps (default 2)")
-    parser.add_argument("--percent", type=float, default=0.5, help="so many pixels may differ (default 0.5)")
+    parser.add_argument("--steps", type=int, default=2, help="largest difference of equal pixels, in steps of 255 (default 2)")
+    parser.add_argument("--percent", type=float, default=0.5, help="largest share of different pixels, in per cent (default 0.5)")
     arguments = parser.parse_args()
     one, other = read_ppm(arguments.one), read_ppm(arguments.other)
     if one[:2] != other[:2]:

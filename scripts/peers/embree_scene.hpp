@@ -1,5 +1,5 @@
-// The workload as Embree sees it. A mesh that stands in the world once, as its file has it, is a geometry of the top scene;
-// any other is a scene of its own, and instances of it stand in the top scene.
+// The workload for Embree. A mesh with one instance without a transform is a geometry of the top scene; every other mesh is a
+// scene with instances in the top scene.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -21,7 +21,7 @@ struct EmbreeOptions {
     std::string device;
 };
 
-// What a top-level geometry looks like. `normals` turns the normals of an instance's mesh.
+// Surface of a top-level geometry. `normals` transforms the normals of an instance's mesh.
 struct Surface {
     Material material;
     Vec3f normals[3];
@@ -83,7 +83,7 @@ class EmbreeScene {
     // Indexed by the geometry id in the top scene, which for an instance is the instance id.
     std::vector<Surface> surfaces;
     bool has_instances = false;
-    // Whether the normals of some instance have to be turned into the world.
+    // Whether the normals of an instance need a transform to the world.
     bool turned_normals = false;
     // The world bounding box of the models, without the scene's own triangles.
     Vec3d lower{1e300, 1e300, 1e300}, upper{-1e300, -1e300, -1e300};

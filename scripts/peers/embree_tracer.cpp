@@ -1,5 +1,5 @@
-// The peer: a careful small ray tracer on Embree that renders what `rayfarm-master bench` renders. scripts/bench_peers.sh
-// builds and drives it. It prints one line of JSON with the fields of rayfarm's own.
+// A small optimised ray tracer on Embree that renders the frames of `rayfarm-master bench`. scripts/bench_peers.sh builds and
+// runs it. It prints one line of JSON with the fields of `rayfarm-master bench --json`.
 
 #include <algorithm>
 #include <chrono>

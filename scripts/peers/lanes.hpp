@@ -1,4 +1,4 @@
-// Functions of one number that a compiler turns into functions of sixteen: no branches, no calls.
+// Functions of one number without branches and calls, which the compiler vectorises.
 #pragma once
 
 #include <cmath>

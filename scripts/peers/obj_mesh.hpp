@@ -1,4 +1,4 @@
-// Positions and triangles of an OBJ file. Polygons become fans; normals, texture coordinates and materials are passed over.
+// Positions and triangles of an OBJ file. Polygons become fans; normals, texture coordinates and materials are ignored.
 #pragma once
 
 #include <cstdint>
@@ -41,7 +41,7 @@ inline ObjMesh read_obj(const std::string& path) {
                 // Counted from one, or backwards from the last position.
                 const long from_zero = index < 0 ? long(mesh.positions.size()) + index : index - 1;
                 if (from_zero < 0 || from_zero >= long(mesh.positions.size()))
-                    throw std::runtime_error(path + ": a face names a position that is not there");
+                    throw std::runtime_error(path + ": a face names a position that does not exist");
                 face.push_back(uint32_t(from_zero));
                 for (p = next; p < end && *p != ' ';) ++p;
             }

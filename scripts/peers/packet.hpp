@@ -1,16 +1,16 @@
-// Sixteen rays from the eye: what they hit, what of it the light sees, and the colours that follow.
+// Sixteen rays from the eye: hits, shadows and colours.
 //
-// Phong in Hall's form with flat normals that face the viewer and one point light without attenuation:
+// Blinn-Phong shading with flat normals that face the viewer and one point light without attenuation:
 //   I = c_d I_a + S I_l ( c_d max(0, N.L) + c_s max(0, N.H)^p )
-// Shading is one loop over the lanes, which the compiler makes one pass of vector instructions.
+// Shading is one loop over the lanes, which the compiler vectorises.
 #pragma once
 
 #include "embree_scene.hpp"
 #include "lanes.hpp"
 
-// A shadow ray starts above its surface by this share of how far from the origin and from the eye its point lies: some
-// thirty times the rounding of single precision.
-constexpr float LIFT = 4e-6f;
+// Distance of a shadow ray from its surface / (distance of the point from the origin + from the eye): about thirty times the
+// rounding of single precision.
+constexpr float SHADOW_BIAS = 4e-6f;
 
 // Directions of a packet's rays, not of unit length.
 struct Directions {
@@ -33,7 +33,7 @@ class PacketTracer {
         if (!scene.has_instances) shadow_context_.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     }
 
-    // Adds the linear colours of sixteen rays to `out`; returns how many shadow rays they took.
+    // Adds the linear colours of sixteen rays to `out`; returns the number of shadow rays.
     int trace(const Directions& directions, Colors& out) {
         RTCRayHit16 rays;
         start(directions, rays);
@@ -72,14 +72,14 @@ class PacketTracer {
         }
     }
 
-    // Leaves in `instID` the surface of each lane; `first` is the surface with the lowest number.
+    // Stores the surface of each lane in `instID`; `first` is the surface with the lowest number.
     static Seen what_is_seen(RTCRayHit16& rays, unsigned& first) {
         unsigned* surface = rays.hit.instID[0];
         const unsigned* geometry = rays.hit.geomID;
         unsigned lowest = RTC_INVALID_GEOMETRY_ID, highest = 0;
         for (int i = 0; i < LANES; ++i) {
             surface[i] = surface[i] == RTC_INVALID_GEOMETRY_ID ? geometry[i] : surface[i];
-            // A ray that missed has the highest number there is.
+            // A ray that missed has the highest possible number.
             lowest = surface[i] < lowest ? surface[i] : lowest;
             const unsigned if_hit = surface[i] == RTC_INVALID_GEOMETRY_ID ? 0 : surface[i];
             highest = if_hit > highest ? if_hit : highest;
@@ -173,7 +173,7 @@ class PacketTracer {
             always.b[i] = hit ? ambient_.z * diffuse.z : background_.z;
 
             const float reach = std::fabs(px) + std::fabs(py) + std::fabs(pz) + t * d_squared * to_viewer;
-            const float lift = LIFT * reach;
+            const float lift = SHADOW_BIAS * reach;
             shadow.org_x[i] = px + nx * lift;
             shadow.org_y[i] = py + ny * lift;
             shadow.org_z[i] = pz + nz * lift;
@@ -188,7 +188,7 @@ class PacketTracer {
         }
         if (count != 0) rtcOccluded16(lit, scene_.top, &shadow_context_, &shadow);
         for (int i = 0; i < LANES; ++i) {
-            // An occluded ray comes back with a `tfar` of minus infinity.
+            // Embree sets `tfar` of an occluded ray to minus infinity.
             const float seen = (lit[i] != 0) & (shadow.tfar[i] >= 0.0f) ? 1.0f : 0.0f;
             out.r[i] += always.r[i] + seen * from_light.r[i];
             out.g[i] += always.g[i] + seen * from_light.g[i];

@@ -27,7 +27,7 @@ def main():
 
 
 def toml_of(scene):
-    """The scene in rayfarm's format; every key is written, so that no default is left to either side."""
+    """The scene in rayfarm's format; all keys are written, so that no default matters."""
 
     def table(head, values):
         keys = (f"{key} = {_toml(value)}" for key, value in values.items())

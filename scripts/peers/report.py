@@ -10,7 +10,7 @@ import json
 import sys
 from statistics import median
 
-# What is compared of a part: the JSON's value, its name and its unit.
+# Measures of a part: the value in the JSON, its name and its unit.
 MEASURES = {
     "frames": [("frame", "ms", lambda run: run["ms_per_frame"]["median"])],
     "rays": [
@@ -56,7 +56,7 @@ def rows(groups):
 
 
 def check_rays(groups):
-    """Both sides must have traced the same rays and met the same things."""
+    """Checks that both tracers traced the same rays and found the same hits."""
     wrong = []
     for (part, workload, _), rounds in groups.items():
         for runs in rounds.values():

@@ -1,4 +1,4 @@
-"""Reads a scene file as far as the comparison goes, and says what is beyond it.
+"""Reads the keys of a scene file that both tracers support, and refuses others.
 
 Both tracers render the same few features: one point light with shadows and without attenuation, flat normals, one
 material a model, models and triangles, a background of one colour, a pinhole camera.

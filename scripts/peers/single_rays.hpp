@@ -1,4 +1,4 @@
-// Random rays, one at a time: what a general ray tracer does with rays that have nothing in common.
+// Random rays, one at a time: the incoherent rays of a general ray tracer.
 #pragma once
 
 #include <algorithm>

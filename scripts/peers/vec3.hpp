@@ -1,4 +1,4 @@
-// Three numbers, and what a camera and a transform need of them.
+// Vectors of three numbers, with the operations of cameras and transforms.
 #pragma once
 
 #include <cmath>
@@ -28,7 +28,7 @@ inline Vec3<T> cross(Vec3<T> a, Vec3<T> b) {
 
 inline Vec3f to_float(Vec3d a) { return {float(a.x), float(a.y), float(a.z)}; }
 
-// Columns of a linear map, and where it puts the origin.
+// Columns of a linear map, and its translation.
 struct Affine {
     Vec3d x, y, z, origin;
 

@@ -1,63 +1,63 @@
 # shellcheck shell=sh
-# What scripts/workers.sh has sh read on a machine, after lines that set action, name, hash, machine, plain_size, packed_size
-# and the worker's options ("$@"). Says in one line what came of it. Exit status: 0 well; 9 the program, or the rest of it,
-# is to be copied first, and the line says how and from which byte on; 1 anything else.
-# shellcheck disable=SC2154 # they are set in front of this text
+# The part of scripts/workers.sh that sh runs on each machine. Lines in front of it set action, name, hash, machine, plain_size,
+# packed_size and the worker's options ("$@"). Prints one line with the result. Exit status: 0 success; 9 the program, or the
+# rest of it, must be copied first, and the line has the encoding and the first byte; 1 any failure.
+# shellcheck disable=SC2154 # set in front of this text
 
 folder=$HOME/.rayfarm
 program=$folder/rayfarm-worker
 pid_file=$folder/$name.pid
 log=$folder/$name.log
 
-give_up() { echo "$*"; exit 1; }
+refuse() { echo "$*"; exit 1; }
 
 hash_of() {
     if command -v sha256sum >/dev/null; then sha256sum <"$1"; else shasum -a 256 <"$1"; fi | cut -d ' ' -f 1
 }
 
-# alive ID: not where it has ended and only waits for somebody to ask how.
+# alive ID: whether a process runs; zombies do not.
 alive() {
     kill -0 "$1" 2>/dev/null || return 1
     case $(ps -p "$1" -o stat=) in "" | Z*) return 1 ;; esac
 }
 
-# Prints the worker's id if it runs. Ids are used again: what does not bear its name is another program.
+# Prints the id of the worker's process if it runs. Systems reuse ids, so the name of the program is compared as well.
 running() {
     { read -r pid <"$pid_file"; } 2>/dev/null || return 1
     alive "$pid" || return 1
     case $(ps -p "$pid" -o comm=) in *rayfarm-worker*) echo "$pid" ;; *) return 1 ;; esac
 }
 
-# Short where sleep knows fractions.
+# 0.2 s where sleep accepts fractions, else 1 s.
 pause() { sleep 0.2 2>/dev/null || sleep 1; }
 
-last_words() { tail -n 1 "$log" 2>/dev/null | cut -c 1-200; }
+last_line() { tail -n 1 "$log" 2>/dev/null | cut -c 1-200; }
 
-# Since the worker was started.
+# Whether the worker has connected since it was started.
 has_joined() { grep -q 'connected to the master' "$log" 2>/dev/null; }
 
 size_of() { if [ -f "$1" ]; then wc -c <"$1" | tr -d ' '; else echo 0; fi; }
 
-# What was left there by a copy that never became whole, and by other versions.
+# Removes files of incomplete copies and of other versions.
 tidy() {
-    for left in "$folder"/rayfarm-worker.*.part; do
-        case $left in "$folder/rayfarm-worker.$hash."*) ;; *) rm -f "$left" ;; esac
+    for old in "$folder"/rayfarm-worker.*.part; do
+        case $old in "$folder/rayfarm-worker.$hash."*) ;; *) rm -f "$old" ;; esac
     done
     rm -f "$folder/rayfarm-worker.$name.new"
     find "$folder" -name 'rayfarm-worker.*' \( -name '*.part' -o -name '*.new' \) -mtime +1 -exec rm -f {} + 2>/dev/null
     return 0
 }
 
-# A program for another kind of machine is not worth copying.
+# Fails where the program is for another architecture, before it is copied.
 check_kind() {
     [ -n "$machine" ] || return 0
     here=$(uname -m)
     case $here in amd64) here=x86_64 ;; arm64 | armv8*) here=aarch64 ;; armv*) here=arm ;; esac
     [ "$here" = "$machine" ] ||
-        give_up "this machine is of another kind ($(uname -s) $here) than the program (for $machine): build it there, and name it with --worker"
+        refuse "this machine is of another kind ($(uname -s) $here) than the program (for $machine): build it there, and name it with --worker"
 }
 
-# Puts the program in its place where its copy is whole, and asks for the rest of the copy where it is not.
+# Installs the program where its copy is complete, and requests the rest of the copy otherwise.
 install() {
     how=plain size=$plain_size
     if [ "$packed_size" -gt 0 ] && command -v gzip >/dev/null; then how=gzip size=$packed_size; fi
@@ -67,13 +67,13 @@ install() {
     if [ "$have" -ge "$size" ]; then
         case $how in gzip) unpack="gzip -dc" ;; *) unpack="cat" ;; esac
         problem=$($unpack <"$part" 2>&1 >"$new") || case $problem in
-            *space* | *quota* | *denied*) rm -f "$new"; give_up "cannot write $new: $problem" ;;
+            *space* | *quota* | *denied*) rm -f "$new"; refuse "cannot write $new: $problem" ;;
         esac
         if [ "$(hash_of "$new")" = "$hash" ]; then
-            problem=$({ chmod 755 "$new" && mv -f "$new" "$program" && rm -f "$part"; } 2>&1) || give_up "cannot put the program in place: $problem"
+            problem=$({ chmod 755 "$new" && mv -f "$new" "$program" && rm -f "$part"; } 2>&1) || refuse "cannot install the program: $problem"
             return
         fi
-        # Damaged: from the beginning again.
+        # Damaged: the copy starts again.
         rm -f "$new" "$part"
         have=0
     fi
@@ -83,53 +83,53 @@ install() {
 
 start() {
     umask 077
-    problem=$(mkdir -p "$folder" 2>&1) || give_up "cannot make $folder: $problem"
+    problem=$(mkdir -p "$folder" 2>&1) || refuse "cannot make $folder: $problem"
     check_kind
     tidy
     [ -x "$program" ] && [ "$(hash_of "$program")" = "$hash" ] || install
-    version=$("$program" --version 2>&1) || give_up "the program does not run here: $version"
+    version=$("$program" --version 2>&1) || refuse "the program does not run here: $version"
     options=$*
     if pid=$(running); then
         [ "$(sed -n 2p "$pid_file")" = "$hash $options" ] && { echo "runs already, process $pid"; return; }
-        give_up "another one runs, process $pid: stop it first"
+        refuse "another one runs, process $pid: stop it first"
     fi
     [ ! -f "$log" ] || mv -f "$log" "$log.old"
-    # A session of its own where that is at hand, so that no terminal's end is its end.
+    # In a session of its own where setsid exists, so that the worker survives its terminal.
     detach=$(command -v setsid) || detach=
     # shellcheck disable=SC2086 # nothing, or one word
     nohup $detach "$program" "$@" </dev/null >"$log" 2>&1 &
-    printf '%s\n%s\n' "$!" "$hash $options" >"$pid_file" || give_up "cannot write $pid_file"
-    await_news "$!"
+    printf '%s\n%s\n' "$!" "$hash $options" >"$pid_file" || refuse "cannot write $pid_file"
+    await_connection "$!"
 }
 
-# A worker that has no master yet is well as well: it goes on trying.
-await_news() {
-    looks=0
-    while [ "$looks" -lt 25 ] && ! has_joined; do
+# await_connection ID: waits up to 5 s for the connection. A worker without a master is no failure: it keeps trying.
+await_connection() {
+    checks=0
+    while [ "$checks" -lt 25 ] && ! has_joined; do
         pause
-        alive "$1" || has_joined || give_up "it ended at once: $(last_words)"
-        looks=$((looks + 1))
+        alive "$1" || has_joined || refuse "it ended at once: $(last_line)"
+        checks=$((checks + 1))
     done
-    if has_joined; then echo "process $1, has joined$(alive "$1" || echo ", and has left again: $(last_words)")"; else echo "process $1, not joined yet: $(last_words)"; fi
+    if has_joined; then echo "process $1, has joined$(alive "$1" || echo ", and has left again: $(last_line)")"; else echo "process $1, not joined yet: $(last_line)"; fi
 }
 
 status() {
-    pid=$(running) || give_up "does not run"
-    if has_joined; then echo "runs, process $pid: $(last_words)"; else echo "process $pid, not joined yet: $(last_words)"; fi
+    pid=$(running) || refuse "does not run"
+    if has_joined; then echo "runs, process $pid: $(last_line)"; else echo "process $pid, not joined yet: $(last_line)"; fi
 }
 
 stop() {
     rm -f "$folder"/rayfarm-worker.*."$name.part" "$folder/rayfarm-worker.$name.new"
     pid=$(running) || { rm -f "$pid_file"; echo "does not run"; return; }
     kill -TERM "$pid"
-    looks=0
-    while [ "$looks" -lt 50 ] && running >/dev/null; do
+    checks=0
+    while [ "$checks" -lt 50 ] && running >/dev/null; do
         pause
-        looks=$((looks + 1))
+        checks=$((checks + 1))
     done
     how=stopped
     if running >/dev/null; then
-        kill -KILL "$pid" || give_up "process $pid cannot be ended"
+        kill -KILL "$pid" || refuse "process $pid cannot be ended"
         how="killed: it did not end by itself"
     fi
     rm -f "$pid_file"

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Environment variables with which no test may be skipped for want of a program.
+/// Environment variables with which no test may be skipped because a program is missing.
 const REQUIRE_VARIABLES: [&str; 2] = ["RAYFARM_REQUIRE_ALL", "RAYFARM_REQUIRE_WINDOW"];
 
 /// Number of skips in this process.

@@ -19,7 +19,7 @@ use crate::verification::delivered::FrameSet;
 pub struct FarmControl {
     driver: Arc<Driver>,
     slots: Arc<LocalSlots>,
-    /// Goodbyes are sent on the farm's runtime, whatever thread calls.
+    /// Disconnect messages are sent on the farm's runtime, whatever thread calls.
     runtime: Handle,
 }
 

@@ -159,7 +159,7 @@ impl Farm {
 
     /// Disconnects all workers and waits until the local ones have exited; those that do not within three seconds are killed.
     pub async fn shut_down(self) {
-        // First of all, so that no supervisor restarts a worker that exits because of its goodbye.
+        // First of all, so that no supervisor restarts a worker that exits because of its disconnect message.
         self.stop_processes.cancel();
         self.driver.disconnect_all("the master ends").await;
         let stop = self.stop.disarm();

@@ -33,7 +33,7 @@ enum SessionError {
     Protocol(#[from] ProtocolError),
     #[error(transparent)]
     Answer(#[from] AnswerError),
-    #[error("it closed the connection without a goodbye")]
+    #[error("it closed the connection without a disconnect message")]
     Closed,
     #[error("it requests more than {MAX_ASSET_REQUESTS} assets at once")]
     TooManyRequests,
@@ -133,7 +133,7 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     match ended {
         Ok(reason) => {
             tracing::info!("{worker} ({name}, {address}) leaves: {reason}");
-            driver.leave(worker, "goodbye");
+            driver.leave(worker, "disconnected in order");
         }
         Err(error) => {
             // A session that the driver has ended is logged already.
@@ -145,7 +145,7 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     }
 }
 
-/// Handles a worker's messages. Returns the reason in its goodbye.
+/// Handles a worker's messages. Returns the reason in its disconnect message.
 ///
 /// # Errors
 /// The connection fails, or a message breaks a rule.

@@ -19,7 +19,7 @@ const LEASE_SHARE: f64 = 0.5;
 const MIN_SEGMENT_SECONDS: f64 = 0.0005;
 /// Largest share of the time that messages of all workers together take...
 const MESSAGES_SHARE: f64 = 0.5;
-/// ...where each takes the master this long, in seconds. Measured 5 to 10 us on the machine of the README.
+/// ...where each takes the master this long, in seconds. Measured 5 to 10 us on the machine of docs/benchmarks.md.
 const MESSAGE_SECONDS: f64 = 10e-6;
 /// Longest predicted time of a segment, in seconds: a longer one loses too much when its worker is lost.
 const MAX_SEGMENT_SECONDS: f64 = 0.5;

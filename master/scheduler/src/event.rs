@@ -14,7 +14,7 @@ impl fmt::Display for WorkerId {
     }
 }
 
-/// Machine that a worker runs on, as far as the shell can tell. Where a worker of another host is ready, workers of one
+/// Machine that a worker runs on, as far as the shell can determine. Where a worker of another host is ready, workers of one
 /// host do not verify each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct HostId(pub u128);

@@ -28,7 +28,7 @@ pub enum WorkerState {
     Paused,
     /// It finishes its leases and is then disconnected.
     Draining,
-    /// It could not render a frame or a lease was overdue, and it backs off for a while.
+    /// It could not render a frame or a lease was overdue, and it backs off.
     Resting,
     /// A ping is unanswered: it may be dead.
     Silent,

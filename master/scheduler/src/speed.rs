@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Factor by which earlier observations decay sooner where the new one is faster. A worker that was slow for a while gets
+/// Factor by which earlier observations decay sooner where the new one is faster. A worker that was slow temporarily gets
 /// few rows, so its recovery would otherwise be measured late.
 const FASTER_DECAY: f64 = 3.0;
 

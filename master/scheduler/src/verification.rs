@@ -7,7 +7,7 @@
 //! time per worker. A verification that no worker has finished two complete frames later is dropped.
 //!
 //! The shell compares the two renderings: it keeps a digest of the first one. Where they differ, the arbiter renders the
-//! rows on the master, and the master bans every worker whose result does not match. Asking a majority of workers would
+//! rows on the master, and the master bans every worker whose result does not match. A vote among workers would
 //! be cheaper and could be wrong: two machines with the same fault agree. Verifications that are drawn for the master,
 //! or for which no other worker is ready, are arbitrated one at a time, by a random priority.
 
@@ -26,7 +26,7 @@ use super::{Action, Cost, FrameId, HostId, Lease, Scheduler, WorkerId};
 pub(super) const MAX_PENDING: usize = 1024;
 /// Pending verifications that wait for the master at most; those with the lowest priority numbers stay.
 pub(super) const MAX_FOR_MASTER: usize = 8;
-/// Banned workers that are remembered: pending verifications can accuse no more than these.
+/// Banned workers that are remembered: pending verifications can accuse at most these.
 const MAX_BANNED: usize = 2 * MAX_PENDING;
 
 /// Counts of verified segments.

@@ -1,4 +1,4 @@
-//! Numbers as text for people.
+//! Numbers as text for display.
 
 /// A count with its noun: `1 worker`, `2 workers`, `99,938 triangles`.
 pub(crate) fn counted(count: u64, what: &str) -> String {

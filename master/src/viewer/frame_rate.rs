@@ -31,7 +31,7 @@ impl FrameRate {
         }
     }
 
-    /// Starts the rate anew with the next frame, because nothing was requested for a while.
+    /// Starts the rate anew with the next frame, because nothing was requested since the last one.
     pub(crate) fn rested(&mut self) {
         self.rested = true;
     }

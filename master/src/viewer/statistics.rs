@@ -28,7 +28,7 @@ pub(crate) struct Statistics {
     pub(crate) latency: Option<Duration>,
     /// Time without a completed frame although one was requested.
     pub(crate) since_last_frame: Duration,
-    /// Whether nothing has been requested for a while: the picture is complete and nothing moves.
+    /// Whether no frame is requested: the picture is complete and nothing moves.
     pub(crate) resting: bool,
     /// Lines of the quality controller about the picture at rest; empty while the picture moves or without a controller.
     pub(crate) quality: Vec<String>,

@@ -24,7 +24,7 @@ fn request(offset: u64) -> PeerRequest {
 /// Receives all parts of a reply from bytes that arrive in pieces, and the error after the last part.
 async fn receive_all(bytes: Vec<u8>, piece_bytes: usize) -> (Vec<PeerReply>, ProtocolError) {
     let (mut ours, mut theirs) = duplex(61);
-    let feed = tokio::spawn(async move {
+    let writer = tokio::spawn(async move {
         for piece in bytes.chunks(piece_bytes.max(1)) {
             if theirs.write_all(piece).await.is_err() {
                 return;
@@ -37,7 +37,7 @@ async fn receive_all(bytes: Vec<u8>, piece_bytes: usize) -> (Vec<PeerReply>, Pro
             Ok(reply) => received.push(reply),
             Err(error) => {
                 drop(ours);
-                feed.await.unwrap();
+                writer.await.unwrap();
                 return (received, error);
             }
         }

@@ -135,7 +135,7 @@ fn block_on<T>(work: impl Future<Output = T>) -> T {
 async fn receive<In: Message, Out: Message>(input: Vec<u8>, piece: usize) -> Vec<Result<In, String>> {
     let (ours, mut theirs) = duplex(97);
     let (out, mut received, _) = spawn::<_, Out, In>(ours);
-    let feed = tokio::spawn(async move {
+    let writer = tokio::spawn(async move {
         for part in input.chunks(piece) {
             if theirs.write_all(part).await.is_err() {
                 return;
@@ -148,7 +148,7 @@ async fn receive<In: Message, Out: Message>(input: Vec<u8>, piece: usize) -> Vec
         received_all.push(message.map_err(|error| error.to_string()));
     }
     drop((out, received));
-    feed.await.unwrap();
+    writer.await.unwrap();
     received_all
 }
 

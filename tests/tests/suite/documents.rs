@@ -1,6 +1,7 @@
-//! Documents compared with the programs: commands, options and scene keys.
+//! Documents compared with the programs and the tree of files: commands, options, scene keys, and paths.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::process::Command;
 
 use rayfarm_tests::{Running, Scenes, master, project_root, worker};
@@ -8,6 +9,11 @@ use rayfarm_tests::{Running, Scenes, master, project_root, worker};
 /// Documents that describe the options of both programs.
 const OPTION_DOCUMENTS: [&str; 2] = ["docs/guide.md", "docs/quality.md"];
 const SCENE_DOCUMENT: &str = "docs/scene-format.md";
+/// Documents that name files and folders of the project, seen from its root.
+const MAPS: [&str; 2] = ["ARCHITECTURE.md", "CONTRIBUTING.md"];
+
+/// Paths in these documents that are no files of the project: a pattern for the names of records.
+const NOT_A_PATH: &str = "PROCESSOR/DATE-NAME.csv";
 
 /// Options in these documents that `--help` does not list: hidden aliases, and options of cargo.
 const NOT_IN_HELP: [&str; 2] = ["trace", "release"];
@@ -79,6 +85,50 @@ fn defined(help: &str) -> BTreeSet<String> {
 /// What is in code spans and code blocks of a document.
 fn code(document: &str) -> String {
     document.split('`').skip(1).step_by(2).collect::<Vec<_>>().join("\n")
+}
+
+/// Code spans of a document that consist of letters, digits and what else paths consist of. Fenced blocks do not count.
+fn spans(document: &str) -> impl Iterator<Item = &str> {
+    let outside_fences = document.split("```").step_by(2);
+    let spans = outside_fences.flat_map(|text| text.split('`').skip(1).step_by(2));
+    spans.filter(|span| span.chars().all(|c| c.is_ascii_alphanumeric() || "/._-".contains(c)))
+}
+
+/// Adds the names of all files below a folder. Hidden folders and build products do not count.
+fn add_file_names(folder: &Path, names: &mut BTreeSet<String>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        if !entry.file_type().unwrap().is_dir() {
+            names.insert(name);
+        } else if !name.starts_with('.') && name != "target" {
+            add_file_names(&entry.path(), names);
+        }
+    }
+}
+
+#[test]
+fn code_spans_with_paths_are_found() {
+    let document = "`a/b.rs`, `--x y`\n```sh\n`c/d`\n```\n`e.rs`";
+    assert_eq!(spans(document).collect::<Vec<_>>(), ["a/b.rs", "e.rs"]);
+}
+
+#[test]
+fn files_that_the_maps_name_exist() {
+    let root = project_root();
+    let mut names = BTreeSet::new();
+    add_file_names(root, &mut names);
+    for map in MAPS {
+        let document = document(map);
+        let missing: Vec<&str> = spans(&document)
+            .filter(|span| *span != NOT_A_PATH)
+            .filter(|span| match span.contains('/') {
+                true => !root.join(span).exists(),
+                false => span.ends_with(".rs") && !names.contains(*span),
+            })
+            .collect();
+        assert!(missing.is_empty(), "{map} names files that do not exist: {missing:?}");
+    }
 }
 
 #[test]

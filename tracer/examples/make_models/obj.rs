@@ -31,7 +31,7 @@ pub(crate) enum Digits {
     Finest = 5,
 }
 
-/// The OBJ text and the number of its triangles. `library` is the MTL file beside it.
+/// The OBJ text and the number of its triangles. `library` is the MTL file in the same folder.
 pub(crate) fn obj_text(model: &Model, library: &str, shading: Shading, digits: Digits) -> (String, usize) {
     let normal_digits = if digits == Digits::Finest { 3 } else { 2 };
     let mut writer = ObjWriter { shading, digits: digits as usize, normal_digits, ..ObjWriter::default() };

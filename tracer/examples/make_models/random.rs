@@ -1,4 +1,4 @@
-//! Variation without a generator's state: a number depends on what it is for, not on what was asked before.
+//! Variation without a generator's state: a number depends on its key, not on the numbers drawn before.
 
 /// Integer hash (the finaliser of splitmix64 over the two inputs).
 fn hash(kind: u64, index: u64) -> u64 {

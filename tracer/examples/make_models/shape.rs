@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::angle;
 
-/// A Phong material, linear colours.
+/// A Blinn-Phong material, linear colours.
 #[derive(Debug)]
 pub(crate) struct Material {
     /// Name in the MTL file.
@@ -15,7 +15,7 @@ pub(crate) struct Material {
     pub(crate) diffuse: [f64; 3],
     /// c_s.
     pub(crate) specular: [f64; 3],
-    /// Phong exponent.
+    /// Blinn-Phong exponent.
     pub(crate) exponent: f64,
 }
 

@@ -1,6 +1,6 @@
 //! The oracle: the shading equations in `f64`, every ray against every primitive, without trees, SIMD or shortcuts.
 //!
-//! Of a frame's quality it applies what is left out (shadows, highlights) and the filter; it is exact where a setting trades
+//! Of a frame's quality it applies omitted terms (shadows, highlights) and the filter; it is exact where a setting trades
 //! precision for speed. It shares with the fast path only the scene, the cleaned triangles and the sRGB encoding; all else is
 //! computed from the equations of the model of light, to be compared with them.
 //!

@@ -85,7 +85,7 @@ impl Oracle {
     /// Whether a primitive is opaque at a hit: not cut out by alpha.
     fn is_opaque(&self, primitive: &Primitive, hit: &Crossing) -> bool {
         let cutout = self.scene.materials[primitive.material as usize].cutout;
-        // Half of 255 lies between two bytes.
+        // Half of 255 is between two bytes.
         cutout.is_none_or(|index| self.texel(self.scene.textures[index as usize], hit.uv).w >= 0.5)
     }
 }

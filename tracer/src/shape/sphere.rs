@@ -84,7 +84,7 @@ mod tests {
                 let distance = (direction * t - center).length();
                 prop_assert!((distance - radius).abs() < 1e-10 * (1.0 + center.length()), "{distance} {radius}");
             } else {
-                // Missed: the line passes outside, or the sphere lies behind.
+                // Missed: the line passes outside, or the sphere is behind.
                 let along = center.dot(direction) / direction.length_squared();
                 let closest = (direction * along.max(0.0) - center).length();
                 prop_assert!(closest >= radius * (1.0 - 1e-12));

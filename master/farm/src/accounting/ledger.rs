@@ -129,7 +129,7 @@ impl Ledger {
         Some(Stretch { from, parts: claim.split(budget) })
     }
 
-    /// Revokes leases: the time spent on them was in vain. Time must be attributed up to now.
+    /// Revokes leases: the time spent on them produced no pixel of a picture. Time must be attributed up to now.
     pub(super) fn revoke(&mut self, which: impl Fn(&Lease) -> bool) -> Option<Stretch> {
         self.held.retain(|lease, _| !which(lease));
         if self.open.is_zero() || !self.held.is_empty() {

@@ -12,7 +12,7 @@
 //! | decode | were idle while the master decoded their pixels |
 //! | send | were idle while leases or pixels were on the wire |
 //! | wait | were idle although the worker held leases (its frame was being prepared, or some threads ran out of rows earlier than others), or because no frame was requested |
-//! | idle tail | had no rows while other workers finished a frame, or rendered rows in vain: another worker was faster, or the frame was dropped |
+//! | idle tail | had no rows while other workers finished a frame, or rendered rows that are in no picture: another worker was faster, or the frame was dropped |
 //! | scene | waited for the scene: from the worker's request for an asset until it replies to a lease, minus what it traced |
 //!
 //! Overlapped time costs nothing: a thread that traces while pixels of its worker are on the wire counts as tracing. So

@@ -20,7 +20,7 @@ pub struct Parts {
     pub send: u64,
     /// Idle, while the master decoded pixels.
     pub decode: u64,
-    /// Idle or rendering in vain, while other workers finished the frame.
+    /// Idle, or rendering rows that are in no picture, while other workers finished the frame.
     pub idle_tail: u64,
     /// Idle, while the scene was in transfer.
     pub scene: u64,

@@ -110,9 +110,9 @@ mod tests {
 
     #[test]
     fn ray_counts_are_limited_to_what_the_rows_can_take() {
-        let honest = Cost { trace_ns: 9, primary: 100, shadow: 300, secondary: 50, ..Cost::default() };
-        assert_eq!(plausible(honest, &view(), 1), honest);
-        let absurd = Cost { primary: u64::MAX, shadow: u64::MAX, secondary: u64::MAX, ..honest };
+        let genuine = Cost { trace_ns: 9, primary: 100, shadow: 300, secondary: 50, ..Cost::default() };
+        assert_eq!(plausible(genuine, &view(), 1), genuine);
+        let absurd = Cost { primary: u64::MAX, shadow: u64::MAX, secondary: u64::MAX, ..genuine };
         let cut = plausible(absurd, &view(), 8);
         let samples = u64::from(view().width) * 8 * u64::from(view().samples);
         assert!(cut.primary >= samples && cut.primary < 100 * samples, "{cut:?}");

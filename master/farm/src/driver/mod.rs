@@ -55,7 +55,7 @@ pub(crate) struct Driver {
     finished: Notify,
     /// Notified when no segment is left to verify.
     verified: Notify,
-    /// Disputes for the arbiter; no more than there are open segments.
+    /// Disputes for the arbiter; at most one for each open segment.
     arbiter_queue: mpsc::UnboundedSender<Dispute>,
     /// The key from which the workers' own keys are derived; without it, no assets are passed from worker to worker.
     secret: Option<[u8; 32]>,

@@ -160,21 +160,21 @@ impl Driver {
         }
     }
 
-    /// Disconnects all workers and admits no more. Returns when each goodbye is sent or has timed out.
+    /// Disconnects all workers and admits no more. Returns when each disconnect message is sent or has timed out.
     pub(crate) async fn disconnect_all(&self, reason: &str) {
-        let goodbyes: Vec<_> = {
+        let flushes: Vec<_> = {
             let mut inner = self.lock();
             inner.is_ending = true;
-            let goodbyes = inner.sessions.ids().into_iter().map(|worker| {
-                let goodbye = inner.sessions.disconnect(worker, reason, Reconnect::NextMaster);
+            let flushes = inner.sessions.ids().into_iter().map(|worker| {
+                let flush = inner.sessions.disconnect(worker, reason, Reconnect::NextMaster);
                 self.drive(&mut inner, Event::WorkerLeft { worker });
-                goodbye
+                flush
             });
-            goodbyes.flatten().collect()
+            flushes.flatten().collect()
         };
-        for goodbye in goodbyes {
+        for flush in flushes {
             // The task has a time limit and does not panic.
-            let _ = goodbye.await;
+            let _ = flush.await;
         }
     }
 }

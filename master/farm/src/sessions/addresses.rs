@@ -19,7 +19,7 @@ pub struct Reachable {
 }
 
 impl Reachable {
-    /// The addresses of a master that listens at `listening`. An unspecified address stands for all addresses of this
+    /// The addresses of a master that listens at `listening`. An unspecified address means all addresses of this
     /// machine, which are read from the operating system.
     pub fn of(listening: SocketAddr) -> Self {
         let interfaces = address::interfaces().unwrap_or_else(|error| {

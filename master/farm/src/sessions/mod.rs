@@ -102,8 +102,8 @@ impl Sessions {
         }
     }
 
-    /// Removes a session and sends its goodbye in the background, with the reason and whether to reconnect. The task ends
-    /// when the goodbye is sent or its time is over.
+    /// Removes a session and sends its disconnect message in the background, with the reason and whether to reconnect. The task ends
+    /// when the message is sent or has timed out.
     pub(crate) fn disconnect(
         &mut self,
         worker: WorkerId,
@@ -114,7 +114,7 @@ impl Sessions {
         self.ended.add(&traffic);
         self.routing.remove_worker(worker);
         self.bans.add_disconnected(worker, identity);
-        Some(session::say_goodbye(sender, reason, reconnect))
+        Some(session::send_disconnect(sender, reason, reconnect))
     }
 
     /// Bans a worker that is connected or has disconnected lately. A current session is not ended by this.

@@ -13,8 +13,8 @@ use super::identity::Identity;
 use super::lease_book::LeaseBook;
 use crate::assets::transfers::Transfers;
 
-/// Time limit for sending the messages that are queued when a session ends, the goodbye included.
-const GOODBYE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Time limit for sending the messages that are queued when a session ends, the disconnect message included.
+const DISCONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A connected worker.
 pub(crate) struct Session {
@@ -56,17 +56,21 @@ impl Session {
     }
 }
 
-/// Sends a goodbye in the background and closes the connection. The task ends within [`GOODBYE_TIMEOUT`].
-pub(super) fn say_goodbye(sender: Sender<ToWorker>, reason: &str, reconnect: Reconnect) -> JoinHandle<()> {
-    let goodbye = ToWorker::Disconnect { reason: reason.to_owned(), reconnect };
+/// Sends a disconnect message in the background and closes the connection. The task ends within [`DISCONNECT_TIMEOUT`].
+pub(super) fn send_disconnect(
+    sender: Sender<ToWorker>,
+    reason: &str,
+    reconnect: Reconnect,
+) -> JoinHandle<()> {
+    let message = ToWorker::Disconnect { reason: reason.to_owned(), reconnect };
     tokio::spawn(async move {
         let flush = async {
             // Sending fails where the session has ended already; then there is nothing to flush.
-            if sender.send(goodbye).await.is_ok() {
+            if sender.send(message).await.is_ok() {
                 sender.closed().await;
             }
         };
-        let _ = tokio::time::timeout(GOODBYE_TIMEOUT, flush).await;
+        let _ = tokio::time::timeout(DISCONNECT_TIMEOUT, flush).await;
         sender.abort();
     })
 }

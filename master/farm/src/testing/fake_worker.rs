@@ -23,7 +23,7 @@ const PIXEL_TIME: Duration = Duration::from_nanos(2_440);
 pub enum Script {
     /// Renders every lease correctly.
     Correct,
-    /// Closes the connection without a goodbye at its n-th lease, from 0.
+    /// Closes the connection without a disconnect message at its n-th lease, from 0.
     DisconnectAt(usize),
     /// Delays the reply to its first lease until the channel fires.
     Late(oneshot::Receiver<()>),
@@ -46,8 +46,8 @@ pub enum Script {
 /// The end of a fake worker's session.
 #[derive(Debug, PartialEq)]
 pub struct Outcome {
-    /// The reason in the master's goodbye, if there was one.
-    pub goodbye: Option<String>,
+    /// The reason in the master's disconnect message; `None` if there was none.
+    pub disconnect_reason: Option<String>,
     /// Number of leases granted.
     pub leases: usize,
     /// Whether the master drained it.
@@ -93,7 +93,7 @@ async fn run(stream: TcpStream, mut script: Script) -> Outcome {
         return send_garbage(stream).await;
     }
     let (sender, mut receiver, _) = session::spawn::<_, ToMaster, ToWorker>(stream);
-    let mut outcome = Outcome { goodbye: None, leases: 0, drained: false };
+    let mut outcome = Outcome { disconnect_reason: None, leases: 0, drained: false };
     let mut views: Vec<(FrameId, FrameView)> = Vec::new();
     while let Some(Ok(message)) = receiver.recv().await {
         match message {
@@ -110,7 +110,7 @@ async fn run(stream: TcpStream, mut script: Script) -> Outcome {
                 answer(&sender, &mut script, lease, &view).await;
             }
             ToWorker::Ping { nonce } => sender.send(ToMaster::Pong { nonce }).await.unwrap(),
-            ToWorker::Disconnect { reason, .. } => outcome.goodbye = Some(reason),
+            ToWorker::Disconnect { reason, .. } => outcome.disconnect_reason = Some(reason),
             ToWorker::Drain => outcome.drained = true,
             ToWorker::Cancel { .. } => {}
             ToWorker::AssetBegin { .. }
@@ -184,5 +184,5 @@ async fn send_garbage(stream: TcpStream) -> Outcome {
     let mut heard = Vec::new();
     // The connection ends with EOF or a reset, depending on the operating system.
     let _ = read.read_to_end(&mut heard).await;
-    Outcome { goodbye: None, leases: 0, drained: false }
+    Outcome { disconnect_reason: None, leases: 0, drained: false }
 }

@@ -32,7 +32,7 @@ async fn a_drained_worker_leaves_and_may_reconnect() {
     farm.control().drain(farm.status().workers[0].id).unwrap();
     let outcome = in_time(leaving).await.unwrap();
     assert!(outcome.drained, "the worker got no drain message");
-    assert!(outcome.goodbye.unwrap().contains("drains"));
+    assert!(outcome.disconnect_reason.unwrap().contains("drains"));
     fake_worker::start(farm.address(), Script::Correct).await;
     until_workers(&farm, 1).await;
     render(&mut farm, turned(1)).await;
@@ -44,7 +44,7 @@ async fn a_banned_worker_is_refused_until_it_is_allowed() {
     let banned = fake_worker::start(farm.address(), Script::Correct).await;
     until_workers(&farm, 1).await;
     farm.control().ban(farm.status().workers[0].id, "it is needed elsewhere").unwrap();
-    assert_eq!(in_time(banned).await.unwrap().goodbye.as_deref(), Some("it is needed elsewhere"));
+    assert_eq!(in_time(banned).await.unwrap().disconnect_reason.as_deref(), Some("it is needed elsewhere"));
     let names: Vec<_> = farm.status().banned.into_iter().map(|banned| banned.name).collect();
     assert_eq!(names, ["fake"]);
 

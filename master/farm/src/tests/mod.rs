@@ -129,7 +129,7 @@ async fn a_late_reply_is_ignored() {
         assert_eq!(frame.workers, 2, "a late reply does not end its session");
     }
     farm.shut_down().await;
-    assert_eq!(in_time(worker).await.unwrap().goodbye.as_deref(), Some("the master ends"));
+    assert_eq!(in_time(worker).await.unwrap().disconnect_reason.as_deref(), Some("the master ends"));
 }
 
 #[tokio::test]
@@ -139,8 +139,8 @@ async fn workers_whose_replies_do_not_fit_are_disconnected_with_the_reason() {
         let worker = fake_worker::start(farm.address(), script).await;
         until_workers(&farm, 1).await;
         farm.request(view());
-        let goodbye = in_time(worker).await.unwrap().goodbye.unwrap();
-        assert!(goodbye.contains(reason), "{goodbye}");
+        let received = in_time(worker).await.unwrap().disconnect_reason.unwrap();
+        assert!(received.contains(reason), "{received}");
         until_workers(&farm, 0).await;
         fake_worker::start(farm.address(), Script::Correct).await;
         assert!(is_picture(&view(), &finished(&mut farm).await.pixels));

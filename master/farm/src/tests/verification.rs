@@ -71,8 +71,8 @@ async fn a_worker_that_sends_wrong_pixels_is_banned() {
             }
             until(&farm, |status| status.workers.len() == correct + 1).await;
             render_past_the_ban(&mut farm, correct).await;
-            let goodbye = in_time(wrong_worker).await.unwrap().goodbye.unwrap();
-            assert!(goodbye.contains("wrong pixels"), "{goodbye}");
+            let reason = in_time(wrong_worker).await.unwrap().disconnect_reason.unwrap();
+            assert!(reason.contains("wrong pixels"), "{reason}");
             let banned = farm.status().banned;
             assert_eq!(banned.iter().map(|banned| banned.name.as_str()).collect::<Vec<_>>(), ["wrong"]);
             let mut again = TcpStream::connect(farm.address()).await.unwrap();
@@ -111,8 +111,8 @@ async fn a_lone_worker_is_verified_by_the_master() {
     let wrong_worker = fake_worker::start(farm.address(), Script::WrongPixels).await;
     until(&farm, |status| status.workers.len() == 1).await;
     farm.request(view());
-    let goodbye = in_time(wrong_worker).await.unwrap().goodbye.unwrap();
-    assert!(goodbye.contains("wrong pixels"), "{goodbye}");
+    let reason = in_time(wrong_worker).await.unwrap().disconnect_reason.unwrap();
+    assert!(reason.contains("wrong pixels"), "{reason}");
     assert_eq!(counts(&farm).mismatches, 1);
     farm.shut_down().await;
 }

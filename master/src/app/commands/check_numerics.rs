@@ -118,8 +118,8 @@ fn report(subject: &Subject, outcomes: &[Outcome]) -> Report {
 
 /// A line for each case, under the scene's name.
 fn table(report: &Report) -> String {
-    let verdict = if report.holds { "holds" } else { "DOES NOT HOLD" };
-    let mut text = format!("{}, {}: {verdict}\n", report.scene, report.simd_level);
+    let outcome = if report.holds { "holds" } else { "DOES NOT HOLD" };
+    let mut text = format!("{}, {}: {outcome}\n", report.scene, report.simd_level);
     let line = |check: &str, case: &str, tested: &str, edges: &str, wrong: &str| {
         format!("  {check:<7} {case:<34} {tested:>18} {edges:>12} {wrong:>10}\n")
     };

@@ -33,7 +33,7 @@ async fn signal() {
     interrupt().await;
 }
 
-/// Waits for Ctrl-C; for ever where there is no handler, because the system's default handling then ends the process.
+/// Waits for Ctrl-C. Never returns where there is no handler, because the system's default handling then ends the process.
 async fn interrupt() {
     if tokio::signal::ctrl_c().await.is_err() {
         std::future::pending::<()>().await;

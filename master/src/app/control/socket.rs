@@ -209,7 +209,7 @@ pub(super) fn listen_unix(path: &Path, _: Console, _: CancellationToken) -> Resu
     )))
 }
 
-/// Waits after a failed accept, usually for want of file descriptors, so that the loop does not spin.
+/// Waits after a failed accept, usually because no file descriptor is free, so that the loop does not spin.
 async fn pause_after(error: &std::io::Error) {
     tracing::warn!("a connection for commands was not accepted: {error}");
     tokio::time::sleep(std::time::Duration::from_millis(100)).await;

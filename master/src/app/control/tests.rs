@@ -136,8 +136,8 @@ async fn workers_are_listed_paused_resumed_kicked_and_allowed() {
     tokio::time::timeout(PATIENCE, farm.finished()).await.unwrap().unwrap();
 
     assert_eq!(ask(&console, &format!("kick {id}"))["ok"], true);
-    let goodbye = worker.await.unwrap().goodbye.unwrap();
-    assert!(goodbye.contains("kicked"), "{goodbye}");
+    let reason = worker.await.unwrap().disconnect_reason.unwrap();
+    assert!(reason.contains("kicked"), "{reason}");
     assert_eq!(ask(&console, "status")["kicked"], serde_json::json!(["fake"]));
     assert_eq!(ask(&console, "allow fake")["allowed"], 1);
     assert!(ask(&console, "allow fake")["error"].as_str().unwrap().contains("fake"));

@@ -1,4 +1,4 @@
-//! Stand-in on systems without X.
+//! Replacement on systems without X: every query returns nothing.
 
 use minifb::Window;
 

@@ -18,7 +18,7 @@ const LIVENESS_BOUND: u64 = 60 * SECOND;
 /// A fault schedule; all of it follows from its seed.
 #[derive(Clone, Copy, Debug)]
 pub struct Schedule {
-    /// The seed.
+    /// Seed of all random choices.
     pub seed: u64,
 }
 
@@ -159,12 +159,12 @@ impl World {
         }
     }
 
-    /// Renders frames with healthy workers, then with many newcomers that never answer. Returns the worst frame
+    /// Renders frames with healthy workers, then with many new workers that never answer. Returns the worst frame
     /// time in milliseconds before and after they join; `None` if an invariant is violated.
     #[cfg(test)]
-    pub(crate) fn worst_with_newcomers(
+    pub(crate) fn worst_with_silent_joins(
         mut self,
-        newcomers: u32,
+        joining: u32,
         condition: Condition,
         at: u64,
     ) -> Option<[f64; 2]> {
@@ -174,7 +174,7 @@ impl World {
         let mut worst = [0.0; 2];
         for (phase, worst) in worst.iter_mut().enumerate() {
             self.counters.restart(self.clock.now);
-            for _ in 0..if phase == 1 { newcomers } else { 0 } {
+            for _ in 0..if phase == 1 { joining } else { 0 } {
                 let id = self.join(1.0);
                 self.machines.get_mut(&id)?.condition = condition;
             }

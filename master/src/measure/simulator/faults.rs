@@ -93,7 +93,7 @@ impl World {
         }
     }
 
-    /// Cuts a part of the network off for a while.
+    /// Cuts workers off the network for a random time.
     fn partition(&mut self, ids: &[WorkerId]) {
         let lasts = self.rng.below(MAX_FAULT_DURATION);
         for &id in ids {

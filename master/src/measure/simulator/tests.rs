@@ -68,16 +68,16 @@ fn a_failing_worker_delays_a_frame_by_one_frame_at_most() {
 }
 
 #[test]
-fn newcomers_that_never_answer_delay_no_frame() {
+fn workers_that_join_and_never_answer_delay_no_frame() {
     for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Smart(16)] {
-        for (workers, newcomers) in [(1, 3), (1, 6), (3, 20)] {
+        for (workers, joining) in [(1, 3), (1, 6), (3, 20)] {
             for condition in [Condition::Stopped, Condition::Stuck] {
                 let setup = Setup { workers, policy, ..Setup::default() };
                 let [usual, worst] =
-                    World::new(setup).worst_with_newcomers(newcomers, condition, SECOND * 4).unwrap();
+                    World::new(setup).worst_with_silent_joins(joining, condition, SECOND * 4).unwrap();
                 assert!(
                     worst < 2.2 * usual,
-                    "{policy}, {workers} and {newcomers} {condition:?}: {worst} ms after {usual} ms"
+                    "{policy}, {workers} and {joining} {condition:?}: {worst} ms after {usual} ms"
                 );
             }
         }

@@ -222,7 +222,7 @@ fn apply(
     ControlFlow::Continue(())
 }
 
-/// Waits until a time; for ever where there is none.
+/// Waits until a time. Never returns where there is none.
 async fn until(at: Option<Instant>) {
     match at {
         Some(at) => tokio::time::sleep_until(at.into()).await,

@@ -85,7 +85,7 @@ impl Balance {
 }
 
 impl Limit {
-    /// Name of the bottleneck, for people.
+    /// Name of the bottleneck, for display.
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::Threads => "render threads",
@@ -93,7 +93,7 @@ impl Limit {
         }
     }
 
-    /// Advice on the bottleneck, for people.
+    /// Advice on the bottleneck, for display.
     pub(super) fn remedy(self) -> &'static str {
         match self {
             Self::Threads => "more workers or a smaller window would help",

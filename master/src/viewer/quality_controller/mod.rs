@@ -135,8 +135,8 @@ impl QualityController {
         self.ladder.rungs().get(mode.rung()).filter(|_| is_of_this(mode))
     }
 
-    /// Records a finished frame, requested at `requested_at`, that took `elapsed` from its beginning. Frames overlap, so no more
-    /// than the time since the previous frame counts.
+    /// Records a finished frame, requested at `requested_at`, that took `elapsed` from its beginning. Frames overlap, so at most
+    /// the time since the previous frame counts.
     pub(crate) fn finished(
         &mut self,
         now: Duration,

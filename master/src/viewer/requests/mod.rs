@@ -208,7 +208,7 @@ impl Requests {
         })
     }
 
-    /// Waits until the next frame of a sequence has a slot; for ever where none is missing. Cancel safe.
+    /// Waits until the next frame of a sequence has a slot. Never returns where none is missing. Cancel safe.
     pub(super) async fn slot_is_free(&self) {
         match &self.plan {
             Some(plan) if self.open.len() < OPEN_REQUESTS && self.next < plan.len() => {

@@ -15,7 +15,7 @@ use glam::DVec3;
 static WOOD: Material = Material::glossy("wood", [0.21, 0.09, 0.04], 0.18, 40.0);
 static BRASS: Material = Material::metal("brass", [0.38, 0.25, 0.08], [0.60, 0.45, 0.20], 60.0);
 
-/// The ball's middle stands this high.
+/// Height of the ball's centre.
 const HEIGHT: f64 = 0.62;
 
 /// The stand, in the usual way.

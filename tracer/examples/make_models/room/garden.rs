@@ -1,4 +1,4 @@
-//! What the windows show: ridges, each paler than the one before it, and cypresses. West only.
+//! What the windows show: ridges, each paler than the ridge in front of it, and cypresses. West only.
 
 use glam::DVec3;
 

@@ -65,7 +65,7 @@ fn throw_pillow(material: &'static Material, size: f64) -> Model {
 fn piped_cushion(size: DVec3, bulge: f64, cloth: &'static Material, cord: &'static Material) -> Model {
     let mut model = Model::default();
     model.add(cloth, cushion(size, PLUMP, bulge));
-    // Where the rounding stands at 45 degrees.
+    // Where the rounding is at 45 degrees.
     let inset = PLUMP.radius * (1.0 - cos(45.0));
     for side in [-1.0, 1.0] {
         let loop_ = rounded_rectangle(

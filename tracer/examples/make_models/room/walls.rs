@@ -7,7 +7,7 @@ use super::plan::{HALF_X, HALF_Z, HEIGHT, Opening, RAIL, THICKNESS, Wall};
 use crate::generator::shape::{Model, Shape};
 use crate::generator::shapes::{lathe_every, plain_box, rectangle_moulding, spline, straight_moulding};
 
-/// Sections of the strips, (height, depth) or (inwards, height) as the moulding wants them.
+/// Sections of the strips, (height, depth) or (inwards, height) as the moulding expects them.
 const BASEBOARD: [(f64, f64); 7] = [
     (0.0, 0.022),
     (0.12, 0.022),

@@ -224,7 +224,7 @@ fn memory(compiled: &CompiledScene, meshes: &[MeshFacts], textures: &[TextureFac
     Memory { meshes, textures, scene_tree, total: meshes + textures + scene_tree }
 }
 
-/// Asked of the very code that sends.
+/// Number of bytes that a worker receives, from the code that sends them.
 fn travel(source: &Source, view: &FrameView) -> Result<Travel, CommandError> {
     let assets = Assets::new(&source.scene, source.meshes.clone(), source.textures.clone())
         .map_err(CommandError::wrong_input)?;

@@ -81,7 +81,7 @@ impl Renders {
         let options = WorkerOptions {
             master: self.address.to_string(),
             threads: Some(1),
-            name: "honest".to_owned(),
+            name: "correct".to_owned(),
             reconnect: false,
             once: true,
             asset_cache_bytes: 1 << 20,
