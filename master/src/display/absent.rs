@@ -1,4 +1,4 @@
-//! Stand-in for the window in builds without the feature `window`.
+//! Replacement of the window in builds without the feature `window`.
 
 use super::{Display, DisplayError, SceneInfo};
 use crate::viewer::ViewerHandle;

@@ -2,7 +2,7 @@
 //!
 //! The window is one display; `render`, which writes frames to files, is another. The window and its input live on the main
 //! thread, as window systems require; the viewer runs on tokio's threads. Neither ever waits for the other.
-//! A build without the feature `window` has a stand-in that cannot be opened.
+//! In a build without the feature `window`, a replacement reports that there is none.
 
 #[cfg(not(feature = "window"))]
 mod absent;
