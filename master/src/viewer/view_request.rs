@@ -1,11 +1,9 @@
 //! View requests: a view and the quality of its picture, with the knobs as commands, displays and reports name them.
 
 use rayfarm_tracer::image::{self, ImageError, RgbImage};
-use rayfarm_tracer::scene::knobs::word_of;
-use rayfarm_tracer::scene::{
-    ColorDepth, ExponentPrecision, Filter, FrameView, Quality, RenderScale, Shading,
-};
-use serde::Serialize;
+use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobForm};
+use rayfarm_tracer::scene::{FrameView, RenderScale, Setting};
+use serde::{Serialize, Serializer};
 
 /// A requested picture, and the scale at which the farm renders it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,15 +15,20 @@ pub(crate) struct ViewRequest {
 }
 
 impl ViewRequest {
-    /// The view that the farm renders.
-    pub(crate) fn rendered(&self) -> FrameView {
-        let (width, height) = self.size();
-        FrameView { width, height, ..self.view }
+    /// Sample count, scale and knobs.
+    pub(crate) fn setting(&self) -> Setting {
+        self.view.setting(self.scale)
     }
 
-    /// Width and height of the rendered picture, in pixels.
-    fn size(&self) -> (u32, u32) {
-        (self.scale.of(self.view.width), self.scale.of(self.view.height))
+    /// The request with upper limits of its knobs. No knob is raised.
+    pub(crate) fn at_most(&self, limit: &Setting) -> Self {
+        let Setting { samples, scale, quality } = self.setting().at_most(limit);
+        Self { view: FrameView { samples, quality, ..self.view }, scale }
+    }
+
+    /// The view that the farm renders.
+    pub(crate) fn rendered(&self) -> FrameView {
+        self.view.at(&self.setting())
     }
 
     /// Resizes a rendered picture to the size in which it is delivered.
@@ -38,59 +41,58 @@ impl ViewRequest {
 
     /// Values of all knobs, for reports.
     pub(crate) fn knobs(&self) -> Knobs {
-        let Quality { adaptive, shadows, shading, filter, exponent, colors, dither } = self.view.quality;
-        Knobs {
-            shadows,
-            shading: word_of(&Shading::WORDS, &shading),
-            filter: filter.map(|filter| word_of(&Filter::WORDS, &filter)),
-            exponent: word_of(&ExponentPrecision::WORDS, &exponent),
-            colors: word_of(&ColorDepth::WORDS, &colors),
-            scale: self.scale.factor(),
-            adaptive,
-            dither,
-        }
+        Knobs(self.setting())
     }
 
-    /// A short text for each knob that is not at full quality.
-    pub(crate) fn reductions(&self) -> Vec<String> {
-        // Dither is no reduction.
-        let Quality { adaptive: _, shadows, shading, filter, exponent, colors, dither: _ } =
-            self.view.quality;
-        let mut reductions = Vec::new();
-        let mut name = |reduced: bool, words: &str| {
-            if reduced {
-                reductions.push(words.to_owned());
-            }
-        };
-        name(self.scale != RenderScale::Full, &format!("scale {}", self.scale.word()));
-        name(self.view.is_adaptive(), "adaptive samples");
-        name(!shadows, "no shadows");
-        name(shading == Shading::Diffuse, "diffuse only");
-        name(filter == Some(Filter::Nearest), "nearest texels");
-        name(filter == Some(Filter::Bilinear), "bilinear texels");
-        name(exponent == ExponentPrecision::Fast, "fast exponent");
-        name(colors == ColorDepth::Reduced, "16-bit colours");
-        reductions
+    /// Labels of all knobs that are not at full quality.
+    pub(crate) fn reductions(&self) -> Vec<&'static str> {
+        self.setting().reductions()
     }
 }
 
-/// Value of each knob, in the words of the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct Knobs {
-    shadows: bool,
-    shading: &'static str,
-    /// `null` where each texture has its own filter.
-    filter: Option<&'static str>,
-    exponent: &'static str,
-    colors: &'static str,
+/// Value of each knob except the number of samples, which reports have on its own. Serialises to a map by knob.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Knobs(Setting);
+
+/// Value of a knob in JSON.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum ReportedValue {
+    Switch(bool),
     /// Rendered pixels per pixel along a side.
-    scale: f64,
-    adaptive: bool,
-    dither: bool,
+    Fraction(Option<f64>),
+    /// `null` for the value that has no word.
+    Word(Option<&'static str>),
+}
+
+impl Knobs {
+    fn value(&self, knob: &Knob) -> Option<ReportedValue> {
+        let word = knob.value_of(&self.0).word;
+        match knob.form {
+            KnobForm::Switch => Some(ReportedValue::Switch(word == Some("on"))),
+            KnobForm::Fraction => Some(ReportedValue::Fraction(word.and_then(fraction))),
+            KnobForm::Word => Some(ReportedValue::Word(word)),
+            KnobForm::Count => None,
+        }
+    }
+}
+
+impl Serialize for Knobs {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(KNOBS.iter().filter_map(|knob| Some((knob.name, self.value(knob)?))))
+    }
+}
+
+/// The number of a text such as `3/4` or `1`.
+fn fraction(text: &str) -> Option<f64> {
+    let (part, parts) = text.split_once('/').unwrap_or((text, "1"));
+    Some(part.parse::<f64>().ok()? / parts.parse::<f64>().ok()?)
 }
 
 #[cfg(test)]
 mod tests {
+    use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, Shading};
+
     use super::*;
     use crate::test_scene;
 
@@ -100,12 +102,20 @@ mod tests {
 
     #[test]
     fn full_quality_has_no_reductions() {
-        assert_eq!(full().reductions(), Vec::<String>::new());
+        assert_eq!(full().reductions(), [""; 0]);
         assert_eq!(full().rendered(), test_scene::view());
         assert_eq!(
             serde_json::to_string(&full().knobs()).unwrap(),
-            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false,"dither":false}"#
+            r#"{"scale":1.0,"adaptive":false,"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","dither":false}"#
         );
+    }
+
+    #[test]
+    fn fractions_are_those_of_the_scales() {
+        for scale in RenderScale::ALL {
+            assert_eq!(fraction(scale.word()), Some(scale.factor()));
+        }
+        assert_eq!((fraction("1/"), fraction("wide")), (None, None));
     }
 
     #[test]
@@ -133,7 +143,7 @@ mod tests {
         assert_eq!(wanted.reductions(), expected);
         assert_eq!(
             serde_json::to_string(&wanted.knobs()).unwrap(),
-            r#"{"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","scale":0.5,"adaptive":true,"dither":true}"#
+            r#"{"scale":0.5,"adaptive":true,"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","dither":true}"#
         );
         let (rendered, view) = (wanted.rendered(), wanted.view);
         assert_eq!((rendered.width, rendered.height), (view.width / 2, view.height / 2));

@@ -40,7 +40,7 @@ pub(super) fn within_error(
     wanted: ViewRequest,
 ) -> Result<ViewRequest, CommandError> {
     Ok(match args.max_error {
-        Some(_) => ladder(args, source, &wanted)?.cheapest().applied(&wanted),
+        Some(_) => wanted.at_most(&ladder(args, source, &wanted)?.cheapest()),
         None if args.front.is_some() => {
             let what = "--front is for --max-error, and in view for --target-fps; give one of them as well";
             return Err(CommandError::WrongInput(what.to_owned()));

@@ -31,9 +31,9 @@ struct Explanation {
     samples: u32,
     /// Values of the knobs.
     quality: Knobs,
-    /// Knobs that are not at full quality.
+    /// Labels of all knobs that are not at full quality.
     #[serde(skip)]
-    reductions: Vec<String>,
+    reductions: Vec<&'static str>,
     /// SIMD level of this machine.
     simd_level: &'static str,
     /// Triangles over all instances.
