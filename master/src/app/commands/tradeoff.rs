@@ -55,7 +55,7 @@ fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
     let source = Source::load(scene, args.models, args.size)?;
-    let view = source.still_request(args.size, None, &QualityArgs::default())?.view;
+    let view = source.still_request(args.size, &QualityArgs::default())?.view;
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;
     let runtime = runtime()?;
