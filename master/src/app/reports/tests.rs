@@ -1,8 +1,8 @@
 use rayfarm_tracer::scene::RenderScale;
 
 use super::*;
+use crate::farm::ViewRequest;
 use crate::test_scene;
-use crate::viewer::view_request::ViewRequest;
 
 fn ms(values: &[u64]) -> Vec<Duration> {
     values.iter().copied().map(Duration::from_millis).collect()
@@ -26,7 +26,7 @@ fn the_json_line_has_the_documented_shape() {
         width: 64,
         height: 48,
         samples: 4,
-        quality: full.knobs(),
+        quality: Knobs::of(full.setting()),
         workers: 1,
         threads: 2,
         triangles: 12,

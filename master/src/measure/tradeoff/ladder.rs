@@ -4,8 +4,8 @@ use rayfarm_tracer::scene::RenderScale;
 
 use super::setting::MeasuredSetting;
 use super::table::{Row, Table};
+use crate::farm::ViewRequest;
 use crate::viewer::quality_controller::{Ladder, Origin, Rung, bytes, continued};
-use crate::viewer::view_request::ViewRequest;
 
 /// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
 /// losses are differences to its mean FLIP error.
@@ -14,7 +14,7 @@ use crate::viewer::view_request::ViewRequest;
 /// In words: a table without a row for the picture at rest, or a picture at rest with a reduced knob. The table's errors are
 /// differences to the picture with every knob at full quality, not to a reduced one.
 pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, String> {
-    let turned = wanted.reductions();
+    let turned = wanted.setting().reductions();
     if !turned.is_empty() {
         return Err(format!(
             "was measured against pictures with every knob at full quality, and this one is at rest with {}: leave that out, or \

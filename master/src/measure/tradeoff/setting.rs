@@ -3,7 +3,7 @@
 use rayfarm_tracer::scene::knobs::{KNOBS, KnobValue};
 use rayfarm_tracer::scene::{FrameView, Quality, SceneFeatures, Setting};
 
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::ViewRequest;
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.

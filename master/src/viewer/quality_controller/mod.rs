@@ -35,7 +35,7 @@ use stillness::{Motion, Stillness};
 pub(crate) use wire::bytes;
 
 use crate::accounting::FrameAccount;
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::ViewRequest;
 
 /// Quality at which a frame is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use rayfarm_tracer::scene::{Scene, SceneFeatures, Setting};
 
 use super::ladder::{Ladder, Origin, Rung};
 use super::wire::bytes;
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::ViewRequest;
 
 /// Effect of one knob: factor of time, and added mean FLIP error.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use rayfarm_tracer::scene::ColorDepth;
 
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::ViewRequest;
 
 /// Bytes of a pixel with reduced colours, as a part of those with full ones: two thirds, and less after compression; the mean
 /// of the measured scenes.

@@ -18,10 +18,9 @@ use serde::Serialize;
 use self::features::{FeatureFacts, MEASURED_ON, features, kernels};
 use super::source::Source;
 use crate::app::cli::ExplainArgs;
-use crate::app::reports::print_json;
+use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
-use crate::farm::Assets;
-use crate::viewer::view_request::{Knobs, ViewRequest};
+use crate::farm::{Assets, ViewRequest};
 
 /// Explanation of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -157,8 +156,8 @@ fn explain(source: &Source, wanted: &ViewRequest) -> Result<Explanation, Command
         width: wanted.view.width,
         height: wanted.view.height,
         samples: view.samples,
-        quality: wanted.knobs(),
-        reductions: wanted.reductions(),
+        quality: Knobs::of(wanted.setting()),
+        reductions: wanted.setting().reductions(),
         knobs_with_effect: knobs_with_effect(&compiled, &wanted.setting()),
         simd_level: simd_level(),
         triangles: compiled.triangle_count(),
