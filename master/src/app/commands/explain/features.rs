@@ -10,8 +10,8 @@ use super::super::source::Source;
 use crate::display::numbers::counted;
 
 /// Origin of [`FeatureFacts::measured_percent`].
-pub(super) const MEASURED_ON: &str = "a ring of 100,352 triangles and one light, on one thread with AVX-512: \
-                                      the table of features of scripts/bench_tracer.sh";
+pub(super) const MEASURED_ON: &str = "a ring of 100,352 triangles under one light, on one thread with AVX-512 \
+                                      (samples: instructions): the table of features of scripts/bench_tracer.sh";
 /// Time that features add to a frame of the scene [`MEASURED_ON`], in per cent. Other scenes have other percentages; these give
 /// the order of magnitude.
 const SHADOWS: f64 = 79.0;

@@ -55,7 +55,7 @@ fn write_head(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
 
 fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     for (asked_for, title) in [
-        (true, "Features in use, with the time that each adds to a typical scene:"),
+        (true, "Features in use, with the time that each adds to the scene of the benchmarks:"),
         (false, "Features not in use, at no cost:"),
     ] {
         writeln!(out, "\n{title}")?;
