@@ -10,6 +10,10 @@ mod in_process;
 mod log_bar;
 mod measure;
 mod quantile;
+#[cfg_attr(
+    not(feature = "window"),
+    allow(dead_code, reason = "the window is the only display that sends input and reads statistics")
+)]
 mod viewer;
 
 pub use rayfarm_farm as farm;

@@ -10,7 +10,6 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 
 use rayfarm_protocol::FrameId;
-use rayfarm_tracer::scene::FrameView;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -29,6 +28,7 @@ use crate::status::FarmStatus;
 use crate::supervisor::{LocalSlots, LocalWorkers};
 use crate::verification::arbiter::{self, RowRenderer};
 use crate::verification::delivered::FrameSet;
+use crate::view_request::ViewRequest;
 
 /// A running farm. Dropping it ends its sessions and local workers without waiting for them; [`Farm::shut_down`] waits.
 pub struct Farm {
@@ -103,8 +103,8 @@ impl Farm {
 
     /// Requests a frame. It may replace an earlier request: at most two are open, and the oldest frame is always finished.
     /// A view that cannot be rendered (no pixels, an invalid camera) is an error of [`Farm::finished`].
-    pub fn request(&self, view: FrameView) -> FrameId {
-        self.driver.request(view)
+    pub fn request(&self, request: impl Into<ViewRequest>) -> FrameId {
+        self.driver.request(request.into())
     }
 
     /// Sets the number of frames of the run, from which [`FarmStatus::totals`] predicts its duration.

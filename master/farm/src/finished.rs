@@ -7,15 +7,18 @@ use rayfarm_tracer::scene::FrameView;
 
 use crate::accounting::FrameAccount;
 use crate::framebuffer::FramePixels;
+use crate::view_request::ViewRequest;
 
 pub use rayfarm_protocol::Cost as FrameCounts;
 
 /// A completed picture with its costs.
 #[derive(Debug)]
 pub struct FinishedFrame {
-    /// The request that it answers.
+    /// Number of the request that it answers.
     pub frame: FrameId,
-    /// The requested view.
+    /// The request that it answers.
+    pub request: ViewRequest,
+    /// The rendered view: the requested one at its scale.
     pub view: FrameView,
     /// RGB8 sRGB rows, top to bottom: `view.width * view.height * 3` bytes.
     pub pixels: FramePixels,

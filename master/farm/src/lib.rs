@@ -27,6 +27,7 @@ mod sessions;
 mod status;
 mod supervisor;
 mod verification;
+mod view_request;
 
 #[cfg(test)]
 mod tests;
@@ -47,3 +48,4 @@ pub use sessions::lease_book::{LeaseBook, LeaseStatus};
 pub use status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
 pub use supervisor::LocalWorkerCommand;
 pub use verification::delivered::{FrameSet, as_text};
+pub use view_request::ViewRequest;

@@ -2,22 +2,50 @@
 //!
 //! The window is one display; `render`, which writes frames to files, is another. The window and its input live on the main
 //! thread, as window systems require; the viewer runs on tokio's threads. Neither ever waits for the other.
+//! In a build without the feature `window`, a replacement reports that there is none.
 
+#[cfg(not(feature = "window"))]
+mod absent;
+#[cfg(feature = "window")]
 mod canvas;
+#[cfg(feature = "window")]
 mod input;
 pub(crate) mod numbers;
+#[cfg(feature = "window")]
 mod overlay;
+#[cfg(feature = "window")]
 mod screen;
+#[cfg(feature = "window")]
 mod tint;
+#[cfg(feature = "window")]
 mod visibility;
+#[cfg(feature = "window")]
 mod watch;
+#[cfg(feature = "window")]
 mod window;
+#[cfg(feature = "window")]
 mod worker_selection;
+#[cfg(feature = "window")]
 mod x11;
 
-pub(crate) use window::{SceneInfo, WindowDisplay};
+#[cfg(not(feature = "window"))]
+pub(crate) use absent::WindowDisplay;
+#[cfg(feature = "window")]
+pub(crate) use window::WindowDisplay;
 
 use crate::viewer::ViewerHandle;
+
+/// Facts about the scene and its farm that a display shows.
+#[derive(Clone, Debug)]
+#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only the window shows them"))]
+pub(crate) struct SceneInfo {
+    /// Name of the scene, for the title.
+    pub(crate) name: String,
+    /// Triangles over all instances.
+    pub(crate) triangles: u64,
+    /// Workers that the master starts itself.
+    pub(crate) local_workers: u32,
+}
 
 /// A display of a view.
 pub(crate) trait Display {

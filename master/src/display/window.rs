@@ -14,7 +14,7 @@ use super::screen;
 use super::tint::Coloring;
 use super::watch::WindowWatch;
 use super::worker_selection::{self, WorkerSelection};
-use super::{Display, DisplayError};
+use super::{Display, DisplayError, SceneInfo};
 use crate::farm::FarmStatus;
 use crate::viewer::{InputAction, PresentedFrame, Statistics, ViewerHandle};
 
@@ -33,17 +33,6 @@ const SLOW_FRAME: Duration = Duration::from_millis(700);
 const MAX_PROBLEMS: usize = 4;
 /// Colour of the window before the first picture.
 const BACKGROUND: u32 = 0x0020_2428;
-
-/// Facts about the scene and its farm that the window shows.
-#[derive(Clone, Debug)]
-pub(crate) struct SceneInfo {
-    /// Name of the scene, for the title.
-    pub(crate) name: String,
-    /// Triangles over all instances.
-    pub(crate) triangles: u64,
-    /// Workers that the master starts itself.
-    pub(crate) local_workers: u32,
-}
 
 /// A window on the screen.
 pub(crate) struct WindowDisplay {
@@ -68,6 +57,14 @@ pub(crate) struct WindowDisplay {
 }
 
 impl WindowDisplay {
+    /// Checks that this build has a window: always `Ok` with the feature `window`.
+    ///
+    /// # Errors
+    /// None.
+    pub(crate) fn check_build() -> Result<(), String> {
+        Ok(())
+    }
+
     /// Opens an empty window of the given size, in pixels.
     ///
     /// # Errors
@@ -279,9 +276,9 @@ impl WindowDisplay {
             frame_time,
             latency: statistics.latency,
             size: self.size(),
-            samples: picture.request.view.samples,
+            samples: picture.frame.request.view.samples,
             quality: quality.clone(),
-            reductions: picture.request.reductions(),
+            reductions: picture.frame.request.setting().reductions(),
             workers: status.workers.len(),
             threads: status.workers.iter().map(|worker| worker.threads).sum(),
             triangles: self.info.triangles,

@@ -8,19 +8,16 @@ use tokio::sync::{mpsc, watch};
 
 use super::input_action::InputAction;
 use super::statistics::Statistics;
-use super::view_request::ViewRequest;
 use crate::farm::{FarmStatus, FinishedFrame};
 
 /// Actions that wait for the viewer at most. Further ones are dropped until it has caught up.
 const MAX_WAITING_ACTIONS: usize = 256;
 
-/// A finished frame with the request that it answers.
+/// A finished frame with the input that it answers.
 #[derive(Debug)]
 pub(crate) struct PresentedFrame {
-    /// Pixels, costs and accounts.
+    /// Pixels, costs, accounts, and the request that the frame answers, after the quality controller.
     pub(crate) frame: FinishedFrame,
-    /// Request that the frame answers, after the quality controller.
-    pub(crate) request: ViewRequest,
     /// Time of the input that the frame answers.
     pub(crate) input_at: Instant,
     /// Time at which the last row arrived at the viewer.

@@ -17,7 +17,6 @@ pub(crate) mod quality_controller;
 mod requests;
 mod sequence;
 mod statistics;
-pub(crate) mod view_request;
 mod worker_command;
 
 pub(crate) use camera_control::CameraControl;

@@ -6,6 +6,8 @@ use glam::DVec3;
 use rayfarm_tracer::scene::rotation::sin_cos_degrees;
 use rayfarm_tracer::scene::{Camera, FrameView};
 
+use crate::farm::ViewRequest;
+
 /// Movements without input, as the command line offers them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Animation {
@@ -21,6 +23,11 @@ impl Animation {
     /// Whether frames differ without input.
     pub(crate) fn is_moving(&self) -> bool {
         self.orbit != 0.0 || self.spin != 0.0
+    }
+
+    /// Request of frame `index` (from 0): `base` with the view of that frame.
+    pub(crate) fn request(&self, base: &ViewRequest, index: u64) -> ViewRequest {
+        ViewRequest { view: self.view(&base.view, index), ..*base }
     }
 
     /// View of frame `index` (from 0). Frame 0 is `base` itself, bit for bit.

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 use rayfarm_tests::{Running, Scenes, master, project_root, worker};
+use rayfarm_tracer::scene::RenderSettings;
+use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobForm};
 
 /// Documents that describe the options of both programs.
 const OPTION_DOCUMENTS: [&str; 2] = ["docs/guide.md", "docs/quality.md"];
@@ -14,6 +16,10 @@ const MAPS: [&str; 2] = ["ARCHITECTURE.md", "CONTRIBUTING.md"];
 
 /// Paths in these documents that are no files of the project: a pattern for the names of records.
 const NOT_A_PATH: &str = "PROCESSOR/DATE-NAME.csv";
+
+/// Document with the table of knobs, and the heading above it.
+const KNOBS_DOCUMENT: &str = "docs/quality.md";
+const KNOBS_HEADING: &str = "\n## Knobs\n";
 
 /// Options in these documents that `--help` does not list: hidden aliases, and options of cargo.
 const NOT_IN_HELP: [&str; 2] = ["trace", "release"];
@@ -107,6 +113,39 @@ fn add_file_names(folder: &Path, names: &mut BTreeSet<String>) {
     }
 }
 
+/// Cells of the first table after a heading, without its head. An escaped bar does not end a cell.
+fn table_after(document: &str, heading: &str) -> Vec<Vec<String>> {
+    const BAR: &str = "\u{1}";
+    let document = document.replace("\\|", BAR);
+    let (_, text) = document.split_once(heading).expect(heading);
+    let is_row = |line: &&str| line.starts_with('|');
+    let rows = text.lines().skip_while(|line| !is_row(line)).take_while(is_row).skip(2);
+    let cells = |row: &str| row.split('|').map(|cell| cell.trim().replace(BAR, "|")).collect::<Vec<_>>();
+    rows.map(|row| cells(row.trim_matches('|'))).collect()
+}
+
+/// A knob's option as documents write it.
+fn documented_option(knob: &Knob) -> String {
+    let (option, words) = (knob.option, knob.words().collect::<Vec<_>>().join("|"));
+    match (knob.form, knob.best().word) {
+        (KnobForm::Switch, Some("off")) => format!("`--{option}[=on|off]`"),
+        (KnobForm::Switch, _) => format!("`--{option} on|off`"),
+        (KnobForm::Count, _) => format!("`--{option} N`"),
+        (KnobForm::Word | KnobForm::Fraction, _) => format!("`--{option} {words}`"),
+    }
+}
+
+/// A knob's scene key with its default as documents write them.
+fn documented_key(knob: &Knob) -> String {
+    let key = knob.key;
+    match (knob.form, knob.value_of(&RenderSettings::default().setting()).word) {
+        (_, None) => format!("`{key}`"),
+        (KnobForm::Switch, Some(word)) => format!("`{key} = {}`", word == "on"),
+        (KnobForm::Word, Some(word)) => format!("`{key} = \"{word}\"`"),
+        (KnobForm::Count | KnobForm::Fraction, Some(word)) => format!("`{key} = {word}`"),
+    }
+}
+
 #[test]
 fn code_spans_with_paths_are_found() {
     let document = "`a/b.rs`, `--x y`\n```sh\n`c/d`\n```\n`e.rs`";
@@ -129,6 +168,19 @@ fn files_that_the_maps_name_exist() {
             .collect();
         assert!(missing.is_empty(), "{map} names files that do not exist: {missing:?}");
     }
+}
+
+#[test]
+fn the_documented_knobs_are_those_of_the_table() {
+    let rows = table_after(&document(KNOBS_DOCUMENT), KNOBS_HEADING);
+    for knob in KNOBS {
+        let (option, key) = (documented_option(knob), documented_key(knob));
+        let row = rows.iter().find(|row| row.first() == Some(&option));
+        let row = row.unwrap_or_else(|| panic!("{KNOBS_DOCUMENT} has no {option} among {rows:?}"));
+        assert!(row.get(1).is_some_and(|cell| cell.starts_with(&key)), "{key} of {row:?}");
+        assert!(row.get(2).is_some_and(|effect| !effect.is_empty()), "{row:?}");
+    }
+    assert_eq!(rows.len(), KNOBS.len(), "{KNOBS_DOCUMENT} has other rows among {rows:?}");
 }
 
 #[test]

@@ -36,6 +36,7 @@ use crate::sessions::{ByteCount, Sessions};
 use crate::verification::arbiter::Dispute;
 use crate::verification::delivered::{Delivered, FrameSet};
 use crate::verification::{OpenSegments, SegmentDigest};
+use crate::view_request::ViewRequest;
 use reply::Reply;
 
 pub(crate) use answers::AnswerError;
@@ -100,6 +101,8 @@ struct Run {
 
 /// A requested frame.
 struct Request {
+    request: ViewRequest,
+    /// The view that workers render.
     view: FrameView,
     announce: FrameAnnounce,
     /// Time of the request, on the driver's clock.
@@ -190,7 +193,8 @@ impl Driver {
     }
 
     /// Requests a frame. A view that cannot be rendered is reported by [`Self::next_finished`].
-    pub(crate) fn request(&self, view: FrameView) -> FrameId {
+    pub(crate) fn request(&self, request: ViewRequest) -> FrameId {
+        let view = request.rendered();
         let mut inner = self.lock();
         inner.last_frame += 1;
         let frame = FrameId(inner.last_frame);
@@ -202,7 +206,8 @@ impl Driver {
         match self.announcement(frame, &view) {
             Ok(announce) => {
                 let (FrameView { width, height, .. }, tile_rows) = (view, tile_rows(&view));
-                inner.requests.insert(frame, Request { view, announce, at: self.started.elapsed() });
+                let at = self.started.elapsed();
+                inner.requests.insert(frame, Request { request, view, announce, at });
                 self.drive(&mut inner, Event::FrameRequested { frame, width, height, tile_rows });
             }
             Err(error) => self.deliver(&mut inner, Err(error)),

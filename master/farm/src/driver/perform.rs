@@ -78,7 +78,7 @@ impl Driver {
             inner.delivered.add(frame, self.framebuffers.workers(frame));
         }
         let picture = inner.requests.remove(&frame).zip(self.framebuffers.finish(frame));
-        let Some((Request { view, at, .. }, pixels)) = picture else {
+        let Some((Request { request, view, at, .. }, pixels)) = picture else {
             debug_assert!(false, "frame {frame} is done without all of its pixels");
             return;
         };
@@ -88,6 +88,7 @@ impl Driver {
         let bytes = now.since(std::mem::replace(&mut inner.counted, now));
         let finished = FinishedFrame {
             frame,
+            request,
             view,
             pixels,
             counts: cost,

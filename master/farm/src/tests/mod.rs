@@ -8,7 +8,7 @@ use rayfarm_protocol::session;
 use rayfarm_protocol::{
     AssetId, Encoding, FrameId, Hello, Lease, PixelsHeader, ToMaster, ToWorker, codec, handshake,
 };
-use rayfarm_tracer::scene::{FrameView, Scene};
+use rayfarm_tracer::scene::{FrameView, RenderScale, Scene};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
@@ -21,6 +21,7 @@ use crate::status::FarmStatus;
 use crate::supervisor::LocalWorkerCommand;
 use crate::testing::fake_worker::{self, Script, is_picture};
 use crate::testing::test_scene::{scene, view};
+use crate::view_request::ViewRequest;
 use rayfarm_scheduler::{SegmentPolicy, WorkerState};
 
 mod asset_routing;
@@ -269,6 +270,22 @@ async fn dropped_requests_are_not_finished() {
     let frame = finished(&mut farm).await;
     assert_eq!(frame.frame, requested);
     assert!(is_picture(&large, &frame.pixels));
+}
+
+#[tokio::test]
+async fn a_finished_frame_carries_the_request_that_it_answers() {
+    let mut farm = farm(SegmentPolicy::Static(8)).await;
+    fake_worker::start(farm.address(), Script::Correct).await;
+    for scale in RenderScale::ALL {
+        let mut request = ViewRequest { view: turned(1), scale };
+        request.view.quality.shadows = false;
+        farm.request(request);
+        // A later request, changes nothing about the frame in flight.
+        farm.request(turned(2));
+        let [first, second] = [finished(&mut farm).await, finished(&mut farm).await];
+        assert_eq!((first.request, first.view), (request, request.rendered()));
+        assert_eq!(second.request, turned(2).into());
+    }
 }
 
 #[tokio::test]

@@ -13,9 +13,10 @@ use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcom
 
 use crate::app::control::Place;
 pub(crate) use values::Size;
-use values::{frame_count, frame_index, ray_count, sample_count, size, thread_count, worker_count};
+use values::{frame_count, frame_index, ray_count, size, thread_count, worker_count};
 
 mod farm;
+mod knobs;
 mod models;
 mod picture;
 mod plot;
@@ -26,8 +27,9 @@ mod tradeoff;
 mod values;
 
 pub(crate) use farm::FarmArgs;
+pub(crate) use knobs::QualityArgs;
 pub(crate) use models::ModelArgs;
-pub(crate) use picture::{PictureArgs, QualityArgs};
+pub(crate) use picture::PictureArgs;
 pub(crate) use plot::PlotArgs;
 pub(crate) use quality_control::{ErrorArgs, QualityControlArgs};
 pub(crate) use shell::{CompletionsArgs, ManArgs, Program};
@@ -245,9 +247,6 @@ pub(crate) struct ExplainArgs {
     /// Picture size in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<Size>,
-    /// Rays per pixel: a square number, 1, 4, 9, 16, ...
-    #[arg(long, value_name = "N", value_parser = sample_count)]
-    pub(crate) samples: Option<u32>,
     #[command(flatten)]
     pub(crate) quality: QualityArgs,
     /// Print one line of JSON on standard output.

@@ -3,8 +3,7 @@
 use clap::Args;
 use rayfarm_tracer::scene::{LoadOptions, Up};
 
-use super::picture::one_of;
-use super::values::{Size, crease_angle};
+use super::values::{Size, crease_angle, one_of};
 
 /// Options for reading models.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Args)]

@@ -1,6 +1,7 @@
 use std::net::SocketAddr;
 
-use rayfarm_tracer::scene::Up;
+use rayfarm_tracer::scene::knobs::KNOBS;
+use rayfarm_tracer::scene::{Setting, Up};
 
 use super::*;
 use crate::farm::SegmentPolicy;
@@ -40,6 +41,11 @@ fn refused(line: &str) -> String {
     }
 }
 
+/// Samples per pixel of a command line, over a scene with the largest number.
+fn samples(quality: &QualityArgs) -> u32 {
+    quality.over(Setting::FULL).samples
+}
+
 #[test]
 fn view_is_the_default_command() {
     assert_eq!(view("rayfarm-master").scene, None);
@@ -56,7 +62,8 @@ fn defaults_are_as_documented() {
     assert_eq!((args.frames, args.json, args.fps_log), (1, false, None));
     assert_eq!((args.farm.listen, args.farm.local_workers(), args.farm.threads), (None, 1, None));
     assert_eq!(args.farm.segment, SegmentPolicy::Adaptive);
-    assert_eq!((args.picture.size, args.picture.samples), (None, None));
+    assert_eq!(args.picture.size, None);
+    assert_eq!(args.picture.quality.over(Setting::FULL), Setting::FULL);
     assert_eq!((args.picture.orbit, args.picture.spin), (0.0, 0.0));
     assert_eq!(view("rayfarm-master").frames, None);
 }
@@ -71,7 +78,7 @@ fn every_common_option_is_parsed() {
     assert_eq!((args.farm.local_workers(), args.farm.threads), (3, Some(2)));
     assert_eq!(args.farm.segment, SegmentPolicy::Smart(24));
     assert_eq!(args.picture.size, Some(Size { width: 1024, height: 768 }));
-    assert_eq!(args.picture.samples, Some(9));
+    assert_eq!(samples(&args.picture.quality), 9);
     assert_eq!((args.picture.orbit, args.picture.spin), (-90.5, 2.0));
     assert_eq!((args.frames, args.fps_log, args.json), (100, Some("log.csv".into()), true));
 }
@@ -124,13 +131,14 @@ fn the_other_commands_are_parsed() {
     match command("rayfarm-master bench a.toml --threads 1 --frames 5 --samples 4 --json") {
         Command::Bench(args) => {
             assert_eq!((args.threads, args.frames, args.json), (Some(1), 5, true));
-            assert_eq!(args.picture.samples, Some(4));
+            assert_eq!(samples(&args.picture.quality), 4);
         }
         other => panic!("{other:?}"),
     }
     match command("rayfarm-master explain a.toml --size 64x48 --samples 4 --json") {
         Command::Explain(args) => {
-            assert_eq!((args.scene, args.json, args.samples), ("a.toml".into(), true, Some(4)));
+            assert_eq!((args.scene, args.json), ("a.toml".into(), true));
+            assert_eq!(samples(&args.quality), 4);
             assert_eq!(args.size, Some(Size { width: 64, height: 48 }));
         }
         other => panic!("{other:?}"),
@@ -151,7 +159,7 @@ fn the_other_commands_are_parsed() {
 #[test]
 fn the_last_of_two_equal_options_counts() {
     assert_eq!(render("rayfarm-master render a.toml -o b.png --frames 2 --frames 3").frames, 3);
-    assert_eq!(view("rayfarm-master --samples 4 --samples 9").picture.samples, Some(9));
+    assert_eq!(samples(&view("rayfarm-master --samples 4 --samples 9").picture.quality), 9);
 }
 
 #[test]
@@ -177,9 +185,9 @@ fn wrong_use_is_status_2_and_says_what_was_expected() {
         ("rayfarm-master --size 800", "1024x768"),
         ("rayfarm-master --size 800x", "1024x768"),
         ("rayfarm-master --size 16385x1", "16384"),
-        ("rayfarm-master --samples 0", "square number"),
-        ("rayfarm-master --samples 2", "square number"),
-        ("rayfarm-master --samples 4294967296", "square number"),
+        ("rayfarm-master --samples 0", "expected one of 1, 4, 9"),
+        ("rayfarm-master --samples 2", "expected one of 1, 4, 9"),
+        ("rayfarm-master --samples 4294967296", "225, 256"),
         ("rayfarm-master --frames 0", "from 1"),
         ("rayfarm-master --threads 0", "from 1"),
         ("rayfarm-master --local-workers -1", "-1"),
@@ -249,29 +257,39 @@ fn a_run_has_a_timeline_and_control() {
 fn knobs_are_parsed_and_override_the_scene() {
     use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
 
-    let all = "--adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4 --dither";
-    let full = Quality::default();
-    let reduced = Quality {
-        adaptive: true,
-        shadows: false,
-        shading: Shading::Diffuse,
-        filter: Some(Filter::Nearest),
-        exponent: ExponentPrecision::Fast,
-        colors: ColorDepth::Reduced,
-        dither: true,
+    let all = "--samples 9 --adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4 \
+               --dither";
+    let full = Setting { samples: 4, ..Setting::FULL };
+    let reduced = Setting {
+        samples: 9,
+        scale: RenderScale::ThreeQuarters,
+        quality: Quality {
+            adaptive: true,
+            shadows: false,
+            shading: Shading::Diffuse,
+            filter: Some(Filter::Nearest),
+            exponent: ExponentPrecision::Fast,
+            colors: ColorDepth::Reduced,
+            dither: true,
+        },
     };
     let args = render(&format!("rayfarm-master render a.toml -o b.png {all}")).picture.quality;
-    assert_eq!((args.over(full), args.scale_over(RenderScale::Half)), (reduced, RenderScale::ThreeQuarters));
+    assert_eq!(args.over(full), reduced);
+    assert!(args.selects("adaptive", "on") && !args.selects("adaptive", "off"));
     let none = view("rayfarm-master a.toml").picture.quality;
-    assert_eq!((none.over(reduced), none.scale_over(RenderScale::Half)), (reduced, RenderScale::Half));
-    let back = "--adaptive=off --shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1 --dither=off";
+    assert_eq!(none.over(reduced), reduced);
+    let back = "--samples 04 --adaptive=off --shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1 \
+                --dither=off";
     let back = view(&format!("rayfarm-master {back} a.toml")).picture.quality;
-    assert_eq!(back.over(reduced), Quality { filter: Some(Filter::Bilinear), ..full });
-    assert_eq!(back.scale_over(RenderScale::Half), RenderScale::Full);
+    let bilinear = Quality { filter: Some(Filter::Bilinear), ..full.quality };
+    assert_eq!(back.over(reduced), Setting { quality: bilinear, ..full });
+    let half = view("rayfarm-master --scale 0.5 a.toml").picture.quality;
+    assert_eq!(half.over(full).scale, RenderScale::Half);
     for command in ["bench", "explain"] {
         parse(&format!("rayfarm-master {command} a.toml {all}")).unwrap();
     }
     for (wrong, known) in [
+        ("--shadows", "a value is required"),
         ("--shadows yes", "on, off"),
         ("--adaptive=yes", "on, off"),
         ("--scale 0.6", "1, 3/4"),
@@ -279,6 +297,19 @@ fn knobs_are_parsed_and_override_the_scene() {
     ] {
         let message = refused(&format!("rayfarm-master bench a.toml {wrong}"));
         assert!(message.contains(known), "{message}");
+    }
+}
+
+#[test]
+fn every_knob_of_the_table_is_an_option_with_its_summary() {
+    for name in ["view", "render", "bench", "explain"] {
+        let cli = Cli::command();
+        let command = cli.find_subcommand(name).unwrap();
+        for knob in KNOBS {
+            let option = command.get_arguments().find(|arg| arg.get_long() == Some(knob.option)).unwrap();
+            let help = option.get_help().unwrap().to_string();
+            assert!(knob.summary.starts_with(&help), "{name} --{}: {help}", knob.option);
+        }
     }
 }
 

@@ -2,9 +2,9 @@
 
 use std::net::SocketAddr;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayfarm_protocol::address;
 use rayfarm_tracer::image::MAX_SIDE;
-use rayfarm_tracer::scene::MAX_SAMPLES;
 
 const MAX_FRAMES: u32 = 10_000_000;
 const MAX_LOCAL_WORKERS: u32 = 64;
@@ -32,14 +32,6 @@ pub(super) fn size(text: &str) -> Result<Size, String> {
         _ => Err(expected()),
     };
     Ok(Size { width: side(width)?, height: side(height)? })
-}
-
-/// A square number of rays.
-pub(super) fn sample_count(text: &str) -> Result<u32, String> {
-    let expected = || format!("expected a square number from 1 to {MAX_SAMPLES}: 1, 4, 9, 16, ...");
-    let samples: u32 = text.parse().map_err(|_| expected())?;
-    let square = samples.isqrt().pow(2) == samples;
-    if square && (1..=MAX_SAMPLES).contains(&samples) { Ok(samples) } else { Err(expected()) }
 }
 
 /// One frame or more.
@@ -112,6 +104,17 @@ pub(super) fn listen_address(text: &str) -> Result<SocketAddr, String> {
 pub(super) fn equation(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').ok_or("expected COLUMN=TEXT, such as workers=4")?;
     Ok((parts.0.to_owned(), parts.1.to_owned()))
+}
+
+/// Parser of one of a few words, with the meaning of each.
+pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
+    words: &'static [(&'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    let known = PossibleValuesParser::new(words.iter().map(|(word, _)| *word));
+    known.try_map(move |text| {
+        let found = words.iter().find(|(word, _)| *word == text).map(|(_, meaning)| *meaning);
+        found.ok_or("unknown word")
+    })
 }
 
 fn whole_number<T>(text: &str, least: T, most: T) -> Result<T, String>

@@ -10,13 +10,13 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
 
 use super::source::{Source, animation};
 use crate::app::cli::BenchArgs;
-use crate::app::reports::{BenchReport, MsPerFrame, print_json};
+use crate::app::reports::{BenchReport, Knobs, MsPerFrame, print_json};
 use crate::display::numbers::{counted, grouped};
 use crate::error::CommandError;
+use crate::farm::ViewRequest;
 use crate::in_process::{all_cores, trace};
 use crate::quantile::round_to_us;
 use crate::viewer::frame_counts::RaysPerFrame;
-use crate::viewer::view_request::ViewRequest;
 
 /// Measures the frames of a scene and prints the figures on standard output.
 ///
@@ -90,7 +90,7 @@ impl Bench {
             width: view.width,
             height: view.height,
             samples: view.samples,
-            quality: self.request.knobs(),
+            quality: Knobs::of(self.request.setting()),
             threads: self.threads,
             triangles: self.scene.triangle_count(),
             load_ms: round_to_us(load),

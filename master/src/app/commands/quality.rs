@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use super::source::Source;
 use crate::app::cli::{ErrorArgs, QualityControlArgs};
 use crate::error::CommandError;
+use crate::farm::ViewRequest;
 use crate::measure::tradeoff::ladder::ladder as measured_ladder;
 use crate::measure::tradeoff::table::Table;
 use crate::viewer::quality_controller::{Ladder, QualityController, prior_ladder};
-use crate::viewer::view_request::ViewRequest;
 
 /// Request of a view at rest, and the quality controller for its motion. With a rate to hold, the largest error applies to
 /// moving pictures; without one, to all.
@@ -40,7 +40,7 @@ pub(super) fn within_error(
     wanted: ViewRequest,
 ) -> Result<ViewRequest, CommandError> {
     Ok(match args.max_error {
-        Some(_) => ladder(args, source, &wanted)?.cheapest().applied(&wanted),
+        Some(_) => wanted.at_most(&ladder(args, source, &wanted)?.cheapest()),
         None if args.front.is_some() => {
             let what = "--front is for --max-error, and in view for --target-fps; give one of them as well";
             return Err(CommandError::WrongInput(what.to_owned()));

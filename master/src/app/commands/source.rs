@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene};
+use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene, Setting};
 use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
+use crate::farm::ViewRequest;
 use crate::viewer::orbit::Animation;
-use crate::viewer::view_request::ViewRequest;
 
 /// Scene without a file on the command line, in a folder of models.
 const DEFAULT_SCENE: &str = "room.toml";
@@ -54,7 +54,7 @@ impl Source {
     /// # Errors
     /// A combination that cannot be rendered.
     pub(super) fn request(&self, picture: &PictureArgs) -> Result<ViewRequest, CommandError> {
-        self.still_request(picture.size, picture.samples, &picture.quality)
+        self.still_request(picture.size, &picture.quality)
     }
 
     /// Request of a picture without animation.
@@ -64,22 +64,21 @@ impl Source {
     pub(super) fn still_request(
         &self,
         size: Option<Size>,
-        samples: Option<u32>,
-        quality: &QualityArgs,
+        options: &QualityArgs,
     ) -> Result<ViewRequest, CommandError> {
         let mut view = FrameView::of(&self.scene);
         if let Some(size) = size {
             (view.width, view.height) = (size.width, size.height);
         }
-        view.samples = samples.unwrap_or(view.samples);
-        view.quality = quality.over(view.quality);
+        let Setting { samples, scale, quality } = options.over(self.scene.render.setting());
+        (view.samples, view.quality) = (samples, quality);
         view.validate().map_err(CommandError::wrong_input)?;
-        if quality.is_adaptive() && view.samples == 1 {
+        if options.selects("adaptive", "on") && samples == 1 {
             let message = "--adaptive omits samples, but there is only one per pixel: \
                            request more with --samples 4, 9, 16, ..., or leave --adaptive out";
             return Err(CommandError::WrongInput(message.into()));
         }
-        Ok(ViewRequest { view, scale: quality.scale_over(self.scene.render.scale) })
+        Ok(ViewRequest { view, scale })
     }
 
     /// Compiles the scene for the tracer.

@@ -23,7 +23,7 @@ use crate::in_process::all_cores;
 use crate::measure::tradeoff::measure::{MeasureContext, summary};
 use crate::measure::tradeoff::oracle::{ReferenceCheck, affordable_pixels, check_pixels, sample_pixels};
 use crate::measure::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
-use crate::measure::tradeoff::setting::{SceneFeatures, Setting};
+use crate::measure::tradeoff::setting::MeasuredSetting;
 use crate::measure::tradeoff::steps::Steps;
 use crate::measure::tradeoff::table::{Row, Table};
 
@@ -47,7 +47,7 @@ pub(super) fn run(args: &TradeoffArgs) -> Result<(), CommandError> {
 
 fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
     let table = Table::read(path).map_err(CommandError::wrong_input)?;
-    for row in table.rows.iter().filter(|row| Setting::named(&row.setting).is_none()) {
+    for row in table.rows.iter().filter(|row| MeasuredSetting::named(&row.setting).is_none()) {
         tracing::warn!("{}: unknown setting {}, perhaps of another version", path.display(), row.setting);
     }
     if json { print_json(&table) } else { print(&front(&table)) }
@@ -55,7 +55,7 @@ fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
     let source = Source::load(scene, args.models, args.size)?;
-    let view = source.still_request(args.size, None, &QualityArgs::default())?.view;
+    let view = source.still_request(args.size, &QualityArgs::default())?.view;
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;
     let runtime = runtime()?;
@@ -78,7 +78,7 @@ fn measure(
     folder: &Folder,
 ) -> Result<Report, CommandError> {
     let steps = Steps::new();
-    let settings = Setting::applicable(SceneFeatures::of(&context.scene));
+    let settings = MeasuredSetting::applicable(&context.scene.features());
     let reference_view = context.reference_view();
     steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
     let reference = context.reference(&|rows| steps.done(u64::from(rows)))?;
@@ -119,13 +119,13 @@ fn check(
 /// Renders each setting, compares it with the reference, and writes its two pictures.
 fn compare(
     context: &MeasureContext,
-    settings: &[Setting],
+    settings: &[MeasuredSetting],
     reference: &RgbImage,
     folder: &Folder,
     steps: &Steps,
 ) -> Result<Vec<Row>, CommandError> {
     steps.part("pictures", settings.len() as u64);
-    let one = |setting: &Setting| {
+    let one = |setting: &MeasuredSetting| {
         let compared = context.compare(setting, reference)?;
         folder.save(&picture_name(&compared.row.setting), &compared.picture)?;
         folder.save(&difference_name(&compared.row.setting), &compared.errors.picture())?;
@@ -138,7 +138,7 @@ fn compare(
 /// Times of each setting, over `repeats` rounds of all settings.
 fn time(
     context: &MeasureContext,
-    settings: &[Setting],
+    settings: &[MeasuredSetting],
     repeats: u32,
     steps: &Steps,
 ) -> Result<Vec<Vec<Duration>>, CommandError> {

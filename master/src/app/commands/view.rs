@@ -1,5 +1,6 @@
 //! `view`: a window on the main thread over a viewer on the runtime.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use tokio::sync::watch;
@@ -27,6 +28,8 @@ const FRAMES_PER_ORBIT: u32 = 360;
 /// A wrong scene; no display; a farm that cannot listen or go on.
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
+    // Before the scene is compiled, which can take minutes.
+    WindowDisplay::check_build().map_err(|problem| no_window(&problem, &path))?;
     let source = Source::load(&path, args.models, args.picture.size)?;
     let requested = source.request(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
@@ -43,12 +46,8 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     drop(compiled);
     let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
     let mut observability = Observability::new(&args.observability)?;
-    let display = WindowDisplay::open(info, view.width, view.height).map_err(|problem| {
-        CommandError::Failed(format!(
-            "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
-            path.display()
-        ))
-    })?;
+    let display =
+        WindowDisplay::open(info, view.width, view.height).map_err(|problem| no_window(&problem, &path))?;
 
     let limit = args.frames.map(u64::from);
     // A number of frames is for measuring: they are rendered although nothing changes.
@@ -69,6 +68,14 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     rendered.map_err(CommandError::from).and(shown).and(observability.end())?;
     check_frames(&control)?;
     check_count(&args, &statistics, &interrupted)
+}
+
+/// Reports that there is no window, with the command that needs none.
+fn no_window(problem: &str, scene: &Path) -> CommandError {
+    CommandError::Failed(format!(
+        "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
+        scene.display()
+    ))
 }
 
 /// Starts the farm and a viewer over it.

@@ -1,8 +1,11 @@
 //! Reports of runs, as one line of JSON.
 
+mod knobs;
+
 use std::io::{self, Write};
 use std::time::Duration;
 
+pub(crate) use knobs::Knobs;
 use serde::Serialize;
 
 use crate::accounting::AccountReport;
@@ -10,7 +13,6 @@ use crate::error::CommandError;
 use crate::farm::Verification;
 use crate::quantile::{percentile, round_to_us};
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame};
-use crate::viewer::view_request::Knobs;
 
 /// Report of a `render` run; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,8 +1,8 @@
 use rayfarm_tracer::scene::RenderScale;
 
 use super::*;
+use crate::farm::ViewRequest;
 use crate::test_scene;
-use crate::viewer::view_request::ViewRequest;
 
 fn ms(values: &[u64]) -> Vec<Duration> {
     values.iter().copied().map(Duration::from_millis).collect()
@@ -26,7 +26,7 @@ fn the_json_line_has_the_documented_shape() {
         width: 64,
         height: 48,
         samples: 4,
-        quality: full.knobs(),
+        quality: Knobs::of(full.setting()),
         workers: 1,
         threads: 2,
         triangles: 12,
@@ -43,7 +43,7 @@ fn the_json_line_has_the_documented_shape() {
         serde_json::to_string(&report).unwrap(),
         concat!(
             r#"{"frames":2,"skipped":1,"fps":12.5,"width":64,"height":48,"samples":4,"quality":"#,
-            r#"{"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","scale":1.0,"adaptive":false,"dither":false},"#,
+            r#"{"scale":1.0,"adaptive":false,"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","dither":false},"#,
             r#""workers":1,"threads":2,"triangles":12,"#,
             r#""rays_per_frame":{"primary":12288,"shadow":7,"secondary":0},"#,
             r#""ms_per_frame":{"min":1.5,"median":2.0,"p95":2.45,"max":2.5},"#,

@@ -93,8 +93,8 @@ pub(super) struct Figures {
     pub(super) samples: u32,
     /// Lines of the quality controller.
     pub(super) quality: Vec<String>,
-    /// A text for each knob that is not at full quality.
-    pub(super) reductions: Vec<String>,
+    /// Labels of all knobs that are not at full quality.
+    pub(super) reductions: Vec<&'static str>,
     /// Connected workers.
     pub(super) workers: usize,
     /// Render threads of all workers.
@@ -111,7 +111,8 @@ impl Figures {
         let mut lines = vec![self.speed()];
         let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
-        lines.extend(self.quality.iter().chain(&self.reductions).cloned());
+        lines.extend(self.quality.iter().cloned());
+        lines.extend(self.reductions.iter().copied().map(str::to_owned));
         lines.push(format!(
             "{}, {}",
             counted(self.workers as u64, "worker"),

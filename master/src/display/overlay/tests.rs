@@ -59,10 +59,11 @@ fn figures_are_legible_on_the_canvas() {
 
 #[test]
 fn the_quality_controller_and_every_reduced_knob_have_a_line() {
-    let reductions = vec!["scale 1/2".to_owned(), "no shadows".to_owned()];
+    let reductions = ["scale 1/2", "no shadows"];
     let quality = vec!["moving: loses FLIP 0.050".to_owned()];
-    let lines = Figures { quality: quality.clone(), reductions: reductions.clone(), ..figures() }.lines();
-    let expected = [&figures().lines()[..2], &quality, &reductions, &figures().lines()[2..]].concat();
+    let lines = Figures { quality: quality.clone(), reductions: reductions.to_vec(), ..figures() }.lines();
+    let expected =
+        [&figures().lines()[..2], &quality, &reductions.map(str::to_owned), &figures().lines()[2..]].concat();
     assert_eq!(lines, expected);
 }
 

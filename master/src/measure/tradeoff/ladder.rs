@@ -2,10 +2,10 @@
 
 use rayfarm_tracer::scene::RenderScale;
 
-use super::setting::Setting as Measured;
+use super::setting::MeasuredSetting;
 use super::table::{Row, Table};
-use crate::viewer::quality_controller::{Ladder, Origin, Rung, Setting, bytes, continued};
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::ViewRequest;
+use crate::viewer::quality_controller::{Ladder, Origin, Rung, bytes, continued};
 
 /// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
 /// losses are differences to its mean FLIP error.
@@ -14,7 +14,7 @@ use crate::viewer::view_request::ViewRequest;
 /// In words: a table without a row for the picture at rest, or a picture at rest with a reduced knob. The table's errors are
 /// differences to the picture with every knob at full quality, not to a reduced one.
 pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, String> {
-    let turned = wanted.reductions();
+    let turned = wanted.setting().reductions();
     if !turned.is_empty() {
         return Err(format!(
             "was measured against pictures with every knob at full quality, and this one is at rest with {}: leave that out, or \
@@ -22,7 +22,7 @@ pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, Stri
             turned.join(", ")
         ));
     }
-    let known = |name: &str| Measured::named(name).map(|setting| setting.applied_to(&wanted.view));
+    let known = |name: &str| MeasuredSetting::named(name).map(|setting| setting.applied_to(&wanted.view));
     let is_at_rest = |request: &ViewRequest| request == wanted;
     let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(is_at_rest));
     let Some(full) = full else {
@@ -37,7 +37,7 @@ pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, Stri
     let rungs = table.rows.iter().chain(&small).filter_map(|row| {
         let request = known(&row.setting).filter(|request| is_below(request, wanted))?;
         let cost = row.median_ms / full.median_ms;
-        let (setting, wire) = (Setting::of(&request), bytes(&request) / bytes(wanted));
+        let (setting, wire) = (request.setting(), bytes(&request) / bytes(wanted));
         Some(Rung { setting, cost, wire, loss: (row.flip - full.flip).max(0.0) })
     });
     Ok(Ladder::of(rungs, Origin::Measured))
@@ -61,7 +61,7 @@ fn small_rows(table: &Table) -> Vec<Row> {
 
 /// Whether a request is the other one with some knobs reduced and none raised.
 fn is_below(request: &ViewRequest, wanted: &ViewRequest) -> bool {
-    Setting::of(request).applied(wanted) == *request && request != wanted
+    wanted.at_most(&request.setting()) == *request && request != wanted
 }
 
 #[cfg(test)]
@@ -101,9 +101,9 @@ mod tests {
         assert_eq!(figures.len(), 4, "{figures:?}");
         assert_eq!(figures[0], (1.0, 0.0));
         assert!((figures[1].0 - 0.5).abs() < 1e-9 && (figures[1].1 - 0.002).abs() < 1e-9, "{figures:?}");
-        let adaptive = ladder.rungs()[1].setting.applied(&wanted).view;
+        let adaptive = wanted.at_most(&ladder.rungs()[1].setting).view;
         assert!(adaptive.quality.adaptive && adaptive.samples == 4);
-        let last = ladder.cheapest().applied(&wanted);
+        let last = wanted.at_most(&ladder.cheapest());
         assert_eq!((last.scale, last.view.samples), (RenderScale::Half, 1));
     }
 

@@ -7,7 +7,7 @@ use rayfarm_tracer::image::{self, FlipMap, PIXELS_PER_DEGREE, RgbImage};
 use rayfarm_tracer::scene::{FrameView, MAX_SAMPLES};
 use rayfarm_tracer::{CompiledScene, PreparedFrame};
 
-use super::setting::Setting;
+use super::setting::MeasuredSetting;
 use super::table::Row;
 use crate::error::CommandError;
 use crate::in_process::trace;
@@ -38,7 +38,7 @@ pub(crate) struct Compared {
 impl MeasureContext<'_> {
     /// View of the reference: full quality with the largest number of samples.
     pub(crate) fn reference_view(&self) -> FrameView {
-        FrameView { samples: MAX_SAMPLES, ..Setting::plain().applied_to(&self.view).view }
+        FrameView { samples: MAX_SAMPLES, ..MeasuredSetting::plain().applied_to(&self.view).view }
     }
 
     /// Renders the reference picture. `done` receives the number of rows that were rendered since the last call.
@@ -53,11 +53,15 @@ impl MeasureContext<'_> {
     ///
     /// # Errors
     /// The measurement was cancelled.
-    pub(crate) fn compare(&self, setting: &Setting, reference: &RgbImage) -> Result<Compared, CommandError> {
+    pub(crate) fn compare(
+        &self,
+        setting: &MeasuredSetting,
+        reference: &RgbImage,
+    ) -> Result<Compared, CommandError> {
         let picture = self.picture(setting)?;
         let difference = image::compare(reference, &picture).map_err(CommandError::failed)?;
         let errors = image::flip(reference, &picture, PIXELS_PER_DEGREE).map_err(CommandError::failed)?;
-        let row = Row::new(setting.name(), &difference, errors.mean());
+        let row = Row::new(setting.name.to_owned(), &difference, errors.mean());
         Ok(Compared { picture, errors, row })
     }
 
@@ -68,7 +72,7 @@ impl MeasureContext<'_> {
     /// The measurement was cancelled.
     pub(crate) fn time_round(
         &self,
-        settings: &[Setting],
+        settings: &[MeasuredSetting],
         times: &mut [Vec<Duration>],
         backward: bool,
         done: &dyn Fn(),
@@ -84,7 +88,7 @@ impl MeasureContext<'_> {
     }
 
     /// The picture under a setting, in its full size.
-    fn picture(&self, setting: &Setting) -> Result<RgbImage, CommandError> {
+    fn picture(&self, setting: &MeasuredSetting) -> Result<RgbImage, CommandError> {
         let wanted = setting.applied_to(&self.view);
         wanted.delivered(self.render(&wanted.rendered(), &|_| ())?).map_err(CommandError::failed)
     }

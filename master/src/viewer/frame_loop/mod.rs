@@ -22,8 +22,7 @@ use super::quality_controller::QualityController;
 use super::requests::{Answered, RequestPolicy, Requests, ViewState};
 use super::sequence::{FrameSequence, SequenceFrame, SequencePlan, SequenceSender};
 use super::statistics::ViewerState;
-use super::view_request::ViewRequest;
-use crate::farm::{Farm, FarmError, FinishedFrame};
+use crate::farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 
 /// Interval at which displays receive the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
@@ -154,7 +153,7 @@ impl Viewer {
             }
             Err(error) => return Err(error.into()),
         };
-        let answered = self.requests.finished(frame.frame, &frame.view, frame.elapsed, &frame.account);
+        let answered = self.requests.finished(frame.frame, frame.elapsed, &frame.account);
         let line = self.figures.add(&frame);
         self.deliver(frame, answered);
         if let Some(log) = &mut self.log {
@@ -168,8 +167,8 @@ impl Viewer {
     }
 
     fn deliver(&self, frame: FinishedFrame, answered: Answered) {
-        let Answered { request, input_at, number, slot, quality } = answered;
-        let presented = PresentedFrame { frame, request, input_at, completed_at: Instant::now(), quality };
+        let Answered { input_at, number, slot, quality } = answered;
+        let presented = PresentedFrame { frame, input_at, completed_at: Instant::now(), quality };
         // Statistics come first, so that a display which draws the frame has those that include it.
         self.channels.publish_statistics(self.figures.snapshot());
         match &self.sequence {

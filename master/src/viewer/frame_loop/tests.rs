@@ -150,7 +150,7 @@ async fn a_moving_picture_is_reduced_and_the_picture_at_rest_is_full_to_the_last
     let moving = viewer.frame(turn, is_reduced).await;
     assert!(moving.quality[0].starts_with("moving: loses about FLIP 0."), "{:?}", moving.quality);
     assert!(is_picture(&moving.frame.view, &moving.frame.pixels));
-    assert_eq!(moving.request.rendered().width, moving.frame.view.width);
+    assert_eq!(moving.frame.request.rendered().width, moving.frame.view.width);
 
     let last = seen_by(turned(steps));
     let rests = viewer.frame(|_| (), |it| is_at_rest(it) && it.frame.view.camera == last.camera).await;

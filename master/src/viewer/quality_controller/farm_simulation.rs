@@ -4,7 +4,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3};
-use rayfarm_tracer::scene::{Attenuation, ColorDepth, FrameView, Light, LightKind, RenderScale, Shading};
+use rayfarm_tracer::scene::{
+    Attenuation, ColorDepth, FrameView, Light, LightKind, RenderScale, Shading, Sphere,
+};
 
 use super::*;
 use crate::accounting::{Parts, WorkerAccount};
@@ -86,6 +88,7 @@ fn general(samples: u32) -> Ladder {
     let kind = LightKind::Point { position: DVec3::Y };
     scene.lights = vec![Light { kind, color: Vec3::ONE, attenuation: Attenuation::None, shadows: true }];
     scene.materials[0].specular = Vec3::ONE;
+    scene.spheres = vec![Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 }];
     prior_ladder(&scene, &wanted(samples))
 }
 
@@ -108,7 +111,10 @@ fn a_slow_wire_reduces_only_knobs_that_save_bytes() {
         let frames = simulation.frames(1000);
         assert_eq!(changes(&frames), 0, "{wire}, {seed}");
         let (rung, took) = frames[999];
-        assert!(rung.setting.shadows && rung.setting.shading == Shading::Full, "{wire}: {rung:?}");
+        assert!(
+            rung.setting.quality.shadows && rung.setting.quality.shading == Shading::Full,
+            "{wire}: {rung:?}"
+        );
         assert!(rung.wire < 0.6 && took < 1.1 / 30.0, "{wire}: {took} at {rung:?}");
     }
 }
@@ -118,8 +124,11 @@ fn where_the_smallest_scale_is_not_enough_colours_are_reduced_before_shadows_are
     let mut simulation = Simulation::new(general(1), 30.0, 0.01, 0.6);
     simulation.frames(SETTLING);
     let (rung, took) = simulation.frame();
-    assert_eq!((rung.setting.colors, rung.setting.scale), (ColorDepth::Reduced, RenderScale::Quarter));
-    assert!(rung.setting.shadows && took < 1.0 / 30.0, "{took} at {rung:?}");
+    assert_eq!(
+        (rung.setting.quality.colors, rung.setting.scale),
+        (ColorDepth::Reduced, RenderScale::Quarter)
+    );
+    assert!(rung.setting.quality.shadows && took < 1.0 / 30.0, "{took} at {rung:?}");
 }
 
 #[test]
@@ -148,7 +157,7 @@ fn the_controller_follows_a_wire_that_becomes_slow_and_fast_again() {
     simulation.wire = 0.3;
     simulation.frames(SETTLING);
     let (slow, took) = simulation.frame();
-    assert!(took < 1.05 / 30.0 && slow.setting.shadows, "{took} at {slow:?}");
+    assert!(took < 1.05 / 30.0 && slow.setting.quality.shadows, "{took} at {slow:?}");
     simulation.wire = 0.005;
     let last = *simulation.frames(2 * SETTLING).last().unwrap();
     assert!(last.1 < 1.05 / 30.0, "{last:?}");
@@ -161,7 +170,7 @@ fn the_room_keeps_its_shadows_while_a_setting_with_shadows_holds_the_rate() {
     let target = 1.0 / 60.0;
     for samples in [1, 4, 9, 16] {
         let ladder = room(samples);
-        let shadowed = ladder.rungs().iter().filter(|rung| rung.setting.shadows);
+        let shadowed = ladder.rungs().iter().filter(|rung| rung.setting.quality.shadows);
         let cheapest = shadowed.map(|rung| rung.cost).fold(1.0, f64::min);
         assert!(ladder.rungs().iter().any(|rung| rung.setting.scale == RenderScale::Quarter));
         for share in [0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 50.0] {
@@ -173,7 +182,7 @@ fn the_room_keeps_its_shadows_while_a_setting_with_shadows_holds_the_rate() {
                 let mut simulation = Simulation::new(ladder.clone(), 60.0, threads, wire);
                 simulation.noise = 0.1;
                 let frames = simulation.frames(1000);
-                let dark = frames.iter().filter(|(rung, _)| !rung.setting.shadows).count();
+                let dark = frames.iter().filter(|(rung, _)| !rung.setting.quality.shadows).count();
                 assert_eq!(dark, 0, "{samples} samples, {threads} s of threads, {wire} s of wire");
             }
         }

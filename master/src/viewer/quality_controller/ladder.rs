@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use super::setting::Setting;
+use rayfarm_tracer::scene::Setting;
 
 /// A setting with its cost and its loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rung {
-    /// Effect on the request.
+    /// Upper limits of the request's knobs.
     pub(crate) setting: Setting,
     /// Work of a frame, as a part of the full one's.
     pub(crate) cost: f64,

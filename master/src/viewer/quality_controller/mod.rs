@@ -12,9 +12,9 @@ mod costs;
 mod governor;
 mod ladder;
 mod prior;
-mod setting;
 mod small_scales;
 mod stillness;
+mod wire;
 
 #[cfg(test)]
 mod farm_simulation;
@@ -30,12 +30,12 @@ use governor::Governor;
 use ladder::Loss;
 pub(crate) use ladder::{Ladder, Origin, Rung};
 pub(crate) use prior::ladder as prior_ladder;
-pub(crate) use setting::{Setting, bytes};
 pub(crate) use small_scales::continued;
 use stillness::{Motion, Stillness};
+pub(crate) use wire::bytes;
 
 use crate::accounting::FrameAccount;
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::ViewRequest;
 
 /// Quality at which a frame is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,7 +123,7 @@ impl QualityController {
 
     /// Request for a frame of this mode.
     pub(crate) fn apply(&self, wanted: &ViewRequest, mode: QualityMode) -> ViewRequest {
-        self.rung(mode).map_or(*wanted, |rung| rung.setting.applied(wanted))
+        self.rung(mode).map_or(*wanted, |rung| wanted.at_most(&rung.setting))
     }
 
     /// Rung of a frame of this mode; `None` if the ladder has changed since the request.

@@ -6,11 +6,12 @@
 //! factor of four and more. The tables have no rows yet for the scales 1/3 and 1/4: their figures are extrapolated from those
 //! of 3/4 and 1/2.
 
-use rayfarm_tracer::scene::{ColorDepth, RenderScale, Scene, Shading};
+use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobValue};
+use rayfarm_tracer::scene::{Scene, SceneFeatures, Setting};
 
 use super::ladder::{Ladder, Origin, Rung};
-use super::setting::{Setting, bytes};
-use crate::viewer::view_request::ViewRequest;
+use super::wire::bytes;
+use crate::farm::ViewRequest;
 
 /// Effect of one knob: factor of time, and added mean FLIP error.
 #[derive(Clone, Copy, Debug)]
@@ -19,19 +20,29 @@ struct Effect {
     loss: f64,
 }
 
-const NONE: Effect = Effect { cost: 1.0, loss: 0.0 };
-const SCALES: [(RenderScale, Effect); 5] = [
-    (RenderScale::Full, NONE),
-    (RenderScale::ThreeQuarters, Effect { cost: 0.673, loss: 0.0062 }),
-    (RenderScale::Half, Effect { cost: 0.387, loss: 0.0135 }),
+impl Effect {
+    const NONE: Self = Self { cost: 1.0, loss: 0.0 };
+
+    /// Effect of a change from a value with the effect `before` to one with this effect.
+    fn compared_with(self, before: Self) -> Self {
+        Self { cost: self.cost / before.cost, loss: self.loss - before.loss }
+    }
+}
+
+/// Known effects of values, by slug. Other values are not on the ladder, except those of [`SAMPLING`].
+const EFFECTS: [(&str, Effect); 7] = [
+    ("scale-3-4", Effect { cost: 0.673, loss: 0.0062 }),
+    ("scale-1-2", Effect { cost: 0.387, loss: 0.0135 }),
     // Extrapolated from the two above (`small_scales`), not measured.
-    (RenderScale::Third, Effect { cost: 0.222, loss: 0.0244 }),
-    (RenderScale::Quarter, Effect { cost: 0.150, loss: 0.0354 }),
+    ("scale-1-3", Effect { cost: 0.222, loss: 0.0244 }),
+    ("scale-1-4", Effect { cost: 0.150, loss: 0.0354 }),
+    ("no-shadows", Effect { cost: 0.503, loss: 0.0868 }),
+    ("diffuse", Effect { cost: 0.971, loss: 0.0206 }),
+    // The effect on the threads; reduced colours relieve the wire.
+    ("reduced-colors", Effect { cost: 1.008, loss: 0.0523 }),
 ];
-const NO_SHADOWS: Effect = Effect { cost: 0.503, loss: 0.0868 };
-const DIFFUSE: Effect = Effect { cost: 0.971, loss: 0.0206 };
-/// Effect of reduced colours on the threads; they relieve the wire.
-const REDUCED: Effect = Effect { cost: 1.008, loss: 0.0523 };
+/// Knobs whose common effect is [`sampling`].
+const SAMPLING: [&str; 2] = ["samples", "adaptive"];
 /// Cost of a pixel without its samples, in samples.
 const PER_PIXEL: f64 = 0.38;
 /// Error of one sample per pixel compared with very many; that of n is smaller by the square root of n.
@@ -44,45 +55,46 @@ const ADAPTIVE_LOSS: f64 = 0.0011;
 
 /// General ladder for pictures of a scene.
 pub(crate) fn ladder(scene: &Scene, wanted: &ViewRequest) -> Ladder {
-    let mut rungs = Vec::new();
-    for (scale, samples) in
-        SCALES.iter().flat_map(|(scale, _)| sample_counts(wanted.view.samples).map(move |n| (*scale, n)))
-    {
-        for (adaptive, shadows) in [(false, true), (true, true), (false, false), (true, false)] {
-            for (shading, colors) in [Shading::Full, Shading::Diffuse]
-                .into_iter()
-                .flat_map(|shading| [ColorDepth::Exact, ColorDepth::Reduced].map(|colors| (shading, colors)))
-            {
-                let adaptive = adaptive && samples > 1;
-                let setting = Setting { samples, adaptive, scale, shadows, shading, colors, ..Setting::FULL };
-                rungs.push(rung(setting.for_scene(scene), wanted));
-            }
-        }
-    }
-    Ladder::of(rungs, Origin::General)
+    let features = SceneFeatures::of(scene);
+    let settings = settings(wanted.view.samples).into_iter();
+    Ladder::of(settings.map(|setting| rung(setting.without_idle(&features), wanted)), Origin::General)
 }
 
-/// Square numbers up to the requested number of samples.
-fn sample_counts(most: u32) -> impl Iterator<Item = u32> + Clone {
-    (1..=most.isqrt()).map(|side| side * side)
+/// All combinations of values whose effects are known, with at most `samples` rays per pixel.
+fn settings(samples: u32) -> Vec<Setting> {
+    KNOBS.iter().fold(vec![Setting::FULL], |settings, knob| {
+        let values: Vec<&KnobValue> =
+            knob.values.iter().rev().filter(|value| is_known(knob, value)).collect();
+        let combined = settings.iter().flat_map(|setting| values.iter().map(|value| with(value, *setting)));
+        combined.filter(|setting| setting.samples <= samples).collect()
+    })
+}
+
+/// Whether the effect of a value is known. The best value has none.
+fn is_known(knob: &Knob, value: &KnobValue) -> bool {
+    SAMPLING.contains(&knob.name) || value.slug.is_none_or(|slug| effect(slug).is_some())
+}
+
+/// The setting with another value of one knob.
+fn with(value: &KnobValue, mut setting: Setting) -> Setting {
+    value.apply(&mut setting);
+    setting
+}
+
+fn effect(slug: &str) -> Option<Effect> {
+    EFFECTS.iter().find(|(known, _)| *known == slug).map(|(_, effect)| *effect)
 }
 
 /// Expected cost and loss of a setting. A knob that the request reduces already has no effect.
 fn rung(setting: Setting, wanted: &ViewRequest) -> Rung {
-    let request = setting.applied(wanted);
-    let (full, quality) = (wanted.view.quality, request.view.quality);
-    let scale = |wanted: &ViewRequest| {
-        SCALES.iter().find(|(scale, _)| *scale == wanted.scale).map_or(NONE, |(_, effect)| *effect)
+    let request = wanted.at_most(&setting);
+    let (before, after) = (wanted.setting(), request.setting());
+    let of_knob = |knob: &Knob| {
+        let value = |setting| knob.value_of(setting).slug.and_then(effect).unwrap_or(Effect::NONE);
+        value(&after).compared_with(value(&before))
     };
-    let (before, after) = (scale(wanted), scale(&request));
-    let (all, fewer) = (sampling(wanted), sampling(&request));
-    let effects = [
-        Effect { cost: after.cost / before.cost, loss: after.loss - before.loss },
-        Effect { cost: fewer.cost / all.cost, loss: fewer.loss - all.loss },
-        if quality.shadows == full.shadows { NONE } else { NO_SHADOWS },
-        if quality.shading == full.shading { NONE } else { DIFFUSE },
-        if quality.colors == full.colors { NONE } else { REDUCED },
-    ];
+    let sampled = sampling(&after).compared_with(sampling(&before));
+    let effects: Vec<Effect> = std::iter::once(sampled).chain(KNOBS.iter().map(of_knob)).collect();
     Rung {
         setting,
         wire: bytes(&request) / bytes(wanted),
@@ -92,10 +104,10 @@ fn rung(setting: Setting, wanted: &ViewRequest) -> Rung {
 }
 
 /// Cost of a pixel's samples, in samples, and their error compared with very many.
-fn sampling(request: &ViewRequest) -> Effect {
-    let samples = f64::from(request.view.samples);
+fn sampling(setting: &Setting) -> Effect {
+    let samples = f64::from(setting.samples);
     let loss = ONE_SAMPLE / samples.sqrt();
-    if request.view.is_adaptive() {
+    if setting.quality.adaptive && setting.samples > 1 {
         Effect { cost: ADAPTIVE_PER_PIXEL + ADAPTIVE_PER_SAMPLE * samples, loss: loss + ADAPTIVE_LOSS }
     } else {
         Effect { cost: PER_PIXEL + samples, loss }
@@ -104,11 +116,11 @@ fn sampling(request: &ViewRequest) -> Effect {
 
 #[cfg(test)]
 mod tests {
-    use rayfarm_tracer::scene::FrameView;
+    use rayfarm_tracer::scene::{FrameView, RenderScale};
 
     use super::super::small_scales;
     use super::*;
-    use crate::measure::tradeoff::setting::Setting as Measured;
+    use crate::measure::tradeoff::setting::MeasuredSetting;
     use crate::measure::tradeoff::table::Table;
 
     const TABLES: [&[u8]; 5] = [
@@ -158,8 +170,8 @@ mod tests {
             ("samples-16+adaptive", "samples-16", 16),
         ] {
             let [costs, losses] = measured(setting, baseline);
-            let request = Measured::named(setting).unwrap().applied_to(&wanted(samples).view);
-            let expected = rung(Setting::of(&request), &wanted(samples));
+            let request = MeasuredSetting::named(setting).unwrap().applied_to(&wanted(samples).view);
+            let expected = rung(request.setting(), &wanted(samples));
             let (cost, loss) = (median(&costs), median(&losses));
             let what = format!("{setting}: expected {expected:?}, measured {costs:?} and {losses:?}");
             assert!((expected.cost / cost - 1.0).abs() < 0.15, "{what}");
@@ -168,11 +180,19 @@ mod tests {
     }
 
     #[test]
+    fn every_effect_is_of_a_value_of_the_table() {
+        let slugs: Vec<&str> =
+            KNOBS.iter().flat_map(|knob| knob.values).filter_map(|value| value.slug).collect();
+        assert!(EFFECTS.iter().all(|(slug, _)| slugs.contains(slug)));
+        assert!(SAMPLING.iter().all(|name| Knob::named(name).is_some()));
+    }
+
+    #[test]
     fn the_small_scales_are_extrapolated_from_the_larger_ones() {
-        let [full, three_quarters, half, third, quarter] = SCALES.map(|(_, effect)| effect);
-        let known = [full, three_quarters, half].map(|effect| (effect.cost, effect.loss));
-        for (effect, scale) in [(third, RenderScale::Third), (quarter, RenderScale::Quarter)] {
-            let (cost, loss) = small_scales::continued(known, scale);
+        let [three_quarters, half] = ["scale-3-4", "scale-1-2"].map(|slug| effect(slug).unwrap());
+        let known = [Effect::NONE, three_quarters, half].map(|effect| (effect.cost, effect.loss));
+        for (slug, scale) in [("scale-1-3", RenderScale::Third), ("scale-1-4", RenderScale::Quarter)] {
+            let (effect, (cost, loss)) = (effect(slug).unwrap(), small_scales::continued(known, scale));
             assert!((effect.cost - cost).abs() < 6e-4 && (effect.loss - loss).abs() < 6e-5, "{cost}, {loss}");
         }
     }
@@ -180,14 +200,15 @@ mod tests {
     #[test]
     fn adaptive_sampling_is_the_first_rung_that_saves_half_the_time() {
         let rungs = ladder(&crate::test_scene::scene(), &wanted(16));
-        let first = rungs.rungs().iter().find(|rung| rung.cost < 0.5).unwrap().setting.applied(&wanted(16));
+        let first = rungs.rungs().iter().find(|rung| rung.cost < 0.5).unwrap();
+        let first = wanted(16).at_most(&first.setting);
         assert!(first.view.quality.adaptive && first.view.samples == 16, "{first:?}");
         assert_eq!(first.scale, RenderScale::Full);
     }
 
     #[test]
     fn the_ladder_ends_at_one_sample_and_a_quarter_of_the_size() {
-        let last = ladder(&crate::test_scene::scene(), &wanted(256)).cheapest().applied(&wanted(256));
+        let last = wanted(256).at_most(&ladder(&crate::test_scene::scene(), &wanted(256)).cheapest());
         assert_eq!((last.view.samples, last.scale), (1, RenderScale::Quarter));
     }
 }

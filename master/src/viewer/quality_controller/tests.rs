@@ -1,4 +1,4 @@
-use rayfarm_tracer::scene::{ExponentPrecision, FrameView, RenderScale, Shading};
+use rayfarm_tracer::scene::{ExponentPrecision, FrameView, Quality, RenderScale, Setting, Shading};
 
 use super::*;
 use crate::test_scene;
@@ -99,17 +99,19 @@ fn no_knob_is_raised() {
     low.view.quality.shadows = false;
     low.view.quality.shading = Shading::Diffuse;
     low.view.quality.exponent = ExponentPrecision::Fast;
-    assert_eq!(Setting::FULL.applied(&low), low);
+    assert_eq!(low.at_most(&Setting::FULL), low);
     let lowest = Setting {
         samples: 1,
         scale: RenderScale::Half,
-        shadows: false,
-        shading: Shading::Diffuse,
-        exponent: ExponentPrecision::Fast,
-        ..Setting::FULL
+        quality: Quality {
+            shadows: false,
+            shading: Shading::Diffuse,
+            exponent: ExponentPrecision::Fast,
+            ..Quality::default()
+        },
     };
-    assert_eq!(lowest.applied(&wanted(4)).view.samples, 1);
-    assert_eq!(lowest.applied(&low), ViewRequest { view: FrameView { samples: 1, ..low.view }, ..low });
+    assert_eq!(wanted(4).at_most(&lowest).view.samples, 1);
+    assert_eq!(low.at_most(&lowest), ViewRequest { view: FrameView { samples: 1, ..low.view }, ..low });
 }
 
 #[test]
@@ -120,7 +122,7 @@ fn knobs_without_effect_on_a_scene_are_not_on_its_ladder() {
     let rungs = prior_ladder(&scene, &wanted(4));
     assert!(rungs.rungs().len() > 3);
     for rung in rungs.rungs() {
-        let Setting { shadows, shading, exponent, .. } = rung.setting;
+        let Quality { shadows, shading, exponent, .. } = rung.setting.quality;
         assert_eq!((shadows, shading, exponent), (true, Shading::Full, ExponentPrecision::Exact));
     }
     assert_eq!(rungs.cheapest().scale, RenderScale::Quarter);

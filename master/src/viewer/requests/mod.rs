@@ -4,14 +4,11 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use rayfarm_tracer::scene::{FrameView, RenderScale};
-
 use super::orbit::Animation;
 use super::quality_controller::{QualityController, QualityMode};
 use super::sequence::{SequencePlan, Slot};
-use super::view_request::ViewRequest;
 use crate::accounting::FrameAccount;
-use crate::farm::{Farm, FrameId};
+use crate::farm::{Farm, FrameId, ViewRequest};
 
 /// Requests in flight: the frame being rendered, and the next one, which workers begin when the first has no rows left.
 pub(crate) const OPEN_REQUESTS: usize = 2;
@@ -19,14 +16,14 @@ pub(crate) const OPEN_REQUESTS: usize = 2;
 /// Accepts requests for frames.
 pub(super) trait Renderer {
     /// Requests the next frame.
-    fn request(&self, view: FrameView) -> FrameId;
+    fn request(&self, request: ViewRequest) -> FrameId;
     /// Drops all requested frames.
     fn drop_requests(&self);
 }
 
 impl Renderer for Farm {
-    fn request(&self, view: FrameView) -> FrameId {
-        Self::request(self, view)
+    fn request(&self, request: ViewRequest) -> FrameId {
+        Self::request(self, request)
     }
 
     fn drop_requests(&self) {
@@ -74,8 +71,8 @@ pub(super) struct Requests {
 
 /// The last request.
 struct Requested {
-    view: FrameView,
-    /// View before the quality controller.
+    request: ViewRequest,
+    /// Request before the quality controller.
     wanted: ViewRequest,
     mode: Option<QualityMode>,
 }
@@ -95,11 +92,9 @@ impl Open {
     }
 }
 
-/// Properties of the request that a finished frame answers.
+/// Properties of a request that the farm does not know.
 #[derive(Debug)]
 pub(super) struct Answered {
-    /// The request, after the quality controller.
-    pub(super) request: ViewRequest,
     /// Time of the input that the frame answers.
     pub(super) input_at: Instant,
     /// Number of the frame in the animation.
@@ -143,22 +138,15 @@ impl Requests {
     }
 
     /// Records a finished frame. Frames finish in order: earlier requests were replaced and never finish.
-    pub(super) fn finished(
-        &mut self,
-        frame: FrameId,
-        view: &FrameView,
-        elapsed: Duration,
-        account: &FrameAccount,
-    ) -> Answered {
+    pub(super) fn finished(&mut self, frame: FrameId, elapsed: Duration, account: &FrameAccount) -> Answered {
         let now = Instant::now();
         let mut answer = None;
         while self.open.front().is_some_and(|open| open.frame <= frame) {
             answer = self.open.pop_front().filter(|open| open.frame == frame);
         }
         let Some(Open { mut answered, requested_at, mode, .. }) = answer else {
-            let request = ViewRequest { view: *view, scale: RenderScale::Full };
             self.moved_at = self.moved_at.filter(|&moved_at| moved_at > now);
-            return Answered { request, input_at: now, number: self.next, slot: None, quality: Vec::new() };
+            return Answered { input_at: now, number: self.next, slot: None, quality: Vec::new() };
         };
         self.moved_at = self.moved_at.filter(|&moved_at| moved_at > answered.input_at);
         let (now, requested_at) = (self.since_start(now), self.since_start(requested_at));
@@ -252,8 +240,8 @@ impl Requests {
                 None => return false,
             },
         };
-        let view = animation.view(&request.rendered(), number);
-        if !continuous && self.is_requested(&view, wanted, mode) {
+        let request = animation.request(&request, number);
+        if !continuous && self.is_requested(&request, wanted, mode) {
             return false;
         }
         if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
@@ -261,20 +249,20 @@ impl Requests {
         }
         // A request that replaces another one is as old as the camera that it shows.
         let input_at = self.moved_at.unwrap_or(now);
-        let answered = Answered { request, input_at, number, slot, quality: Vec::new() };
-        self.open.push_back(Open { frame: farm.request(view), answered, requested_at: now, mode });
-        self.requested = Some(Requested { view, wanted: *wanted, mode });
+        let answered = Answered { input_at, number, slot, quality: Vec::new() };
+        self.open.push_back(Open { frame: farm.request(request), answered, requested_at: now, mode });
+        self.requested = Some(Requested { request, wanted: *wanted, mode });
         self.next += 1;
         true
     }
 
-    /// Whether the last request serves for this view: it is the same, or only the quality controller's rung has changed
+    /// Whether the last request serves for this one: it is the same, or only the quality controller's rung has changed
     /// since then and nothing moves any more.
-    fn is_requested(&self, view: &FrameView, wanted: &ViewRequest, mode: Option<QualityMode>) -> bool {
+    fn is_requested(&self, request: &ViewRequest, wanted: &ViewRequest, mode: Option<QualityMode>) -> bool {
         let is_moving = |mode: Option<QualityMode>| mode.is_some_and(|mode| mode != QualityMode::Resting);
         self.requested.as_ref().is_some_and(|last| {
             let is_still = !self.policy.animation.is_moving() && last.wanted == *wanted;
-            last.view == *view || is_still && is_moving(last.mode) && is_moving(mode)
+            last.request == *request || is_still && is_moving(last.mode) && is_moving(mode)
         })
     }
 

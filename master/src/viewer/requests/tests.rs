@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 
+use rayfarm_tracer::scene::RenderScale;
+
 use super::*;
 use crate::test_scene;
 use crate::viewer::quality_controller::{Ladder, Origin};
@@ -9,17 +11,17 @@ use crate::viewer::quality_controller::{Ladder, Origin};
 const STILL: Animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };
 const SPINNING: Animation = Animation { spin: 1.0, ..STILL };
 
-/// Views that were requested, and the number of times that all were dropped.
+/// Requests, and the number of times that all were dropped.
 #[derive(Default)]
 struct Recorder {
-    views: RefCell<Vec<FrameView>>,
+    requests: RefCell<Vec<ViewRequest>>,
     dropped: RefCell<usize>,
 }
 
 impl Renderer for Recorder {
-    fn request(&self, view: FrameView) -> FrameId {
-        self.views.borrow_mut().push(view);
-        FrameId(self.views.borrow().len() as u64)
+    fn request(&self, request: ViewRequest) -> FrameId {
+        self.requests.borrow_mut().push(request);
+        FrameId(self.requests.borrow().len() as u64)
     }
 
     fn drop_requests(&self) {
@@ -53,9 +55,9 @@ impl View {
     /// Finishes the oldest frame and requests the next one.
     fn finish(&mut self) -> Answered {
         let open = self.requests.open.front().expect("a frame is in flight");
-        let (frame, view) = (open.frame, open.answered.request.rendered());
+        let frame = open.frame;
         let account = FrameAccount::default();
-        let answered = self.requests.finished(frame, &view, Duration::from_millis(1), &account);
+        let answered = self.requests.finished(frame, Duration::from_millis(1), &account);
         self.requests.after_finish(&self.recorder, &self.state);
         answered
     }
@@ -67,7 +69,7 @@ impl View {
     }
 
     fn count(&self) -> usize {
-        self.recorder.views.borrow().len()
+        self.recorder.requests.borrow().len()
     }
 }
 
@@ -95,7 +97,7 @@ fn each_view_of_a_moving_camera_is_requested_once_and_the_last_one_is_the_curren
     }
     view.finish_all();
     assert_eq!(view.count(), 6);
-    assert_eq!(view.recorder.views.borrow().last(), Some(&view.state.request.view));
+    assert_eq!(view.recorder.requests.borrow().last(), Some(&view.state.request));
     assert!(view.requests.at_rest().is_some());
 }
 
@@ -107,7 +109,7 @@ fn an_animation_keeps_two_requests_open() {
         view.finish();
     }
     assert_eq!(view.requests.at_rest(), None);
-    let spins: Vec<f64> = view.recorder.views.borrow().iter().map(|view| view.spin).collect();
+    let spins: Vec<f64> = view.recorder.requests.borrow().iter().map(|request| request.view.spin).collect();
     assert!(spins.windows(2).all(|pair| pair[1] == pair[0] + 1.0), "{spins:?}");
 }
 
@@ -130,11 +132,11 @@ fn a_hidden_display_requests_nothing_and_goes_on_where_it_was() {
     view.change(|state| state.request.view.width = 40);
     assert_eq!(view.count(), count);
     view.change(|state| state.hidden = false);
-    let views = view.recorder.views.borrow();
-    assert_eq!(views[count].width, 40);
-    let spins: Vec<f64> = views.iter().map(|view| view.spin).collect();
+    let requests = view.recorder.requests.borrow();
+    assert_eq!(requests[count].view.width, 40);
+    let spins: Vec<f64> = requests.iter().map(|request| request.view.spin).collect();
     assert_eq!(spins[..2], [0.0, 1.0]);
-    assert_eq!(views.len(), count + 2, "two are open again");
+    assert_eq!(requests.len(), count + 2, "two are open again");
 }
 
 #[test]
@@ -168,7 +170,7 @@ fn with_a_controller_the_full_picture_at_rest_is_requested_once() {
 }
 
 #[test]
-fn a_finished_frame_carries_the_request_that_it_answers() {
+fn the_farm_receives_the_request_with_its_scale_and_knobs() {
     for scale in RenderScale::ALL {
         let mut view = View::new(STILL, false, None);
         view.finish();
@@ -176,10 +178,7 @@ fn a_finished_frame_carries_the_request_that_it_answers() {
             state.request.scale = scale;
             state.request.view.quality.shadows = false;
         });
-        let requested = view.state.request;
-        // The view changes while the frame is in flight.
-        view.change(|state| state.request.view.quality.shadows = true);
-        assert_eq!(view.finish().request, requested);
+        assert_eq!(view.recorder.requests.borrow().last(), Some(&view.state.request));
     }
 }
 
@@ -205,6 +204,6 @@ fn a_sequence_requests_each_frame_of_its_plan_once_and_waits_for_slots() {
         }
     }
     assert_eq!(finished, numbers);
-    let spins: Vec<f64> = view.recorder.views.borrow().iter().map(|view| view.spin).collect();
+    let spins: Vec<f64> = view.recorder.requests.borrow().iter().map(|request| request.view.spin).collect();
     assert_eq!(spins, numbers.iter().map(|&number| number as f64).collect::<Vec<_>>());
 }

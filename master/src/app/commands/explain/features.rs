@@ -2,15 +2,18 @@
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::MeshMemory;
-use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Material, Shading};
+use rayfarm_tracer::scene::knobs::Knob;
+use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Material, RenderScale};
 use serde::Serialize;
 
 use super::super::source::Source;
 use crate::display::numbers::counted;
 
-/// Time that features add to a frame, in per cent: medians over pairs of scenes that differ in the feature alone, one thread
-/// with AVX-512. Other scenes have other percentages; these give the order of magnitude. `scripts/bench_tracer.sh` measures
-/// them.
+/// Origin of [`FeatureFacts::measured_percent`].
+pub(super) const MEASURED_ON: &str = "a ring of 100,352 triangles under one light, on one thread with AVX-512 \
+                                      (samples: instructions): the table of features of scripts/bench_tracer.sh";
+/// Time that features add to a frame of the scene [`MEASURED_ON`], in per cent. Other scenes have other percentages; these give
+/// the order of magnitude.
 const SHADOWS: f64 = 79.0;
 const SPECULAR: f64 = 1.6;
 const SMOOTH: f64 = 12.0;
@@ -27,7 +30,7 @@ pub(super) struct FeatureFacts {
     pub(super) asked_for: bool,
     /// Objects that use it.
     pub(super) why: String,
-    /// Time that it added to a frame where it was measured, in per cent.
+    /// Time that it added to a frame of another scene ([`MEASURED_ON`]), in per cent.
     pub(super) measured_percent: Option<f64>,
     /// Bytes in memory and once on the wire; for an unused feature, those that are saved.
     pub(super) bytes: usize,
@@ -36,7 +39,7 @@ pub(super) struct FeatureFacts {
 /// All features, used and unused.
 pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<FeatureFacts> {
     vec![
-        shadows(source, view),
+        shadows(source, compiled, view),
         specular(source, compiled, view),
         smooth(source, compiled),
         textures(source, compiled, view),
@@ -48,25 +51,27 @@ pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameVi
     ]
 }
 
-fn shadows(source: &Source, view: &FrameView) -> FeatureFacts {
+fn shadows(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
     let lights = &source.scene.lights;
     let casting = lights.iter().filter(|light| light.shadows).count();
     FeatureFacts {
         name: "shadows",
-        asked_for: casting > 0 && view.quality.shadows,
+        asked_for: compiled.features().at(&view.quality).shadows,
         why: format!(
             "{casting} of {} cast them{}",
             counted(lights.len() as u64, "light"),
-            turned_off(!view.quality.shadows)
+            turned_off("shadows", view)
         ),
         measured_percent: Some(SHADOWS),
         bytes: 0,
     }
 }
 
-/// Note on a feature that a knob turns off.
-fn turned_off(off: bool) -> &'static str {
-    if off { "; turned off" } else { "" }
+/// Note on a feature that the knob of this name turns off.
+fn turned_off(knob: &str, view: &FrameView) -> &'static str {
+    let setting = view.setting(RenderScale::Full);
+    let is_off = Knob::named(knob).is_some_and(|knob| knob.value_of(&setting).label.is_some());
+    if is_off { "; turned off" } else { "" }
 }
 
 fn specular(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
@@ -78,7 +83,7 @@ fn specular(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
         why: format!(
             "{specular} of {} have it{}",
             counted(materials.len() as u64, "material"),
-            turned_off(view.quality.shading == Shading::Diffuse)
+            turned_off("shading", view)
         ),
         measured_percent: Some(SPECULAR),
         bytes: 0,
@@ -215,7 +220,7 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
         "diffuse only: no directions to the viewer, no exponents"
     };
     kernels.push(format!("shading: {terms}, {}", counted(scene.lights.len() as u64, "light")));
-    if view.quality.shadows && scene.lights.iter().any(|light| light.shadows) {
+    if features.shadows {
         kernels.push(
             "shadows: the points of each tile as a tile of rays from each light that reaches one of them"
                 .to_owned(),

@@ -10,17 +10,17 @@ use std::io::{self, Write};
 use bytes::Bytes;
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
-use rayfarm_tracer::scene::{ColorDepth, FrameView};
+use rayfarm_tracer::scene::knobs::KNOBS;
+use rayfarm_tracer::scene::{ColorDepth, FrameView, Setting};
 use rayfarm_tracer::{CompiledScene, TILE_SIZE, simd_level};
 use serde::Serialize;
 
-use self::features::{FeatureFacts, features, kernels};
+use self::features::{FeatureFacts, MEASURED_ON, features, kernels};
 use super::source::Source;
 use crate::app::cli::ExplainArgs;
-use crate::app::reports::print_json;
+use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
-use crate::farm::Assets;
-use crate::viewer::view_request::{Knobs, ViewRequest};
+use crate::farm::{Assets, ViewRequest};
 
 /// Explanation of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,15 +31,19 @@ struct Explanation {
     samples: u32,
     /// Values of the knobs.
     quality: Knobs,
-    /// Knobs that are not at full quality.
+    /// Labels of all knobs that are not at full quality.
     #[serde(skip)]
-    reductions: Vec<String>,
+    reductions: Vec<&'static str>,
+    /// Names of the knobs whose values can change the picture.
+    knobs_with_effect: Vec<&'static str>,
     /// SIMD level of this machine.
     simd_level: &'static str,
     /// Triangles over all instances.
     triangles: u64,
     things: Things,
     features: Vec<FeatureFacts>,
+    /// Scene and machine of the features' percentages.
+    features_measured_on: &'static str,
     kernels: Vec<String>,
     meshes: Vec<MeshFacts>,
     textures: Vec<TextureFacts>,
@@ -129,7 +133,7 @@ struct Rays {
 /// A wrong scene.
 pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
     let source = Source::load(&args.scene, args.models, args.size)?;
-    let wanted = source.still_request(args.size, args.samples, &args.quality)?;
+    let wanted = source.still_request(args.size, &args.quality)?;
     let explanation = explain(&source, &wanted)?;
     if args.json {
         return print_json(&explanation);
@@ -152,12 +156,14 @@ fn explain(source: &Source, wanted: &ViewRequest) -> Result<Explanation, Command
         width: wanted.view.width,
         height: wanted.view.height,
         samples: view.samples,
-        quality: wanted.knobs(),
-        reductions: wanted.reductions(),
+        quality: Knobs::of(wanted.setting()),
+        reductions: wanted.setting().reductions(),
+        knobs_with_effect: knobs_with_effect(&compiled, &wanted.setting()),
         simd_level: simd_level(),
         triangles: compiled.triangle_count(),
         things,
         features: features(source, &compiled, view),
+        features_measured_on: MEASURED_ON,
         kernels: kernels(source, &compiled, view),
         meshes,
         textures,
@@ -165,6 +171,11 @@ fn explain(source: &Source, wanted: &ViewRequest) -> Result<Explanation, Command
         travel: travel(source, view)?,
         rays_per_frame_at_most: rays(&things, view),
     })
+}
+
+fn knobs_with_effect(scene: &CompiledScene, setting: &Setting) -> Vec<&'static str> {
+    let features = scene.features();
+    KNOBS.iter().filter(|knob| (knob.matters)(&features, setting)).map(|knob| knob.name).collect()
 }
 
 fn things(source: &Source) -> Things {

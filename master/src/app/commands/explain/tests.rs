@@ -124,6 +124,23 @@ fn a_feature_that_is_turned_off_is_not_in_use() {
 }
 
 #[test]
+fn only_knobs_that_can_change_the_picture_have_an_effect() {
+    assert_eq!(explained(BARE).knobs_with_effect, ["samples", "scale", "colors", "dither"]);
+    let more = BARE.replace("shadows = false", "shadows = true");
+    let more = more.replace("specular = [0, 0, 0]", "specular = [0.1, 0, 0], exponent = 10.5");
+    let more = more.replace("height = 48", "height = 48, samples = 4");
+    let expected = ["samples", "scale", "adaptive", "shadows", "shading", "exponent", "colors", "dither"];
+    let explanation = explained(&more);
+    assert_eq!(explanation.knobs_with_effect, expected);
+    assert!(text::text(&explanation).contains(&expected.join(", ")));
+}
+
+#[test]
+fn the_origin_of_percentages_is_named() {
+    assert!(text::text(&explained(BARE)).contains(features::MEASURED_ON));
+}
+
+#[test]
 fn transfers_are_the_bytes_on_the_wire() {
     let bare = explained(BARE);
     let assets = bare.meshes.iter().map(|mesh| mesh.bytes).sum::<usize>();

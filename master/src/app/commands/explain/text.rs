@@ -49,12 +49,13 @@ fn write_head(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     match explanation.reductions.join(", ") {
         reductions if reductions.is_empty() => Ok(()),
         reductions => writeln!(out, "not at full quality: {reductions}"),
-    }
+    }?;
+    writeln!(out, "knobs with an effect on it: {}", explanation.knobs_with_effect.join(", "))
 }
 
 fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     for (asked_for, title) in [
-        (true, "Features in use, with the time that each added where it was measured:"),
+        (true, "Features in use, with the time that each adds to the scene of the benchmarks:"),
         (false, "Features not in use, at no cost:"),
     ] {
         writeln!(out, "\n{title}")?;
@@ -73,7 +74,12 @@ fn write_features(out: &mut String, explanation: &Explanation) -> std::fmt::Resu
             writeln!(out, "  none")?;
         }
     }
-    Ok(())
+    writeln!(
+        out,
+        "\nPercentages are not of this scene. They were measured on {}.",
+        explanation.features_measured_on
+    )?;
+    writeln!(out, "The command tradeoff measures the knobs on this scene.")
 }
 
 fn write_meshes(out: &mut String, meshes: &[MeshFacts]) -> std::fmt::Result {

@@ -15,8 +15,7 @@ use crate::app::plan::Plan;
 use crate::app::progress::Progress;
 use crate::display::{Display, DisplayError};
 use crate::error::CommandError;
-use crate::farm::FinishedFrame;
-use crate::viewer::view_request::ViewRequest;
+use crate::farm::{FinishedFrame, ViewRequest};
 use crate::viewer::{FrameSequence, SequenceFrame, Slot, ViewerHandle};
 
 /// Interval at which the progress display shows the state of the farm.
@@ -80,12 +79,12 @@ impl FrameFiles {
 
     /// Hash of the pixels as they are delivered.
     fn hash(&self, frame: &FinishedFrame) -> Result<blake3::Hash, CommandError> {
-        if self.request.scale == RenderScale::Full {
+        if frame.request.scale == RenderScale::Full {
             return Ok(blake3::hash(&frame.pixels));
         }
         let FrameView { width, height, .. } = frame.view;
         let rendered = RgbImage { width, height, pixels: frame.pixels.to_vec() };
-        let delivered = self.request.delivered(rendered).map_err(CommandError::failed)?;
+        let delivered = frame.request.delivered(rendered).map_err(CommandError::failed)?;
         Ok(blake3::hash(&delivered.pixels))
     }
 
@@ -94,7 +93,7 @@ impl FrameFiles {
         if let Some(Unwritten { number, frame, _slot }) = self.unwritten.pop_front() {
             // A frame without a file keeps its memory, which serves a later frame.
             let FrameView { width, height, .. } = frame.view;
-            let request = self.request;
+            let request = frame.request;
             self.writer.write(number, || {
                 let rendered = RgbImage { width, height, pixels: frame.pixels.into_vec() };
                 move || request.delivered(rendered)

@@ -21,9 +21,8 @@ use crate::app::progress::Progress;
 use crate::app::reports::{RenderReport, print_json};
 use crate::display::Display;
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmOptions, FarmScene};
+use crate::farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 use crate::viewer::orbit::Animation;
-use crate::viewer::view_request::ViewRequest;
 use crate::viewer::{FrameLogFile, Viewer};
 
 mod files;

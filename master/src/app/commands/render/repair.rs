@@ -69,7 +69,7 @@ impl Run {
             while open.len() < OPEN_REQUESTS
                 && let Some(number) = waiting.pop_front()
             {
-                farm.request(self.animation.view(&self.files.request.rendered(), number));
+                farm.request(self.animation.request(&self.files.request, number));
                 open.push_back(number);
             }
             let frame = next(farm).await.map_err(|error| error.to_string())?;

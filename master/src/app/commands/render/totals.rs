@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use crate::accounting::RunAccount;
 use crate::app::plan::Plan;
-use crate::app::reports::{MsPerFrame, RenderReport, VerificationReport};
+use crate::app::reports::{Knobs, MsPerFrame, RenderReport, VerificationReport};
 use crate::display::numbers::three_digits;
 use crate::error::CommandError;
+use crate::farm::ViewRequest;
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame, mean};
-use crate::viewer::view_request::ViewRequest;
 use crate::viewer::{FrameLine, FrameLogFile, FrameRate, PresentedFrame};
 
 /// Sums over the frames of a run.
@@ -132,7 +132,7 @@ impl Totals {
             width: view.width,
             height: view.height,
             samples: view.samples,
-            quality: request.knobs(),
+            quality: Knobs::of(request.setting()),
             workers: self.workers,
             threads: self.threads,
             triangles: self.triangles,
