@@ -11,7 +11,7 @@ pub(crate) fn percentile(sorted: &[Duration], share: f64) -> Duration {
     sorted[below] + (sorted[above] - sorted[below]).mul_f64(place - below as f64)
 }
 
-/// Milliseconds with three decimals, the precision of the clocks.
+/// Time in milliseconds, rounded to microseconds.
 pub(crate) fn round_to_us(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e6).round() / 1e3
 }

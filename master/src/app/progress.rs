@@ -58,7 +58,7 @@ impl Progress {
         }
     }
 
-    /// Records that `done` frames are complete, at the current rate of `fps`.
+    /// Records that `done` frames are complete, at a current rate of `fps` frames per second.
     pub(crate) fn completed(&mut self, done: u64, fps: f64) {
         (self.done, self.fps) = (done, fps);
         self.bar.set_position(done);

@@ -15,9 +15,9 @@ use crate::ProtocolError;
 #[cfg(feature = "transport")]
 mod io;
 
-#[cfg(feature = "transport")]
 pub use crate::kind::Kind;
 pub(crate) use crate::kind::MAX_HEAD_BYTES;
+#[cfg(feature = "transport")]
 pub use io::{read_body, read_header};
 
 /// Number of bytes of a header.

@@ -89,7 +89,7 @@ impl<F, A> Job<F, A> {
         Self { lease, frame, reply, arrived, cancelled: AtomicBool::new(false), progress }
     }
 
-    /// Whether the job is cancelled, for good. Polled between tiles.
+    /// Whether the job is cancelled, which is permanent. Polled between tiles.
     pub(super) fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }

@@ -42,13 +42,13 @@ impl FrameAccount {
 pub struct WorkerAccount {
     /// Number assigned by the master; never reused.
     pub id: u64,
-    /// Its name.
+    /// Name of the worker.
     pub name: String,
-    /// Its render threads.
+    /// Number of render threads of the worker.
     pub threads: u32,
-    /// Its thread time, in parts.
+    /// Thread time of the worker, split into parts.
     pub parts: Parts,
-    /// Segments that it delivered.
+    /// Number of segments that the worker delivered.
     pub segments: u32,
     /// Rows of these segments.
     pub rows: u64,

@@ -54,7 +54,7 @@ pub struct Outcome {
     pub drained: bool,
 }
 
-/// The pixels of rows: a function of the view, x and y, like any picture.
+/// RGB8 test pixels of a range of rows, a function of view, x and y only.
 pub fn pixels(view: &FrameView, rows: Range<u32>) -> Vec<u8> {
     let seed = view.spin as u32 + (view.camera.position.x * 1e4).abs() as u32;
     let pixel = |x: u32, y: u32| [x as u8, y as u8, (seed + x * y) as u8];

@@ -51,7 +51,7 @@ pub(super) struct Worker {
     pub(super) leases: BTreeMap<(FrameId, u32), ActiveLease>,
     /// Leases that were revoked because they were overdue. A late answer is still accepted.
     pub(super) overdue: BTreeMap<(FrameId, u32), ActiveLease>,
-    /// Whether it may still render rows of a dropped lease, because the cancellation is not sent yet.
+    /// Whether the worker may still render rows of a dropped lease, because the cancellation is not sent yet.
     pub(super) stale: bool,
     /// Frames that were announced to it most recently.
     announced: [Option<FrameId>; KNOWN_FRAMES],

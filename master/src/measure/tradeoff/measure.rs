@@ -65,11 +65,11 @@ impl MeasureContext<'_> {
         Ok(Compared { picture, errors, row })
     }
 
-    /// Renders every setting once, in turn, and appends its time from the scene to the finished picture.
+    /// Renders every setting once and appends each duration, from preparation to the resized picture, to `times`.
     /// Alternating forward and backward rounds vary the neighbours of a setting.
     ///
     /// # Errors
-    /// The measurement was cancelled.
+    /// A frame that cannot be prepared or resized; a cancelled measurement.
     pub(crate) fn time_round(
         &self,
         settings: &[MeasuredSetting],

@@ -47,7 +47,7 @@ pub(crate) struct RequestPolicy {
     pub(crate) animation: Animation,
     /// Number of frames after which the run ends.
     pub(crate) limit: Option<u64>,
-    /// Whether frames are requested although nothing has changed and the display is hidden, as measurements need it.
+    /// Whether frames are requested even if nothing has changed and the display is hidden, for measurements.
     pub(crate) continuous: bool,
 }
 

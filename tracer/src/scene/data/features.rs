@@ -13,7 +13,7 @@ pub struct SceneFeatures {
     pub powers: bool,
     /// A material has a texture.
     pub textured: bool,
-    /// There is a texture on a material, and one that is not looked up at the nearest texel.
+    /// A material has a texture, and some texture of the scene has a filter other than nearest.
     pub filtered: bool,
     /// A material takes the colours of vertices.
     pub vertex_colors: bool,

@@ -7,7 +7,10 @@ use crate::scene::data::{RenderScale, Setting};
 use crate::scene::knobs::{KNOBS, Knob, KnobForm, KnobValue};
 use crate::scene::validate::is_sample_count;
 
-/// The setting of a `[render]` table: `default` where it has no key of a knob.
+/// Reads the knobs of a `[render]` table; a missing key keeps its value of `default`.
+///
+/// # Errors
+/// A value that the knob does not have; `adaptive = true` with one sample per pixel.
 pub(super) fn setting(table: Table<'_>, default: Setting) -> Read<Setting> {
     let mut setting = default;
     for knob in KNOBS {

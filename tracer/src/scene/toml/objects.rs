@@ -27,7 +27,7 @@ pub(crate) struct ModelText {
     pub(crate) file: PathBuf,
     /// Offset of the file's name in the text, for messages.
     pub(crate) at: usize,
-    /// Material that replaces the model's own materials.
+    /// Index of the material that replaces the model's own; `None` keeps them.
     pub(crate) material: Option<u32>,
     /// Offset of that material's name in the text.
     pub(crate) material_at: usize,

@@ -6,7 +6,7 @@ use toml::de::{DeTable, DeValue};
 use super::fault::{Fault, Read, shortened, suggestion};
 use super::value::Value;
 
-/// A table without unknown keys.
+/// Table of a scene file whose keys are all known.
 #[derive(Clone, Copy)]
 pub(super) struct Table<'t> {
     /// Name for messages: `[camera]`.
