@@ -25,8 +25,11 @@ pub(crate) use frame_log::{FrameLine, FrameLogError, FrameLogFile};
 pub(crate) use frame_loop::{Viewer, ViewerConfig};
 pub(crate) use frame_rate::FrameRate;
 pub(crate) use handle::{PresentedFrame, ViewerHandle};
+#[cfg(feature = "window")]
 pub(crate) use input_action::InputAction;
 pub(crate) use requests::{OPEN_REQUESTS, RequestPolicy};
 pub(crate) use sequence::{FrameSequence, SequenceFrame, Slot};
 pub(crate) use statistics::Statistics;
-pub(crate) use worker_command::{KICK_REASON, WorkerCommand};
+pub(crate) use worker_command::KICK_REASON;
+#[cfg(feature = "window")]
+pub(crate) use worker_command::WorkerCommand;

@@ -3,8 +3,7 @@
 //! Costs multiply and losses add up, knob by knob. That is a rough start: the costs are then estimated from the frames. The
 //! figures are medians of the tables in `models/tradeoff`, which `tradeoff` has written: of three example scenes, a bust of
 //! 99,938 triangles, and ten instances of it. Losses are FLIP against the same picture without the loss. Scenes differ by a
-//! factor of four and more. The tables have no rows yet for the scales 1/3 and 1/4: their figures are extrapolated from those
-//! of 3/4 and 1/2.
+//! factor of four and more. The scales 1/3 and 1/4 have a table of their own, `small-scales.csv`.
 
 use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobValue};
 use rayfarm_tracer::scene::{Scene, SceneFeatures, Setting};
@@ -33,9 +32,8 @@ impl Effect {
 const EFFECTS: [(&str, Effect); 7] = [
     ("scale-3-4", Effect { cost: 0.673, loss: 0.0062 }),
     ("scale-1-2", Effect { cost: 0.387, loss: 0.0135 }),
-    // Extrapolated from the two above (`small_scales`), not measured.
-    ("scale-1-3", Effect { cost: 0.222, loss: 0.0244 }),
-    ("scale-1-4", Effect { cost: 0.150, loss: 0.0354 }),
+    ("scale-1-3", Effect { cost: 0.206, loss: 0.0259 }),
+    ("scale-1-4", Effect { cost: 0.137, loss: 0.0321 }),
     ("no-shadows", Effect { cost: 0.503, loss: 0.0868 }),
     ("diffuse", Effect { cost: 0.971, loss: 0.0206 }),
     // The effect on the threads; reduced colours relieve the wire.
@@ -118,7 +116,6 @@ fn sampling(setting: &Setting) -> Effect {
 mod tests {
     use rayfarm_tracer::scene::{FrameView, RenderScale};
 
-    use super::super::small_scales;
     use super::*;
     use crate::measure::tradeoff::setting::MeasuredSetting;
     use crate::measure::tradeoff::table::Table;
@@ -187,13 +184,30 @@ mod tests {
         assert!(SAMPLING.iter().all(|name| Knob::named(name).is_some()));
     }
 
+    /// Least time in milliseconds and FLIP error of a setting, for each scene of `small-scales.csv`.
+    fn small_scales(setting: &str) -> Vec<(f64, f64)> {
+        let text = include_bytes!("../../../../models/tradeoff/small-scales.csv");
+        let records = csv::Reader::from_reader(text.as_slice()).into_records().map(Result::unwrap);
+        let rows = records.filter(|record| &record[5] == setting);
+        rows.map(|record| (record[6].parse().unwrap(), record[8].parse().unwrap())).collect()
+    }
+
     #[test]
-    fn the_small_scales_are_extrapolated_from_the_larger_ones() {
-        let [three_quarters, half] = ["scale-3-4", "scale-1-2"].map(|slug| effect(slug).unwrap());
-        let known = [Effect::NONE, three_quarters, half].map(|effect| (effect.cost, effect.loss));
-        for (slug, scale) in [("scale-1-3", RenderScale::Third), ("scale-1-4", RenderScale::Quarter)] {
-            let (effect, (cost, loss)) = (effect(slug).unwrap(), small_scales::continued(known, scale));
-            assert!((effect.cost - cost).abs() < 6e-4 && (effect.loss - loss).abs() < 6e-5, "{cost}, {loss}");
+    fn the_small_scales_have_the_median_measured_effect() {
+        let full = small_scales("samples-1");
+        assert_eq!(full.len(), 5);
+        for setting in ["scale-1-3", "scale-1-4"] {
+            let pairs: Vec<_> = small_scales(setting).into_iter().zip(&full).collect();
+            let median = |of: fn(&((f64, f64), &(f64, f64))) -> f64| {
+                let mut values: Vec<f64> = pairs.iter().map(of).collect();
+                values.sort_by(f64::total_cmp);
+                values[values.len() / 2]
+            };
+            let cost = median(|(scaled, full)| scaled.0 / full.0);
+            let loss = median(|(scaled, full)| scaled.1 - full.1);
+            let expected = effect(setting).unwrap();
+            assert!((expected.cost / cost - 1.0).abs() < 0.02, "{setting}: {expected:?}, measured {cost}");
+            assert!((expected.loss - loss).abs() < 1e-4, "{setting}: {expected:?}, measured {loss}");
         }
     }
 
