@@ -196,15 +196,15 @@ mod tests {
     fn the_small_scales_have_the_median_measured_effect() {
         let full = small_scales("samples-1");
         assert_eq!(full.len(), 5);
+        let median = |mut values: Vec<f64>| {
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2]
+        };
         for setting in ["scale-1-3", "scale-1-4"] {
-            let pairs: Vec<_> = small_scales(setting).into_iter().zip(&full).collect();
-            let median = |of: fn(&((f64, f64), &(f64, f64))) -> f64| {
-                let mut values: Vec<f64> = pairs.iter().map(of).collect();
-                values.sort_by(f64::total_cmp);
-                values[values.len() / 2]
-            };
-            let cost = median(|(scaled, full)| scaled.0 / full.0);
-            let loss = median(|(scaled, full)| scaled.1 - full.1);
+            let scaled = small_scales(setting);
+            assert_eq!(scaled.len(), full.len());
+            let cost = median(scaled.iter().zip(&full).map(|(scaled, full)| scaled.0 / full.0).collect());
+            let loss = median(scaled.iter().zip(&full).map(|(scaled, full)| scaled.1 - full.1).collect());
             let expected = effect(setting).unwrap();
             assert!((expected.cost / cost - 1.0).abs() < 0.02, "{setting}: {expected:?}, measured {cost}");
             assert!((expected.loss - loss).abs() < 1e-4, "{setting}: {expected:?}, measured {loss}");
