@@ -1,10 +1,34 @@
 //! The farm: frames are requested, workers render them, finished pictures come back.
 //!
-//! ```text
+//! # Example
+//!
+//! A small frame; `examples/embed.rs` is the same as a program.
+//!
+//! ```
+//! use rayfarm_farm::{Farm, FarmOptions, FarmScene};
+//! use rayfarm_tracer::scene::{self, FrameView};
+//! # use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
+//!
+//! # #[tokio::main]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let loaded = scene::load("../../models/lights.toml".as_ref())?;
+//! let view = FrameView { width: 64, height: 48, ..FrameView::of(&loaded.scene) };
+//! let scene = FarmScene { scene: loaded.scene, meshes: loaded.meshes, textures: loaded.textures };
+//! let listen = Some(([127, 0, 0, 1], 0).into());
+//! let options = FarmOptions { listen, ..FarmOptions::default() };
 //! let mut farm = Farm::start(options, scene).await?;
-//! farm.request(view);
+//! # let worker = WorkerOptions {
+//! #     master: farm.address().to_string(), threads: Some(1), name: "embedded".to_owned(), reconnect: false, once: true,
+//! #     asset_cache_bytes: 1 << 20, disk_cache: None, compress: None, share: Share::Off,
+//! # };
+//! # tokio::spawn(rayfarm_worker::run(worker, ShutdownHandle::new()));
+//!
+//! farm.request(view); // workers connect to `farm.address()`
 //! let frame = farm.finished().await?;
+//! assert_eq!(frame.pixels.len(), 64 * 48 * 3);
 //! farm.shut_down().await;
+//! # Ok(())
+//! # }
 //! ```
 //!
 //! The crate has no command line and no display. [`rayfarm_scheduler`] decides which worker renders which rows; this

@@ -2,6 +2,31 @@
 //!
 //! Pure: no clock, no socket, no image byte, no randomness. The same events at the same times give the same
 //! actions, so a simulation replays a failure from its seed.
+//!
+//! # Example
+//!
+//! One worker receives the first of two segments, and a second one as the next in its queue:
+//!
+//! ```
+//! use std::time::Duration;
+//!
+//! use rayfarm_scheduler::{Action, Event, FrameId, HostId, Scheduler, SegmentPolicy, WorkerId};
+//!
+//! let mut scheduler = Scheduler::new(SegmentPolicy::Static(16), 1 << 20);
+//! let now = Duration::ZERO;
+//! scheduler.handle(now, Event::WorkerJoined { worker: WorkerId(1), threads: 2, host: HostId(1) });
+//! let frame = FrameId(1);
+//! scheduler.handle(now, Event::FrameRequested { frame, width: 64, height: 32, tile_rows: 16 });
+//!
+//! let actions = std::iter::from_fn(|| scheduler.poll_action());
+//! let rows: Vec<(u32, u32)> = actions
+//!     .filter_map(|action| match action {
+//!         Action::Grant { lease, .. } => Some((lease.first_row, lease.row_count)),
+//!         _ => None,
+//!     })
+//!     .collect();
+//! assert_eq!(rows, [(0, 16), (16, 16)]);
+//! ```
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
