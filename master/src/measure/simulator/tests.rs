@@ -40,16 +40,23 @@ fn efficiency(workers: u32, costs: CostProfile, policy: SegmentPolicy) -> f64 {
     measure(&Setup { workers, costs, policy, frames: 120, ..Setup::default() }).unwrap().useful
 }
 
-#[test]
-fn efficiency_is_high() {
-    for costs in [CostProfile::Bust, CostProfile::Corner] {
-        for (workers, least) in [(1, 0.95), (8, 0.95), (32, 0.9), (128, 0.8)] {
-            let reached = efficiency(workers, costs.clone(), SegmentPolicy::Adaptive);
-            assert!(reached > least, "{costs:?} with {workers} workers: {reached}");
-        }
-        let reached = |policy| efficiency(8, costs.clone(), policy);
-        assert!(reached(SegmentPolicy::Adaptive) > reached(SegmentPolicy::Static(16)));
+fn assert_efficient(costs: &CostProfile) {
+    for (workers, least) in [(1, 0.95), (8, 0.95), (32, 0.9), (128, 0.8)] {
+        let reached = efficiency(workers, costs.clone(), SegmentPolicy::Adaptive);
+        assert!(reached > least, "{costs:?} with {workers} workers: {reached}");
     }
+    let reached = |policy| efficiency(8, costs.clone(), policy);
+    assert!(reached(SegmentPolicy::Adaptive) > reached(SegmentPolicy::Static(16)));
+}
+
+#[test]
+fn efficiency_is_high_with_costs_that_stay() {
+    assert_efficient(&CostProfile::Bust);
+}
+
+#[test]
+fn efficiency_is_high_with_costs_that_move() {
+    assert_efficient(&CostProfile::Corner);
 }
 
 #[test]
