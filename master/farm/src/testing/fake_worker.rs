@@ -68,24 +68,25 @@ pub fn is_picture(view: &FrameView, picture: &FramePixels) -> bool {
 
 /// Connects and shakes hands as a worker named "fake".
 pub async fn connect(address: SocketAddr, threads: u32) -> TcpStream {
+    connect_named(address, "fake", threads).await
+}
+
+async fn connect_named(address: SocketAddr, name: &str, threads: u32) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
-    let hello = Hello { name: "fake".into(), threads, simd: "none".into(), software: "test".into() };
+    let hello = Hello { name: name.into(), threads, simd: "none".into(), software: "test".into() };
     handshake::as_worker(&mut stream, &hello).await.unwrap();
     stream
 }
 
 /// Starts a worker with this name and one thread. It is connected when this returns.
 pub async fn start_named(address: SocketAddr, name: &str, script: Script) -> JoinHandle<Outcome> {
-    let mut stream = TcpStream::connect(address).await.unwrap();
-    let hello = Hello { name: name.into(), threads: 1, simd: "none".into(), software: "test".into() };
-    handshake::as_worker(&mut stream, &hello).await.unwrap();
+    let stream = connect_named(address, name, 1).await;
     tokio::spawn(run(stream, script))
 }
 
 /// Starts a worker with one thread. It is connected when this returns.
 pub async fn start(address: SocketAddr, script: Script) -> JoinHandle<Outcome> {
-    let stream = connect(address, 1).await;
-    tokio::spawn(run(stream, script))
+    start_named(address, "fake", script).await
 }
 
 async fn run(stream: TcpStream, mut script: Script) -> Outcome {
