@@ -155,12 +155,19 @@ fn compile_mesh(corners: Corners, count: usize) -> Duration {
 fn compile_spheres(ball: Ball, count: usize) -> Duration {
     let sphere = |index| {
         let (center, radius) = ball(index, count);
-        Sphere { center, radius, material: 0 }
+        Sphere { center, radius, material: 0, inside_out: false, uv_rotate: DVec3::ZERO }
     };
     let scene = Scene {
         ambient: glam::Vec3::ONE,
         render: RenderSettings::default(),
-        camera: Camera { position: DVec3::ONE, look_at: DVec3::ZERO, up: DVec3::Y, fov: 45.0, zoom: 1.0 },
+        camera: Camera {
+            position: DVec3::ONE,
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            fov: 45.0,
+            zoom: 1.0,
+            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+        },
         background: Background::Color(glam::Vec3::ZERO),
         lights: vec![],
         materials: vec![Material::NEUTRAL],
@@ -169,6 +176,8 @@ fn compile_spheres(ball: Ball, count: usize) -> Duration {
         spheres: (0..count).map(sphere).collect(),
         planes: vec![],
         triangles: vec![],
+        background_visible: true,
+        disks: Vec::new(),
     };
     least(|| {
         if let Err(error) = CompiledScene::new(scene.clone(), [], []) {

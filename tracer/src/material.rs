@@ -29,6 +29,61 @@ pub struct Material {
     pub unlit: bool,
     /// Whether vertex colours of the mesh, if it has any, are a factor of c_d.
     pub vertex_colors: bool,
+    /// A pattern of two colours, in place of c_d and its texture.
+    pub checker: Option<Checker>,
+    /// Texture that tilts shading normals. Valid only on geometry with texture coordinates.
+    pub normal_map: Option<NormalMap>,
+    /// c_r: share of light that is reflected as by a mirror, linear RGB from 0 to 1.
+    pub reflect: Vec3,
+    /// c_t: share of light that is transmitted, linear RGB from 0 to 1.
+    pub transmit: Vec3,
+    /// Index of refraction of the inside, above zero.
+    pub ior: f32,
+    /// Whether it is a sheet without an inside: rays are transmitted straight, and not absorbed.
+    pub thin: bool,
+    /// Whether c_r and c_t are weighted by the Fresnel shares of reflection and transmission.
+    pub fresnel: bool,
+    /// Share of light that is left after one world unit of way inside, linear RGB in (0, 1].
+    pub absorption: Vec3,
+    /// Whether it casts shadows: without, it lets all light through to what is behind.
+    pub casts_shadow: bool,
+}
+
+/// A pattern of cubes or squares in two colours.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Checker {
+    /// Linear RGB of the even and the odd cells.
+    pub colors: [Vec3; 2],
+    /// Side of a cell: in world units, or in repeats of texture coordinates.
+    pub size: f32,
+    /// What the cells are laid in.
+    pub space: CheckerSpace,
+}
+
+/// The space in which a [`Checker`] is laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CheckerSpace {
+    /// World units along the axes of the object, from its own origin: the pattern moves with it.
+    Object,
+    /// World units along the axes of the world: objects move through the pattern.
+    World,
+    /// Texture coordinates.
+    Uv,
+}
+
+impl CheckerSpace {
+    /// Each value with its word.
+    pub const WORDS: [(&'static str, Self); 3] =
+        [("object", Self::Object), ("world", Self::World), ("uv", Self::Uv)];
+}
+
+/// A texture of normals in tangent space (x along u, y along v, z outwards), each channel 2 c - 1 of its bytes' share.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NormalMap {
+    /// Index into [`crate::scene::Scene::textures`].
+    pub texture: u32,
+    /// Factor of x and y.
+    pub strength: f32,
 }
 
 impl Material {
@@ -43,11 +98,31 @@ impl Material {
         emission_texture: None,
         unlit: false,
         vertex_colors: false,
+        checker: None,
+        normal_map: None,
+        reflect: Vec3::ZERO,
+        transmit: Vec3::ZERO,
+        ior: 1.5,
+        thin: false,
+        fresnel: false,
+        absorption: Vec3::ONE,
+        casts_shadow: true,
     };
 
     /// All textures of the material, as indices into [`crate::scene::Scene::textures`].
     pub fn textures(&self) -> impl Iterator<Item = u32> {
-        [self.texture, self.cutout, self.emission_texture].into_iter().flatten()
+        let normals = self.normal_map.map(|map| map.texture);
+        [self.texture, self.cutout, self.emission_texture, normals].into_iter().flatten()
+    }
+
+    /// Whether it reflects or transmits light.
+    pub fn bounces(&self) -> bool {
+        self.reflect != Vec3::ZERO || self.transmit != Vec3::ZERO
+    }
+
+    /// Whether it transmits light.
+    pub fn is_transparent(&self) -> bool {
+        self.transmit != Vec3::ZERO
     }
 
     /// Whether the emission is not zero.

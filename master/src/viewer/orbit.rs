@@ -83,7 +83,14 @@ mod tests {
     use super::*;
 
     fn camera(position: DVec3, look_at: DVec3, up: DVec3) -> Camera {
-        Camera { position, look_at, up, fov: 40.0, zoom: 1.0 }
+        Camera {
+            position,
+            look_at,
+            up,
+            fov: 40.0,
+            zoom: 1.0,
+            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+        }
     }
 
     fn base() -> FrameView {

@@ -96,6 +96,8 @@ const LIGHT: Light = Light {
     color: Vec3::splat(0.6),
     attenuation: Attenuation::None,
     shadows: true,
+    radius: 0.0,
+    shadow_samples: None,
 };
 
 /// Geometry on the floor, with the same number of triangles in each case.
@@ -196,6 +198,7 @@ impl Setting {
             translate: translate * scale,
             rotate: DVec3::ZERO,
             scale: DVec3::splat(scale),
+            group: glam::DMat3::IDENTITY,
         };
         self.scene.models = places.iter().map(model).collect();
         let warnings = vec![];
@@ -237,6 +240,7 @@ fn ambient_only(width: u32, height: u32) -> Scene {
             up: DVec3::Y,
             fov: 42.0,
             zoom: 1.0,
+            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::ZERO),
         lights: vec![],
@@ -246,5 +250,7 @@ fn ambient_only(width: u32, height: u32) -> Scene {
         spheres: vec![],
         planes: vec![],
         triangles: vec![triangle([0, 1, 2]), triangle([0, 2, 3])],
+        background_visible: true,
+        disks: Vec::new(),
     }
 }

@@ -8,9 +8,17 @@ use super::Item;
 use crate::mesh::CompiledMesh;
 use crate::scene::{Model, Scene, rotation};
 
-/// The linear part of a model's placement: its scale, then its rotation, then `spin` degrees about y.
+/// The linear part of a model's placement: its scale, then its rotation, then its groups, then `spin` degrees about y.
 pub(crate) fn orientation(model: &Model, spin: f64) -> DMat3 {
-    rotation::about_y(spin) * rotation::of_model(model.rotate) * DMat3::from_diagonal(model.scale)
+    let own = rotation::of_model(model.rotate) * DMat3::from_diagonal(model.scale);
+    let grouped = if model.group == DMat3::IDENTITY { own } else { model.group * own };
+    rotation::about_y(spin) * grouped
+}
+
+/// Half the size on each axis of the box around a disk.
+pub(crate) fn disk_reach(normal: DVec3, radius: f64) -> DVec3 {
+    let along = normal * normal;
+    DVec3::from_array((DVec3::ONE - along).max(DVec3::ZERO).to_array().map(f64::sqrt)) * radius
 }
 
 /// Bounds of a box after a linear map and a translation.
@@ -39,6 +47,11 @@ pub(super) fn world_bounds(scene: &Scene, meshes: &[Arc<CompiledMesh>], item: It
         Item::Triangle(i) => {
             let [a, b, c] = scene.triangles[i].vertices;
             (a.min(b).min(c), a.max(b).max(c))
+        }
+        Item::Disk(i) => {
+            let disk = &scene.disks[i];
+            let reach = disk_reach(disk.normal, disk.radius);
+            (disk.center - reach, disk.center + reach)
         }
     }
 }
@@ -69,6 +82,7 @@ mod tests {
             translate: DVec3::ZERO,
             rotate,
             scale: DVec3::ONE,
+            group: glam::DMat3::IDENTITY,
         };
         assert_eq!(orientation(&model(DVec3::new(90.0, 0.0, 0.0)), 0.0) * DVec3::Y, DVec3::Z);
         assert_eq!(orientation(&model(DVec3::new(0.0, 90.0, 0.0)), 0.0) * DVec3::Z, DVec3::X);

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use crate::scene::Scene;
 
-/// An *item*: a primitive with bounds, a leaf of the scene's own tree. Models come first, then spheres, then triangles.
+/// An *item*: a primitive with bounds, a leaf of the scene's own tree. Models come first, then spheres, then triangles, then
+/// disks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Item {
     /// Index of a model.
@@ -13,6 +14,8 @@ pub(crate) enum Item {
     Sphere(usize),
     /// Index of a triangle of the scene file.
     Triangle(usize),
+    /// Index of a disk.
+    Disk(usize),
 }
 
 /// The numbering of the items of a scene.
@@ -21,17 +24,23 @@ pub(crate) struct Items {
     models: usize,
     spheres: usize,
     triangles: usize,
+    disks: usize,
 }
 
 impl Items {
     /// The numbering of a scene.
     pub(crate) fn of(scene: &Scene) -> Self {
-        Self { models: scene.models.len(), spheres: scene.spheres.len(), triangles: scene.triangles.len() }
+        Self {
+            models: scene.models.len(),
+            spheres: scene.spheres.len(),
+            triangles: scene.triangles.len(),
+            disks: scene.disks.len(),
+        }
     }
 
     /// Indices of all items.
     pub(crate) fn range(&self) -> Range<u32> {
-        0..(self.models + self.spheres + self.triangles) as u32
+        0..(self.models + self.spheres + self.triangles + self.disks) as u32
     }
 
     /// Index of the first plane: planes have no bounds, and their indices follow those of all items.
@@ -46,8 +55,10 @@ impl Items {
             Item::Model(index)
         } else if index < self.models + self.spheres {
             Item::Sphere(index - self.models)
-        } else {
+        } else if index < self.models + self.spheres + self.triangles {
             Item::Triangle(index - self.models - self.spheres)
+        } else {
+            Item::Disk(index - self.models - self.spheres - self.triangles)
         }
     }
 
@@ -57,6 +68,7 @@ impl Items {
             Item::Model(index) => index,
             Item::Sphere(index) => self.models + index,
             Item::Triangle(index) => self.models + self.spheres + index,
+            Item::Disk(index) => self.models + self.spheres + self.triangles + index,
         };
         index as u32
     }

@@ -22,7 +22,7 @@ use crate::scene::{Model, NormalMode, Scene, SceneFeatures, TextureMap, Validate
 use crate::texture::{Texture, TextureId};
 pub(crate) use attributes::AttributeUse;
 use attributes::{attribute_uses, has_texture};
-pub(crate) use bounds::{orientation, transformed_bounds};
+pub(crate) use bounds::{disk_reach, orientation, transformed_bounds};
 use bounds::{relative_boxes, world_bounds};
 pub(crate) use items::{Item, Items};
 

@@ -97,6 +97,7 @@ mod tests {
             up: DVec3::Y,
             fov: 90.0,
             zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
         };
         FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() }
     }

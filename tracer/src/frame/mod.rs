@@ -22,10 +22,10 @@ use glam::{DVec3, Vec3};
 
 use crate::bvh::WideNode;
 use crate::cancel::{IsCancelled, go_on, never};
-use crate::compile::{CompileError, CompiledScene, Item, Items, transformed_bounds};
+use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, transformed_bounds};
 use crate::light::EyeLight;
 use crate::scene::{Camera, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
-use crate::shape::{EyePlane, EyeSphere};
+use crate::shape::{EyeDisk, EyePlane, EyeSphere};
 use crate::simd::{self, Level};
 use crate::texture::Texture;
 
@@ -54,6 +54,7 @@ pub struct PreparedFrame {
     pub(crate) instances: Vec<Instance>,
     pub(crate) spheres: Vec<EyeSphere>,
     pub(crate) triangles: Vec<EyeTriangle>,
+    pub(crate) disks: Vec<EyeDisk>,
     pub(crate) planes: Vec<EyePlane>,
     /// Largest error bound of any surface, in eye units.
     pub(crate) coarsest: f64,
@@ -112,8 +113,10 @@ impl PreparedFrame {
             })
             .collect();
         go_on(cancelled)?;
-        let (triangles, planes) = (triangles(source, &to_eye), planes(source, &to_eye));
-        let coarsest = coarsest(&instances, &triangles, &planes);
+        let (triangles, disks, planes) =
+            (triangles(source, &to_eye), disks(source, &to_eye), planes(source, &to_eye));
+        let flat = disks.iter().map(|disk| &disk.plane).chain(&planes);
+        let coarsest = coarsest(&instances, &triangles, flat);
         instances.iter_mut().for_each(|instance| instance.set_drift(coarsest));
         let mut frame = Self {
             view: *view,
@@ -124,6 +127,7 @@ impl PreparedFrame {
             instances,
             spheres: spheres(source, &to_eye),
             triangles,
+            disks,
             planes,
             coarsest,
             lights: lights(source, &view.quality, &to_eye),
@@ -188,6 +192,11 @@ impl PreparedFrame {
                 let [a, b, c] = self.triangles[i].corners;
                 (a.min(b).min(c), a.max(b).max(c))
             }
+            Item::Disk(i) => {
+                let EyeDisk { center, radius, plane } = &self.disks[i];
+                let reach = disk_reach(plane.normal, *radius);
+                (*center - reach, *center + reach)
+            }
         };
         ((lo - BOX_PADDING).as_vec3(), (hi + BOX_PADDING).as_vec3())
     }
@@ -233,17 +242,31 @@ fn triangles(scene: &Scene, to_eye: &ToEye) -> Vec<EyeTriangle> {
 }
 
 fn planes(scene: &Scene, to_eye: &ToEye) -> Vec<EyePlane> {
-    let place = |plane: &crate::scene::Plane| {
-        let (normal, point) = (plane.normal.normalize_or_zero(), to_eye.point(plane.point));
-        let error = placement_rounding(&[plane.point], &[point], to_eye.unit);
-        EyePlane { normal, offset: normal.dot(point), error }
-    };
-    scene.planes.iter().map(place).collect()
+    scene.planes.iter().map(|plane| plane_through(plane.point, plane.normal, to_eye)).collect()
 }
 
-fn coarsest(instances: &[Instance], triangles: &[EyeTriangle], planes: &[EyePlane]) -> f64 {
+fn disks(scene: &Scene, to_eye: &ToEye) -> Vec<EyeDisk> {
+    let place = |disk: &crate::scene::Disk| EyeDisk {
+        center: to_eye.point(disk.center),
+        radius: disk.radius / to_eye.unit,
+        plane: plane_through(disk.center, disk.normal, to_eye),
+    };
+    scene.disks.iter().map(place).collect()
+}
+
+fn plane_through(point: DVec3, normal: DVec3, to_eye: &ToEye) -> EyePlane {
+    let (normal, placed) = (normal.normalize_or_zero(), to_eye.point(point));
+    let error = placement_rounding(&[point], &[placed], to_eye.unit);
+    EyePlane { normal, offset: normal.dot(placed), error }
+}
+
+fn coarsest<'a>(
+    instances: &[Instance],
+    triangles: &[EyeTriangle],
+    planes: impl Iterator<Item = &'a EyePlane>,
+) -> f64 {
     let of_instances = instances.iter().map(|instance| mesh_rounding(&instance.linear) + instance.error);
     let of_triangles = triangles.iter().map(|triangle| triangle.error);
-    let of_planes = planes.iter().map(|plane| plane.error);
+    let of_planes = planes.map(|plane| plane.error);
     of_instances.chain(of_triangles).chain(of_planes).fold(0.0, f64::max)
 }

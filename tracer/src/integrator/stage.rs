@@ -11,14 +11,16 @@ pub enum Stage {
     Shading,
     /// Shadow rays; once for each light with shadows that contributes to a point of the tile.
     Shadows,
+    /// Closest hits of reflected and transmitted rays; once a batch of them, only in scenes that bounce.
+    Secondary,
     /// Means of the samples of pixels, and their sRGB bytes.
     Encoding,
 }
 
 impl Stage {
     /// All stages, in the order of a tile.
-    pub const ALL: [Stage; 5] =
-        [Stage::Visible, Stage::Surfaces, Stage::Shading, Stage::Shadows, Stage::Encoding];
+    pub const ALL: [Stage; 6] =
+        [Stage::Visible, Stage::Surfaces, Stage::Shading, Stage::Shadows, Stage::Secondary, Stage::Encoding];
 }
 
 /// Receives stage changes. The implementation for `()` compiles to nothing.

@@ -100,6 +100,7 @@ impl PreparedFrame {
         match self.items.get(item) {
             Item::Sphere(index) => of(self.spheres[index].normal(ray.origin + ray.direction * t), 0.0),
             Item::Triangle(index) => of(self.triangles[index].normal, self.triangles[index].error),
+            Item::Disk(index) => of(self.disks[index].plane.normal, self.disks[index].plane.error),
             Item::Model(index) => {
                 let instance = &self.instances[index];
                 let corners = instance.mesh.corners(triangle);

@@ -30,7 +30,7 @@ impl PreparedFrame {
         match self.items.get(item) {
             Item::Model(index) => &self.instances[index].cutouts,
             Item::Triangle(index) if self.triangles[index].cut => &SINGLE,
-            Item::Triangle(_) | Item::Sphere(_) => &[],
+            Item::Triangle(_) | Item::Sphere(_) | Item::Disk(_) => &[],
         }
     }
 
@@ -49,7 +49,7 @@ impl PreparedFrame {
             Item::Triangle(index) => {
                 (scene.triangles[index].material, scene.triangles[index].uvs, Vec2::ZERO)
             }
-            Item::Sphere(_) => return true,
+            Item::Sphere(_) | Item::Disk(_) => return true,
         };
         let (Some(map), Some(uvs)) = (scene.materials[material as usize].cutout, uvs) else { return true };
         let (texture, map) = &self.textures()[map as usize];

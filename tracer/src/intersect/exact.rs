@@ -36,7 +36,7 @@ impl PreparedFrame {
     pub(super) fn rank(&self, PrimitiveId { item, triangle }: PrimitiveId) -> (u32, u32) {
         let position = match self.items.get(item) {
             Item::Model(index) => self.instances[index].mesh.source(triangle),
-            Item::Sphere(_) | Item::Triangle(_) => 0,
+            Item::Sphere(_) | Item::Triangle(_) | Item::Disk(_) => 0,
         };
         (item, position)
     }
@@ -57,7 +57,8 @@ impl PreparedFrame {
         }
         match self.items.get(item) {
             Item::Sphere(index) => self.spheres[index].intersect(ray.origin, ray.direction, own),
-            Item::Model(_) | Item::Triangle(_) if own => None,
+            Item::Model(_) | Item::Triangle(_) | Item::Disk(_) if own => None,
+            Item::Disk(index) => self.disks[index].intersect(ray.origin, ray.direction),
             Item::Triangle(index) => {
                 let EyeTriangle { corners, cut, .. } = &self.triangles[index];
                 let t = ShearedRay::new(ray.origin, ray.direction).intersect(corners)?;

@@ -31,6 +31,8 @@ pub enum Primitive {
     Sphere(usize),
     /// Index of a triangle of the scene file.
     Triangle(usize),
+    /// Index of a disk.
+    Disk(usize),
     /// Index of a plane.
     Plane(usize),
 }
@@ -57,7 +59,7 @@ impl PreparedFrame {
     /// Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013). Rays pass where alpha cuts a triangle out.
     /// Of surfaces that coincide within the rounding of their corners, the same one is hit everywhere: one of an item
     /// before one of an infinite plane, then one that faces the ray before one seen from behind, then the first in the
-    /// scene: models before spheres before triangles before planes, and in a mesh the first triangle of its file.
+    /// scene: models before spheres before triangles before disks before planes, and in a mesh the first triangle of its file.
     ///
     /// Returns `None` also for an origin or a direction that is not finite, or a direction whose largest component is not
     /// within 1e-100 to 1e100.
@@ -107,6 +109,7 @@ impl PreparedFrame {
             Item::Model(model) => Primitive::Model { model, triangle },
             Item::Sphere(index) => Primitive::Sphere(index),
             Item::Triangle(index) => Primitive::Triangle(index),
+            Item::Disk(index) => Primitive::Disk(index),
         }
     }
 
@@ -118,6 +121,7 @@ impl PreparedFrame {
             }
             Primitive::Sphere(index) => self.items.index_of(Item::Sphere(index)),
             Primitive::Triangle(index) => self.items.index_of(Item::Triangle(index)),
+            Primitive::Disk(index) => self.items.index_of(Item::Disk(index)),
             Primitive::Plane(index) => self.items.first_plane().saturating_add(index as u32),
         };
         PrimitiveId { item, triangle: 0 }

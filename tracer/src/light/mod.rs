@@ -150,7 +150,8 @@ mod tests {
     use crate::simd::{best, dispatch};
 
     fn light(kind: LightKind, attenuation: Attenuation) -> EyeLight {
-        let light = Light { kind, color: Vec3::ONE, attenuation, shadows: true };
+        let light =
+            Light { kind, color: Vec3::ONE, attenuation, shadows: true, radius: 0.0, shadow_samples: None };
         EyeLight::new(&light, |p| p, 1.0)
     }
 

@@ -61,6 +61,8 @@ fn sun(scene: &Scene, elevation: f64) -> Light {
         color: Vec3::ONE,
         attenuation: Attenuation::None,
         shadows: true,
+        radius: 0.0,
+        shadow_samples: None,
     }
 }
 

@@ -129,6 +129,7 @@ fn named(frame: &PreparedFrame, hit: &RayHit) -> String {
         }
         Primitive::Sphere(index) => format!("sphere {}", index + 1),
         Primitive::Triangle(index) => format!("triangle {} of the scene", index + 1),
+        Primitive::Disk(index) => format!("disk {}", index + 1),
         Primitive::Plane(index) => format!("plane {}", index + 1),
     }
 }

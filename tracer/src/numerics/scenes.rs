@@ -19,11 +19,29 @@ pub fn built_in() -> Result<Vec<Subject>, MeshError> {
     let plane = ground();
     let mut spheres = ground();
     for (x, z, radius) in [(-0.6, 0.0, 0.4), (0.5, 0.3, 0.3), (3.0, -9.0, 4.0), (0.1, 1.0, 0.01)] {
-        spheres.spheres.push(Sphere { center: DVec3::new(x, radius, z), radius, material: 0 });
+        spheres.spheres.push(Sphere {
+            center: DVec3::new(x, radius, z),
+            radius,
+            material: 0,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        });
     }
     // One is sunk into the ground, one is the ground.
-    spheres.spheres.push(Sphere { center: DVec3::new(0.3, 0.0, -1.2), radius: 0.5, material: 0 });
-    spheres.spheres.push(Sphere { center: DVec3::new(0.0, -1e6, 0.0), radius: 1e6 - 1e-3, material: 0 });
+    spheres.spheres.push(Sphere {
+        center: DVec3::new(0.3, 0.0, -1.2),
+        radius: 0.5,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    });
+    spheres.spheres.push(Sphere {
+        center: DVec3::new(0.0, -1e6, 0.0),
+        radius: 1e6 - 1e-3,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    });
 
     let (mesh, _) = CompiledMesh::compile(&torus(48, 32))?;
     let mut tori = ground();
@@ -35,6 +53,7 @@ pub fn built_in() -> Result<Vec<Subject>, MeshError> {
             translate: DVec3::new(x, 0.6, 0.0),
             rotate: DVec3::new(60.0, 25.0, 10.0),
             scale: DVec3::splat(0.6),
+            group: glam::DMat3::IDENTITY,
         });
     }
     let subject =
@@ -58,15 +77,25 @@ fn ground() -> Scene {
             up: DVec3::Y,
             fov: 45.0,
             zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::splat(0.3)),
-        lights: vec![Light { kind: light, color: Vec3::ONE, attenuation: Attenuation::None, shadows: true }],
+        lights: vec![Light {
+            kind: light,
+            color: Vec3::ONE,
+            attenuation: Attenuation::None,
+            shadows: true,
+            radius: 0.0,
+            shadow_samples: None,
+        }],
         materials: vec![Material::NEUTRAL],
         textures: Vec::new(),
         models: Vec::new(),
         spheres: Vec::new(),
-        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 0 }],
+        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 0, size: 1.0 }],
         triangles: Vec::new(),
+        background_visible: true,
+        disks: Vec::new(),
     }
 }
 

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
-use super::{LocalRays, PrimitiveId, Ray, RaySource, SurfaceSource};
+use super::{PrimitiveId, Ray, RaySource};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd};
+use crate::simd::{LANES, Lanes, Simd, each_bit};
 
 /// Up to sixteen rays of any origins and directions.
 #[derive(Clone)]
@@ -48,9 +48,40 @@ impl<'a> RayBlock<'a> {
         put(&mut self.direction, lane, ray.direction);
     }
 
+    /// Removes all rays.
+    pub(crate) fn clear(&mut self) {
+        self.live = 0;
+    }
+
     /// Upper end of a ray.
     pub(crate) fn t_max(&self, lane: usize) -> f64 {
         self.t_max[lane]
+    }
+
+    /// Directions in eye space, rounded.
+    #[inline(always)]
+    pub(crate) fn directions<S: Simd>(&self, simd: S) -> Vec3x16<S> {
+        Vec3x16::load(simd, &self.direction)
+    }
+
+    /// Origins in eye space, rounded.
+    #[inline(always)]
+    pub(crate) fn origins<S: Simd>(&self, simd: S) -> Vec3x16<S> {
+        Vec3x16::load(simd, &self.origin)
+    }
+
+    /// The live rays in the space of an instance's mesh, or in eye space.
+    pub(crate) fn local(&self, instance: Option<&Instance>) -> LocalBlock {
+        let Some(instance) = instance else {
+            return LocalBlock { origin: self.origin, direction: self.direction };
+        };
+        let mut local = LocalBlock { origin: [Lanes::ZERO; 3], direction: [Lanes::ZERO; 3] };
+        for lane in each_bit(self.live) {
+            let Ray { origin, direction } = instance.to_mesh(&self.rays[lane]);
+            put(&mut local.origin, lane, origin);
+            put(&mut local.direction, lane, direction);
+        }
+        local
     }
 }
 
@@ -72,49 +103,20 @@ impl RaySource for RayBlock<'_> {
     }
 }
 
-impl SurfaceSource for RayBlock<'_> {
-    const BLOCKS: usize = 1;
-    const COMMON_ORIGIN: bool = false;
-    type Local = LocalBlock;
-
-    #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, _: usize) -> Vec3x16<S> {
-        Vec3x16::load(simd, &self.direction)
-    }
-
-    #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, _: usize) -> Vec3x16<S> {
-        Vec3x16::load(simd, &self.origin)
-    }
-
-    fn local(&self, instance: Option<&Instance>) -> LocalBlock {
-        let Some(instance) = instance else {
-            return LocalBlock { origin: self.origin, direction: self.direction };
-        };
-        let mut local = LocalBlock { origin: [Lanes::ZERO; 3], direction: [Lanes::ZERO; 3] };
-        for (lane, ray) in self.rays.iter().enumerate() {
-            let Ray { origin, direction } = instance.to_mesh(ray);
-            put(&mut local.origin, lane, origin);
-            put(&mut local.direction, lane, direction);
-        }
-        local
-    }
-}
-
 /// A block of rays in the space of a mesh, rounded.
 pub(crate) struct LocalBlock {
     origin: [Lanes; 3],
     direction: [Lanes; 3],
 }
 
-impl LocalRays<RayBlock<'_>> for LocalBlock {
+impl LocalBlock {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, _: usize) -> Vec3x16<S> {
+    pub(crate) fn origins<S: Simd>(&self, simd: S) -> Vec3x16<S> {
         Vec3x16::load(simd, &self.origin)
     }
 
     #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, _: &RayBlock<'_>, _: usize) -> Vec3x16<S> {
+    pub(crate) fn directions<S: Simd>(&self, simd: S) -> Vec3x16<S> {
         Vec3x16::load(simd, &self.direction)
     }
 }

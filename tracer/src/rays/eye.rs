@@ -96,6 +96,11 @@ impl SurfaceSource for EyeTile<'_> {
         Vec3x16::splat(simd, [0.0; 3])
     }
 
+    #[inline(always)]
+    fn places(&self) -> &TileRays {
+        self.rays
+    }
+
     fn local(&self, instance: Option<&Instance>) -> LocalTile {
         let single = |v: DVec3| v.as_vec3().to_array();
         match instance {

@@ -9,8 +9,10 @@
 //!   eye          tiles of the camera
 //!   shadow       tiles of a point light, or of a directional one: its rays are parallel
 //!   block        any sixteen rays
+//!   batch        sixteen blocks, which are shaded as a tile is
 //! ```
 
+mod batch;
 mod block;
 mod eye;
 mod hit;
@@ -20,6 +22,7 @@ mod shadow;
 mod source;
 mod tile;
 
+pub(crate) use batch::{BATCH, RayBatch};
 pub(crate) use block::RayBlock;
 pub(crate) use eye::EyeTile;
 pub(crate) use hit::{HitBlock, NO_ITEM, PrimitiveId};

@@ -169,6 +169,7 @@ mod tests {
             up: DVec3::Y,
             fov: 90.0,
             zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
         };
         let quality = Quality::default();
         let rays =

@@ -3,7 +3,7 @@
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.
 
-use super::{PrimitiveId, Ray};
+use super::{PrimitiveId, Ray, TileRays};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, f32x16};
@@ -39,6 +39,9 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
 
     /// Origins of the rays of a block in eye space, rounded.
     fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
+
+    /// Places of the rays in the camera's picture.
+    fn places(&self) -> &TileRays;
 
     /// The rays in the space of an instance's mesh, or in eye space.
     fn local(&self, instance: Option<&Instance>) -> Self::Local;

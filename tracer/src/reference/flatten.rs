@@ -14,15 +14,16 @@ use crate::srgb;
 /// Half a step of an `f32`, relative to the number: corners of meshes are rounded to it, and are within [-1, 1].
 const HALF_STEP: f64 = 1.0 / (1 << 24) as f64;
 
-/// The primitives of a scene in world space relative to the camera: models, spheres, triangles, planes.
+/// The primitives of a scene in world space relative to the camera: models, spheres, triangles, disks,
+/// planes.
 pub(super) fn flatten(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameView) -> Vec<Primitive> {
     let eye = view.camera.position;
     let mut primitives = Vec::new();
     for (index, model) in scene.models.iter().enumerate() {
         let find = |id: MeshId| meshes.iter().find(|mesh| mesh.id() == id);
         let Some(mesh) = find(model.mesh) else { continue };
-        let turn = rotation([0.0, view.spin, 0.0]) * rotation(model.rotate.to_array());
-        let linear = turn * DMat3::from_diagonal(model.scale);
+        let own = rotation(model.rotate.to_array()) * DMat3::from_diagonal(model.scale);
+        let linear = rotation([0.0, view.spin, 0.0]) * model.group * own;
         let scale = libm::exp2(f64::from(mesh.exponent()));
         let place = |p: Vec3| linear * (p.as_dvec3() * scale + mesh.center()) + (model.translate - eye);
         let placed = digits(&[model.translate, linear * mesh.center(), linear * DVec3::splat(scale), eye]);
@@ -58,6 +59,13 @@ pub(super) fn flatten(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameV
         let error = digits(&triangle.vertices) + digits(&corners);
         let name = Name::Triangle(index);
         primitives.push(Primitive { shape, material: triangle.material, name, error, mirrored: false });
+    }
+    for (index, disk) in scene.disks.iter().enumerate() {
+        let (center, radius) = (disk.center - eye, disk.radius);
+        let shape = Shape::Disk { center, normal: disk.normal.normalize(), radius };
+        let error = digits(&[disk.center, center]);
+        let name = Name::Disk(index);
+        primitives.push(Primitive { shape, material: disk.material, name, error, mirrored: false });
     }
     for (index, plane) in scene.planes.iter().enumerate() {
         let shape = Shape::Plane { point: plane.point - eye, normal: plane.normal.normalize() };

@@ -17,6 +17,7 @@ impl Oracle {
                 Background::Gradient { bottom, top } => {
                     bottom.as_dvec3().lerp(top.as_dvec3(), (direction.y + 1.0) / 2.0)
                 }
+                Background::Sky(_) => DVec3::ZERO,
             };
         };
         let mut material = self.scene.materials[self.primitives[primitive].material as usize];

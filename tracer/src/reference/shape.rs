@@ -20,6 +20,7 @@ pub(super) struct Primitive {
 pub(super) enum Shape {
     Triangle { corners: [DVec3; 3], normals: Option<[DVec3; 3]>, skin: Skin },
     Sphere { center: DVec3, radius: f64 },
+    Disk { center: DVec3, normal: DVec3, radius: f64 },
     Plane { point: DVec3, normal: DVec3 },
 }
 
@@ -69,6 +70,7 @@ impl Shape {
                 corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max)
             }
             Shape::Sphere { center, radius } => center.abs().max_element() + radius,
+            Shape::Disk { center, radius, .. } => center.abs().max_element() + radius,
             Shape::Plane { point, normal } => point.dot(*normal).abs(),
         }
     }
@@ -113,6 +115,11 @@ impl Shape {
                 let t = if t0 > near { t0 } else { t1 };
                 let normal = (origin + direction * t - center).normalize_or_zero();
                 (t > near).then_some(Crossing::plain(t, normal))
+            }
+            Shape::Disk { center, normal, radius } => {
+                let t = (center - origin).dot(normal) / direction.dot(normal);
+                let inside = (origin + direction * t - center).length() <= radius;
+                (inside && t > near && t.is_finite()).then_some(Crossing::plain(t, normal))
             }
             Shape::Plane { point, normal } => {
                 let t = (point - origin).dot(normal) / direction.dot(normal);

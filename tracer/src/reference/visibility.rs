@@ -63,6 +63,7 @@ impl Oracle {
         let (on, normal) = match primitive.shape {
             Shape::Triangle { corners: [a, b, c], .. } => (a, (b - a).cross(c - a).normalize_or_zero()),
             Shape::Plane { point, normal } => (point, normal),
+            Shape::Disk { center, normal, .. } => (center, normal),
             Shape::Sphere { .. } => return false,
         };
         let error = primitive.error + self.primitives[starts_on].error + 2.0 * F64_ERROR * point.length();

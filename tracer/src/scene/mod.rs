@@ -17,8 +17,8 @@ mod toml;
 mod validate;
 
 pub use data::{
-    Attenuation, Background, Camera, FrameView, Light, LightKind, Model, NormalMode, Plane, RenderSettings,
-    Scene, SceneFeatures, Sphere, Triangle,
+    Attenuation, Background, Camera, CameraKind, Disk, FovAxis, FrameView, Light, LightKind, Model,
+    NormalMode, Plane, RenderSettings, Scene, SceneFeatures, Sky, SkyPicture, Sphere, Triangle,
 };
 #[cfg(feature = "import")]
 pub use import::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError, Up};
@@ -26,11 +26,12 @@ pub use knobs::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setting, Sh
 #[cfg(feature = "import")]
 pub use load::{LoadLimits, LoadedScene, compile_model, compile_model_with, load, load_limited, load_with};
 pub use validate::{
-    MAX_COORDINATE, MAX_DEPTH, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SAMPLES,
-    MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, ValidateError,
+    MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_IOR, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS,
+    MAX_NORMAL_STRENGTH, MAX_PLANES, MAX_SAMPLES, MAX_SHADOW_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES,
+    MAX_TRIANGLES, ValidateError,
 };
 
 pub(crate) use crate::material::is_squared;
-pub use crate::material::{MAX_EXPONENT, Material};
+pub use crate::material::{Checker, CheckerSpace, MAX_EXPONENT, Material, NormalMap};
 pub use crate::rotation;
 pub use crate::texture::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};

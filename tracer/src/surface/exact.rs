@@ -29,7 +29,7 @@ impl SurfaceBlock {
             }
             Item::Triangle(index) => (frame.triangles[index].corners, false),
             // Never too thin.
-            Item::Sphere(_) => return,
+            Item::Sphere(_) | Item::Disk(_) => return,
         };
         let ray = rays.ray(block, lane);
         let ng = (b - a).cross(c - a).normalize_or(-ray.direction.normalize());
@@ -41,12 +41,12 @@ impl SurfaceBlock {
         self.set(lane, &ray, t, ng);
     }
 
-    /// Sets the points of rays on a sphere or a plane.
+    /// Sets the points of rays on a sphere, a disk or a plane. The front is on the side of the normal, unless `inverted`.
     pub(super) fn put_analytic<S: Simd, R: SurfaceSource>(
         &mut self,
         group: &Group<'_, R, S>,
         item: u32,
-        material: u32,
+        (material, inverted): (u32, bool),
         normal: impl Fn(DVec3) -> DVec3,
     ) {
         let &Group { rays, block, lanes, .. } = group;
@@ -57,7 +57,7 @@ impl SurfaceBlock {
             let ng = normal(ray.origin + ray.direction * t);
             let behind = ng.dot(ray.direction) > 0.0;
             let ng = if behind { -ng } else { ng };
-            self.set_front(1 << lane, u32::from(!behind) << lane);
+            self.set_front(1 << lane, u32::from(behind == inverted) << lane);
             self.set(lane, &ray, t, ng);
             self.material.0[lane] = material;
         }

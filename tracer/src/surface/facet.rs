@@ -184,7 +184,7 @@ impl Surfaces {
         if frame.features.smooth {
             group.put(simd, ng, &mut surface.ns);
         }
-        if frame.features.emissive {
+        if frame.features.sided {
             surface.set_front(lanes, bits(along.simd_lt(zero)));
         }
         let sound = bias.simd_le(splat(simd, f32::MAX)) & along.abs().simd_le(splat(simd, f32::MAX));
@@ -242,7 +242,7 @@ impl Batch {
                 space_of(kept, self.item, || Space::of_eye(rays))
             }
             // Spheres have no facets.
-            Item::Sphere(_) => return,
+            Item::Sphere(_) | Item::Disk(_) => return,
         };
         let [a, b, c] = corners;
         let to_a = a.sub(space.rays.origins(simd, 0));

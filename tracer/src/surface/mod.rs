@@ -44,7 +44,7 @@ pub(crate) struct SurfaceBlock {
     pub hit: u32,
     /// Bits of the hits that lights reach: not those of unlit materials.
     pub lit: u32,
-    /// Bits of the lanes that hit the front side. Only set if a material of the scene emits light.
+    /// Bits of the lanes that hit the front side. Only set if a material of the scene emits or transmits light.
     pub front: u32,
     /// Points in eye space.
     pub point: [Lanes; 3],
@@ -211,7 +211,7 @@ impl Surfaces {
                 facets.add(simd, block, item, lanes, triangles, |_| material);
                 true
             }
-            Item::Model(_) | Item::Triangle(_) | Item::Sphere(_) => false,
+            Item::Model(_) | Item::Triangle(_) | Item::Sphere(_) | Item::Disk(_) => false,
         }
     }
 
@@ -229,13 +229,19 @@ impl Surfaces {
         if item >= frame.items.first_plane() {
             let index = (item - frame.items.first_plane()) as usize;
             let (normal, material) = (frame.planes[index].normal, frame.scene().planes[index].material);
-            return self.blocks[group.block].put_analytic(group, item, material, |_| normal);
+            return self.blocks[group.block].put_analytic(group, item, (material, false), |_| normal);
         }
         match frame.items.get(item) {
             Item::Sphere(index) => {
                 let sphere = frame.spheres[index];
-                let material = frame.scene().spheres[index].material;
+                let described = &frame.scene().spheres[index];
+                let material = (described.material, described.inside_out);
                 self.blocks[group.block].put_analytic(group, item, material, |point| sphere.normal(point));
+            }
+            Item::Disk(index) => {
+                let (normal, material) =
+                    (frame.disks[index].plane.normal, frame.scene().disks[index].material);
+                self.blocks[group.block].put_analytic(group, item, (material, false), |_| normal);
             }
             Item::Triangle(index) => self.put_single_triangle(simd, group, hits, item, index, space),
             Item::Model(index) => self.put_model(simd, group, hits, item, index, space),

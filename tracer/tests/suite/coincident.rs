@@ -65,6 +65,7 @@ fn model(mesh: &CompiledMesh) -> Model {
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
+        group: glam::DMat3::IDENTITY,
     }
 }
 
@@ -72,7 +73,14 @@ fn model(mesh: &CompiledMesh) -> Model {
 fn dark_scene(eye: DVec3, look_at: DVec3) -> Scene {
     let mut scene = empty(SIDE, SIDE * 3 / 4);
     scene.background = Background::Color(Vec3::ZERO);
-    scene.camera = Camera { position: eye, look_at, up: DVec3::Y, fov: 55.0, zoom: 1.0 };
+    scene.camera = Camera {
+        position: eye,
+        look_at,
+        up: DVec3::Y,
+        fov: 55.0,
+        zoom: 1.0,
+        kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+    };
     scene.ambient = Vec3::splat(0.5);
     let flat = |diffuse| Material { diffuse, specular: Vec3::ZERO, exponent: 1.0, ..Material::NEUTRAL };
     scene.materials = vec![flat(Vec3::new(0.75, 0.15, 0.1)), flat(Vec3::splat(0.8))];
@@ -256,6 +264,7 @@ fn items_on_a_plane_are_visible() {
                 point: turn * DVec3::new(5.0, -3.0, 0.0),
                 normal: turn * DVec3::Z,
                 material: INSIDE,
+                size: 1.0,
             }];
             let bare = seen(&scene, &[]);
             let [lower, _] = fan(wall(), 0);

@@ -73,7 +73,7 @@ fn worst_error(center: DVec3, radius: f64, directions: impl IntoIterator<Item = 
     let mut scene = empty(8, 8);
     scene.camera.position = DVec3::ZERO;
     scene.camera.look_at = DVec3::NEG_Z;
-    scene.spheres = vec![Sphere { center, radius, material: 0 }];
+    scene.spheres = vec![Sphere { center, radius, material: 0, inside_out: false, uv_rotate: DVec3::ZERO }];
     let view = FrameView::of(&scene);
     let frame = PreparedFrame::new(Arc::new(CompiledScene::new(scene, [], []).unwrap()), &view).unwrap();
     let error = |direction: DVec3| {
@@ -155,6 +155,7 @@ fn with_model(mesh: &CompiledMesh, width: u32, height: u32) -> Scene {
         translate: DVec3::ZERO,
         rotate: DVec3::new(40.0, 10.0, 0.0),
         scale: DVec3::ONE,
+        group: glam::DMat3::IDENTITY,
     }];
     scene
 }

@@ -108,7 +108,14 @@ fn dusk() -> Scene {
     let mut scene = analytic(320, 240);
     (scene.spheres, scene.planes, scene.triangles) = (Vec::new(), Vec::new(), Vec::new());
     let (position, look_at, up) = (glam::DVec3::ZERO, glam::DVec3::NEG_Z, glam::DVec3::Y);
-    scene.camera = Camera { position, look_at, up, fov: 10.0, zoom: 1.0 };
+    scene.camera = Camera {
+        position,
+        look_at,
+        up,
+        fov: 10.0,
+        zoom: 1.0,
+        kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+    };
     let [bottom, top] = [0.0, DUSK].map(glam::Vec3::splat);
     scene.background = Background::Gradient { bottom, top };
     scene

@@ -65,9 +65,27 @@ fn sizes_at_the_limits() {
 fn a_ground_sphere_of_a_million_and_a_speck_on_it() {
     let mut scene = empty(160, 120);
     scene.spheres = vec![
-        Sphere { center: DVec3::new(0.0, -1e6 - 1.0, 0.0), radius: 1e6, material: 2 },
-        Sphere { center: DVec3::new(0.0, 0.0, 0.0), radius: 0.8, material: 0 },
-        Sphere { center: DVec3::new(0.0, 0.45, 3.6), radius: 1e-6, material: 1 },
+        Sphere {
+            center: DVec3::new(0.0, -1e6 - 1.0, 0.0),
+            radius: 1e6,
+            material: 2,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        },
+        Sphere {
+            center: DVec3::new(0.0, 0.0, 0.0),
+            radius: 0.8,
+            material: 0,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        },
+        Sphere {
+            center: DVec3::new(0.0, 0.45, 3.6),
+            radius: 1e-6,
+            material: 1,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        },
     ];
     scene.lights = vec![light(point(3.0, 4.0, 1.0), 1.0, Attenuation::None)];
     assert_eq!(off_from_oracle(&scene, &[], &FrameView::of(&scene)), 0);

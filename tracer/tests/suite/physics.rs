@@ -29,7 +29,13 @@ fn lit_sphere(material: Material) -> Scene {
     let mut scene = empty(1, 1);
     scene.camera.position = DVec3::new(0.0, 0.0, 4.0);
     scene.materials = vec![material];
-    scene.spheres = vec![Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 }];
+    scene.spheres = vec![Sphere {
+        center: DVec3::ZERO,
+        radius: 1.0,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    }];
     scene.lights = vec![light(point(0.0, 0.0, 4.0), 1.0, Attenuation::None)];
     scene.ambient = Vec3::ZERO;
     scene
@@ -73,7 +79,7 @@ fn a_slanted_plane_follows_the_cosine() {
     let mut scene =
         lit_sphere(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, exponent: 1.0, ..Material::NEUTRAL });
     scene.spheres.clear();
-    scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, material: 0 }];
+    scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Z, material: 0, size: 1.0 }];
     let direction = DVec3::new(0.0, -libm::sqrt(0.75), -0.5);
     scene.lights = vec![light(LightKind::Directional { direction }, 1.0, Attenuation::None)];
     assert_eq!(middle(&scene), [code(0.5); 3]);
@@ -89,7 +95,13 @@ fn an_occluder_shades_unless_the_light_casts_no_shadows() {
     });
     scene.lights[0].kind = point(0.0, 6.0, 6.0);
     let lit = middle(&scene);
-    scene.spheres.push(Sphere { center: DVec3::new(0.0, 3.0, 3.5), radius: 0.4, material: 0 });
+    scene.spheres.push(Sphere {
+        center: DVec3::new(0.0, 3.0, 3.5),
+        radius: 0.4,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    });
     assert_eq!(middle(&scene), [0; 3]);
     scene.lights[0].shadows = false;
     assert_eq!(middle(&scene), lit);
@@ -105,7 +117,13 @@ fn objects_behind_a_light_do_not_shade() {
         ..Material::NEUTRAL
     });
     let lit = middle(&scene);
-    scene.spheres.push(Sphere { center: DVec3::new(0.0, 0.0, 9.0), radius: 1.0, material: 0 });
+    scene.spheres.push(Sphere {
+        center: DVec3::new(0.0, 0.0, 9.0),
+        radius: 1.0,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    });
     assert_eq!(middle(&scene), lit);
 }
 
@@ -144,7 +162,7 @@ fn no_acne_on_planes_spheres_and_coplanar_triangles_at_any_angle() {
         }
         let mut planar = scene.clone();
         planar.triangles.clear();
-        planar.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1 }];
+        planar.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1, size: 1.0 }];
         let mut unshadowed = scene.clone();
         unshadowed.lights[0].shadows = false;
         let view = FrameView::of(&scene);
@@ -171,6 +189,7 @@ fn no_acne_on_a_convex_mesh_under_any_light() {
             translate: DVec3::ZERO,
             rotate: DVec3::new(10.0, 20.0, 30.0),
             scale: DVec3::ONE,
+            group: glam::DMat3::IDENTITY,
         }];
         let mut unshadowed = scene.clone();
         unshadowed.lights[0].shadows = false;
@@ -306,8 +325,13 @@ fn rendering_stops_between_the_tiles_of_a_band() {
 fn cancelled_compilation_stops_at_every_step() {
     let mut scene = analytic(16, 16);
     let material = scene.spheres[0].material;
-    let sphere =
-        |i: u32| Sphere { center: DVec3::new(f64::from(i), f64::from(i % 7), 0.0), radius: 0.4, material };
+    let sphere = |i: u32| Sphere {
+        center: DVec3::new(f64::from(i), f64::from(i % 7), 0.0),
+        radius: 0.4,
+        material,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    };
     scene.spheres = (0..3_000).map(sphere).collect();
     let asked = AtomicUsize::new(0);
     let compile = |question: usize| {

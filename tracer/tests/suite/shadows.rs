@@ -24,6 +24,7 @@ fn model(mesh: &CompiledMesh, normals: NormalMode) -> Model {
         translate: DVec3::ZERO,
         rotate: DVec3::new(0.0, 25.0, 0.0),
         scale: DVec3::ONE,
+        group: glam::DMat3::IDENTITY,
     }
 }
 
@@ -95,12 +96,18 @@ fn wrong_anywhere(scene: &mut Scene, meshes: &[Arc<CompiledMesh>], step: usize) 
 fn no_acne_on_a_plane_and_spheres_at_grazing_light() {
     let mut scene = empty(60, 45);
     scene.ambient = Vec3::ZERO;
-    scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1 }];
+    scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1, size: 1.0 }];
     // One is on the ground, one is sunk into it, one is large and one is tiny.
     for (x, y, z, radius) in
         [(-0.6, 0.4, 0.0, 0.4), (0.5, 0.0, 0.3, 0.3), (3.0, 1.0, -9.0, 4.0), (0.1, 0.01, 1.0, 0.01)]
     {
-        scene.spheres.push(Sphere { center: DVec3::new(x, y, z), radius, material: 1 });
+        scene.spheres.push(Sphere {
+            center: DVec3::new(x, y, z),
+            radius,
+            material: 1,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        });
     }
     let found = wrong_anywhere(&mut scene, &[], 1);
     assert!(found.is_empty(), "darker, brighter: {found:#?}");
@@ -172,7 +179,7 @@ fn no_light_leaks_through_a_closed_mesh() {
         scene.ambient = Vec3::ZERO;
         scene.background = rayfarm_tracer::scene::Background::Color(Vec3::ZERO);
         scene.models = vec![model(&mesh, NormalMode::Flat)];
-        scene.planes = vec![Plane { point: DVec3::Y * -1.001, normal: DVec3::Y, material: 2 }];
+        scene.planes = vec![Plane { point: DVec3::Y * -1.001, normal: DVec3::Y, material: 2, size: 1.0 }];
         // Towards an edge: facets are inside the unit ball.
         let deepest = libm::cos(std::f64::consts::PI / f64::from(sectors)) * 0.9;
         let inside = [DVec3::ZERO, DVec3::new(0.3, -0.2, 0.1), DVec3::Y * 0.999, DVec3::X * deepest];
@@ -216,7 +223,7 @@ fn no_light_leaks_through_the_seams_of_a_wall() {
     scene.ambient = Vec3::ZERO;
     scene.background = rayfarm_tracer::scene::Background::Color(Vec3::ZERO);
     scene.models = vec![Model { rotate: DVec3::ZERO, ..model(&mesh, NormalMode::Flat) }];
-    scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 2 }];
+    scene.planes = vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 2, size: 1.0 }];
     // Straight from above, between floor and wall: pixels are at multiples of 1/64.
     scene.camera.position = DVec3::new(1.0 / 128.0, 0.25, 1.0 / 128.0);
     scene.camera.look_at = scene.camera.position - DVec3::Y;

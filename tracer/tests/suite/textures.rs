@@ -197,6 +197,7 @@ fn textured_instances_match_the_oracle() {
             translate: DVec3::new(x, 0.0, 0.0),
             rotate: DVec3::new(20.0, 70.0, 10.0),
             scale: scale.into(),
+            group: glam::DMat3::IDENTITY,
         };
         scene.models = vec![
             model(-1.2, [0.8; 3], NormalMode::Flat, vec![0, 1]),
@@ -241,6 +242,7 @@ fn mismatched_meshes_and_textures_are_refused() {
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
+        group: glam::DMat3::IDENTITY,
     }];
     let unfit = CompiledScene::new(scene.clone(), [bare.clone()], [texture.clone()]).unwrap_err().to_string();
     assert!(unfit.contains("without texture coordinates"), "{unfit}");

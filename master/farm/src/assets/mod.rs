@@ -164,6 +164,7 @@ mod tests {
             translate: DVec3::ZERO,
             rotate: DVec3::ZERO,
             scale: DVec3::ONE,
+            group: glam::DMat3::IDENTITY,
         };
         Scene { models: vec![model], ..test_scene::scene() }
     }

@@ -8,7 +8,14 @@ pub fn scene() -> Scene {
     Scene {
         ambient: Vec3::ZERO,
         render: RenderSettings { width: 32, height: 64, ..RenderSettings::default() },
-        camera: Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+        camera: Camera {
+            position: DVec3::Z,
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            fov: 40.0,
+            zoom: 1.0,
+            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+        },
         background: Background::Color(Vec3::ONE),
         lights: Vec::new(),
         materials: vec![Material::NEUTRAL],
@@ -17,6 +24,8 @@ pub fn scene() -> Scene {
         spheres: Vec::new(),
         planes: Vec::new(),
         triangles: Vec::new(),
+        background_visible: true,
+        disks: Vec::new(),
     }
 }
 

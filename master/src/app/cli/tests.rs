@@ -271,6 +271,7 @@ fn knobs_are_parsed_and_override_the_scene() {
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
             dither: true,
+            ..Quality::default()
         },
     };
     let args = render(&format!("rayfarm-master render a.toml -o b.png {all}")).picture.quality;

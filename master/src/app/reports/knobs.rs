@@ -76,6 +76,7 @@ mod tests {
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
             dither: true,
+            ..Quality::default()
         };
         assert_eq!(
             json(Setting { samples: 4, scale: RenderScale::Half, quality }),

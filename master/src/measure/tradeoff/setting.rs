@@ -47,7 +47,7 @@ const NAMES: [&str; 33] = [
 const PLAIN: &str = "samples-1";
 
 /// A setting with its name in tables.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MeasuredSetting {
     /// Name of lower-case letters, digits, `-` and `+`, so that it can be a file name.
     pub(crate) name: &'static str,
@@ -113,6 +113,13 @@ mod tests {
         cut_out: false,
         smooth: false,
         shadows: false,
+        bounces: false,
+        transparent: false,
+        sided: false,
+        shadowless: false,
+        soft_shadows: false,
+        checkered: false,
+        normal_mapped: false,
     };
     const EVERYTHING: SceneFeatures = SceneFeatures {
         specular: true,

@@ -9,6 +9,7 @@ fn home() -> Camera {
         up: DVec3::Y,
         fov: 40.0,
         zoom: 1.0,
+        kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
     }
 }
 

@@ -86,9 +86,22 @@ fn wanted(samples: u32) -> ViewRequest {
 fn general(samples: u32) -> Ladder {
     let mut scene = test_scene::scene();
     let kind = LightKind::Point { position: DVec3::Y };
-    scene.lights = vec![Light { kind, color: Vec3::ONE, attenuation: Attenuation::None, shadows: true }];
+    scene.lights = vec![Light {
+        kind,
+        color: Vec3::ONE,
+        attenuation: Attenuation::None,
+        shadows: true,
+        radius: 0.0,
+        shadow_samples: None,
+    }];
     scene.materials[0].specular = Vec3::ONE;
-    scene.spheres = vec![Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 }];
+    scene.spheres = vec![Sphere {
+        center: DVec3::ZERO,
+        radius: 1.0,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    }];
     prior_ladder(&scene, &wanted(samples))
 }
 

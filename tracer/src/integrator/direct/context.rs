@@ -1,6 +1,7 @@
 //! The tiles of a band: what they share, and the way of each from rays to colours.
 
 use super::super::stage::{Stage, Watch};
+use super::bounce::{self, Bounces};
 use super::{Scratch, shade};
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
@@ -24,6 +25,8 @@ pub(crate) struct TileContext<'a, W> {
     /// Memory of intersections and of shading.
     pub tile: tile::Scratch,
     pub direct: Scratch,
+    /// Only in scenes with materials that reflect or transmit.
+    pub(super) bounces: Option<Box<Bounces<'a>>>,
 }
 
 impl<'a, W: Watch> TileContext<'a, W> {
@@ -38,7 +41,13 @@ impl<'a, W: Watch> TileContext<'a, W> {
             surfaces: Surfaces::empty(frame),
             tile: tile::Scratch::new(),
             direct: Scratch::new(),
+            bounces: Bounces::for_frame(frame),
         }
+    }
+
+    /// Whether the work is cancelled.
+    pub(super) fn is_cancelled(&self) -> bool {
+        (self.cancelled)()
     }
 
     /// Traces and shades the rays of a tile. The result is `direct.colors`. A function of its own on each level: all kinds of bands
@@ -65,6 +74,6 @@ impl<'a, W: Watch> TileContext<'a, W> {
                 shade(simd, tile, self);
             },
         );
-        Ok(())
+        if self.bounces.is_some() { bounce::add(simd, tile, self) } else { Ok(()) }
     }
 }

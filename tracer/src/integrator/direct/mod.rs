@@ -10,11 +10,13 @@
 //! ```text
 //!   context      a tile of rays, from its hits to its colours
 //!   background   rays without a hit
+//!   bounce       reflected and transmitted rays
 //!   emission     unlit materials, and light that surfaces emit
 //!   shadow       S_j
 //! ```
 
 mod background;
+mod bounce;
 mod context;
 mod emission;
 mod shadow;
@@ -25,7 +27,7 @@ use super::stage::{Stage, Watch};
 use crate::bsdf;
 use crate::frame::PreparedFrame;
 use crate::light::EyeLight;
-use crate::rays::{BLOCKS, EyeTile, TileColors};
+use crate::rays::{BLOCKS, SurfaceSource, TileColors};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Lanes, Simd, SimdBase, bits, mask_of, select, splat, three};
 use crate::surface::{Materials, Surfaces};
@@ -54,13 +56,17 @@ impl Scratch {
 
 /// Shades the surface points of a tile into `context.direct.colors`.
 #[inline(always)]
-pub(super) fn shade<S: Simd, W: Watch>(simd: S, tile: &EyeTile<'_>, context: &mut TileContext<'_, W>) {
-    let frame = tile.frame;
+pub(super) fn shade<S: Simd, R: SurfaceSource, W: Watch>(
+    simd: S,
+    rays: &R,
+    context: &mut TileContext<'_, W>,
+) {
+    let frame = context.frame;
     let (surfaces, colors) = (&mut context.surfaces, &mut context.direct.colors);
     for block in 0..BLOCKS {
         let hit = surfaces.blocks[block].hit;
-        if tile.live[block] & !hit != 0 {
-            background::background(simd, &frame.scene().background, tile, block).store(&mut colors[block]);
+        if rays.live(block) & !hit != 0 {
+            background::background(simd, &frame.scene().background, rays, block).store(&mut colors[block]);
         }
         if hit != 0 {
             let behind = Vec3x16::load(simd, &colors[block]);
@@ -71,7 +77,7 @@ pub(super) fn shade<S: Simd, W: Watch>(simd: S, tile: &EyeTile<'_>, context: &mu
         }
     }
     for light in &frame.lights {
-        add_light(simd, tile, light, context);
+        add_light(simd, rays, light, context);
     }
 }
 
@@ -91,9 +97,9 @@ fn blend<S: Simd>(simd: S, lanes: u32, a: Vec3x16<S>, b: Vec3x16<S>) -> Vec3x16<
 
 /// Adds one light to all points of a tile: its unoccluded contribution, where the points are not in its shadow.
 #[inline(always)]
-fn add_light<S: Simd, W: Watch>(
+fn add_light<S: Simd, R: SurfaceSource, W: Watch>(
     simd: S,
-    tile: &EyeTile<'_>,
+    rays: &R,
     light: &EyeLight,
     context: &mut TileContext<'_, W>,
 ) {
@@ -101,7 +107,8 @@ fn add_light<S: Simd, W: Watch>(
     for block in 0..BLOCKS {
         let candidates = context.surfaces.blocks[block].lit;
         if candidates != 0 {
-            let reached = unoccluded(simd, tile.frame, &context.surfaces, light, block, &mut context.direct);
+            let reached =
+                unoccluded(simd, context.frame, &context.surfaces, light, block, &mut context.direct);
             lit[block] = reached & candidates;
         }
     }
@@ -112,7 +119,7 @@ fn add_light<S: Simd, W: Watch>(
         context.counts.shadow += lit.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
         context.watch.enter(Stage::Shadows);
         let origins = &context.direct.shadow_origins;
-        let occluded = shadow::occluded(simd, tile, &context.hits, light, origins, lit, &mut context.tile);
+        let occluded = shadow::occluded(simd, rays, &context.hits, light, origins, lit, &mut context.tile);
         context.watch.enter(Stage::Shading);
         for block in 0..BLOCKS {
             lit[block] &= !occluded[block];

@@ -2,14 +2,14 @@
 
 use crate::intersect::tile;
 use crate::light::{Emitter, EyeLight, SHADOW_T_MAX};
-use crate::rays::{BLOCKS, EyeTile, HitBlock, ShadowTarget, ShadowTile};
+use crate::rays::{BLOCKS, HitBlock, ShadowTarget, ShadowTile, SurfaceSource};
 use crate::simd::{Lanes, Simd};
 
 /// Bits of the lit points of a tile that are in the shadow of a light.
 #[inline(always)]
-pub(super) fn occluded<S: Simd>(
+pub(super) fn occluded<S: Simd, R: SurfaceSource>(
     simd: S,
-    tile: &EyeTile<'_>,
+    rays: &R,
     hits: &[HitBlock; BLOCKS],
     light: &EyeLight,
     points: &[[Lanes; 3]; BLOCKS],
@@ -33,8 +33,15 @@ pub(super) fn occluded<S: Simd>(
         of_others[block] = lit[block] & !of_item[block];
     }
     let mut occluded = [0; BLOCKS];
-    let mut shadow =
-        ShadowTile { frame: tile.frame, light, t_max, grid: tile.rays, points, hits, live: [0; BLOCKS] };
+    let mut shadow = ShadowTile {
+        frame: rays.frame(),
+        light,
+        t_max,
+        grid: rays.places(),
+        points,
+        hits,
+        live: [0; BLOCKS],
+    };
     for live in [of_item, of_others] {
         if live != [0; BLOCKS] {
             shadow.live = live;

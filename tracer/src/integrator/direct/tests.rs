@@ -22,7 +22,14 @@ fn empty() -> Scene {
     Scene {
         ambient: Vec3::splat(0.02),
         render: RenderSettings { width: SIDE, height: SIDE, ..RenderSettings::default() },
-        camera: Camera { position: DVec3::Z * 4.0, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+        camera: Camera {
+            position: DVec3::Z * 4.0,
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            fov: 40.0,
+            zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
+        },
         background: Background::Color(Vec3::splat(0.3)),
         lights: vec![],
         materials: vec![],
@@ -31,6 +38,8 @@ fn empty() -> Scene {
         spheres: vec![],
         planes: vec![],
         triangles: vec![],
+        background_visible: true,
+        disks: Vec::new(),
     }
 }
 
@@ -39,7 +48,14 @@ fn material(diffuse: Vec3, specular: f32, exponent: f32) -> Material {
 }
 
 fn light(position: DVec3, color: f32, attenuation: Attenuation) -> Light {
-    Light { kind: LightKind::Point { position }, color: Vec3::splat(color), attenuation, shadows: true }
+    Light {
+        kind: LightKind::Point { position },
+        color: Vec3::splat(color),
+        attenuation,
+        shadows: true,
+        radius: 0.0,
+        shadow_samples: None,
+    }
 }
 
 /// A wall at z = 0 of 40 x 40 squares with alternating materials: the rays of a block hit different ones.
@@ -134,7 +150,13 @@ fn lights_brighter_than_single_precision_on_colors_with_zeros() {
 }
 
 fn two_balls(scene: &mut Scene) {
-    let ball = |x: f64, y: f64| Sphere { center: DVec3::new(x, y, 0.0), radius: 0.3, material: 0 };
+    let ball = |x: f64, y: f64| Sphere {
+        center: DVec3::new(x, y, 0.0),
+        radius: 0.3,
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    };
     scene.materials = vec![material(Vec3::splat(0.6), 0.1, 9.0)];
     scene.spheres = vec![ball(-0.2, 0.3), ball(0.1, 0.9)];
     scene.lights = vec![light(DVec3::new(0.2, 5.0, 1.0), 0.7, Attenuation::None)];
@@ -150,7 +172,7 @@ fn shadows_next_to_a_horizon_are_those_of_the_oracle() {
         two_balls(&mut scene);
         scene.render.height = SIDE + 1;
         scene.camera.look_at = DVec3::new(0.0, -tilt, 3.0);
-        scene.planes = vec![Plane { point: DVec3::Y * -0.2, normal: DVec3::Y, material: 0 }];
+        scene.planes = vec![Plane { point: DVec3::Y * -0.2, normal: DVec3::Y, material: 0, size: 1.0 }];
         if sun {
             scene.lights[0].kind = SUN;
         }
@@ -178,7 +200,7 @@ fn a_plane_out_of_range_changes_no_shadows() {
         bytes
     };
     let alone = rendered(&scene);
-    scene.planes = vec![Plane { point: DVec3::Y * -1e30, normal: DVec3::Y, material: 0 }];
+    scene.planes = vec![Plane { point: DVec3::Y * -1e30, normal: DVec3::Y, material: 0, size: 1.0 }];
     let before = rendered(&scene);
     let nothing = alone[..3].to_vec();
     let pairs = alone.chunks_exact(3).zip(before.chunks_exact(3));

@@ -9,6 +9,7 @@ use super::*;
 use crate::compile::CompiledScene;
 use crate::intersect::{Primitive, RaySegment};
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
+use crate::rays::{BLOCKS, RayBatch};
 use crate::reference::Oracle;
 use crate::scene::{
     Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
@@ -41,20 +42,41 @@ fn scene_of(corners: &[[f64; 9]], rotate: DVec3, scale: DVec3) -> (Scene, Arc<Co
         translate,
         rotate,
         scale,
+        group: glam::DMat3::IDENTITY,
     };
     let single = |numbers: &[f64; 9]| Triangle { vertices: triangle(numbers), uvs: None, material: 0 };
     let scene = Scene {
         ambient: Vec3::ZERO,
         render: RenderSettings::default(),
-        camera: Camera { position: EYE, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+        camera: Camera {
+            position: EYE,
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            fov: 40.0,
+            zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
+        },
         background: Background::Color(Vec3::ZERO),
         lights: vec![],
         materials: vec![Material::NEUTRAL],
         textures: vec![],
         models: vec![model(DVec3::ZERO), model(DVec3::new(2.0, -1.0, 0.5))],
-        spheres: vec![Sphere { center: DVec3::new(0.5, 0.0, 0.5), radius: 0.7, material: 0 }],
-        planes: vec![Plane { point: DVec3::NEG_Y * 3.0, normal: DVec3::new(0.1, 1.0, 0.0), material: 0 }],
+        spheres: vec![Sphere {
+            center: DVec3::new(0.5, 0.0, 0.5),
+            radius: 0.7,
+            material: 0,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        }],
+        planes: vec![Plane {
+            point: DVec3::NEG_Y * 3.0,
+            normal: DVec3::new(0.1, 1.0, 0.0),
+            material: 0,
+            size: 1.0,
+        }],
         triangles: corners.iter().take(2).map(single).collect(),
+        disks: Vec::new(),
+        background_visible: true,
     };
     (scene, mesh)
 }
@@ -113,14 +135,18 @@ fn check_block(frame: &mut PreparedFrame, rays: &[RaySegment]) {
 }
 
 #[inline(always)]
-fn find_surfaces<S: Simd>(simd: S, surfaces: &mut Surfaces, block: &RayBlock<'_>, hits: &HitBlock) {
-    surfaces.find(simd, block, std::slice::from_ref(hits));
+fn find_surfaces<S: Simd>(simd: S, surfaces: &mut Surfaces, rays: &RayBatch<'_>, hits: &[HitBlock]) {
+    surfaces.find(simd, rays, hits);
 }
 
 /// Asserts that the surface points of a block are those of the exact hits.
 fn check_surfaces(frame: &PreparedFrame, block: &RayBlock<'_>, hits: &HitBlock) {
     let mut surfaces = Surfaces::empty(frame);
-    dispatch!(frame.level, simd => find_surfaces(simd, &mut surfaces, block, hits));
+    let mut rays = RayBatch::new(frame);
+    rays.blocks[0] = block.clone();
+    let mut all: [HitBlock; BLOCKS] = std::array::from_fn(|_| HitBlock::NONE);
+    all[0] = hits.clone();
+    dispatch!(frame.level, simd => find_surfaces(simd, &mut surfaces, &rays, &all));
     let surface = &surfaces.blocks[0];
     for lane in 0..LANES {
         let Some(hit) = frame.hit_in(block, hits, lane) else {

@@ -30,12 +30,20 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
+        group: glam::DMat3::IDENTITY,
     };
     let look_at = eye + DVec3::NEG_Z;
     let mut scene = Scene {
         ambient: Vec3::ZERO,
         render: RenderSettings::default(),
-        camera: Camera { position: eye, look_at, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+        camera: Camera {
+            position: eye,
+            look_at,
+            up: DVec3::Y,
+            fov: 40.0,
+            zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
+        },
         background: Background::Color(Vec3::ZERO),
         lights: vec![],
         materials: vec![Material::NEUTRAL],
@@ -44,6 +52,8 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
         spheres: vec![],
         planes: vec![],
         triangles: vec![],
+        disks: Vec::new(),
+        background_visible: true,
     };
     change(&mut scene);
     let view = FrameView::of(&scene);
@@ -256,11 +266,17 @@ fn hits_are_named_by_their_place_in_the_scene() {
     let frame = frame_of(&ball(6, 6, |p| p), eye, |scene| {
         let place = |x: f64| DVec3::new(x, 0.0, 0.0);
         scene.models.push(Model { translate: place(10.0), ..scene.models[0].clone() });
-        scene.spheres = vec![Sphere { center: place(20.0), radius: 2.0, material: 0 }];
+        scene.spheres = vec![Sphere {
+            center: place(20.0),
+            radius: 2.0,
+            material: 0,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        }];
         let corners = [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::new(0.0, 1.0, 0.0)];
         let triangle = |x: f64| Triangle { vertices: corners.map(|p| p + place(x)), uvs: None, material: 0 };
         scene.triangles = vec![triangle(30.0), triangle(40.0)];
-        scene.planes = vec![Plane { point: DVec3::NEG_Z * 7.0, normal: DVec3::Z, material: 0 }];
+        scene.planes = vec![Plane { point: DVec3::NEG_Z * 7.0, normal: DVec3::Z, material: 0, size: 1.0 }];
     });
     let at = |x: f64| frame.closest_hit(DVec3::new(x, 0.01, 9.0), DVec3::NEG_Z * 0.5, f64::INFINITY).unwrap();
     assert!(matches!(at(10.0).primitive, Primitive::Model { model: 1, .. }));

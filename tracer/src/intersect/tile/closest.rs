@@ -96,7 +96,7 @@ impl EyeTile<'_> {
                         projected.project_exactly(0, &self.projection, corners, self.rays);
                         cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
                     }
-                    Item::Sphere(_) => query.test_every_ray(simd),
+                    Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
                 }
             }
         }

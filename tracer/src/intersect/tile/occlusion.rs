@@ -65,7 +65,7 @@ impl<'a> OcclusionQuery<'a> {
                 projected.project_exactly(0, projection, corners, self.rays);
                 cover_projected(simd, projected, 0, ALL_BLOCKS, self);
             }
-            Item::Sphere(_) => self.test_item(),
+            Item::Sphere(_) | Item::Disk(_) => self.test_item(),
         }
     }
 

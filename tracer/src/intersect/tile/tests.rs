@@ -103,7 +103,14 @@ fn mesh_of(triangles: &[[DVec3; 3]]) -> Option<CompiledMesh> {
 
 fn camera(random: &mut Random) -> Camera {
     let fov = random.one_of(&[0.02, 3.0, 40.0, 120.0, 175.0]);
-    Camera { position: DVec3::ZERO, look_at: random.vector(), up: DVec3::new(0.1, 1.0, 0.2), fov, zoom: 1.0 }
+    Camera {
+        position: DVec3::ZERO,
+        look_at: random.vector(),
+        up: DVec3::new(0.1, 1.0, 0.2),
+        fov,
+        zoom: 1.0,
+        kind: crate::scene::CameraKind::PINHOLE,
+    }
 }
 
 /// A scene of these triangles: most in a mesh with up to two nearly equal instances, four as triangles of the scene file, and
@@ -123,6 +130,7 @@ fn frame_of(
         translate,
         rotate: DVec3::ZERO,
         scale,
+        group: glam::DMat3::IDENTITY,
     };
     let shift = random.vector() * random.one_of(&[0.0, 1e-8, 1e-6, 0.1]);
     let scale = random.one_of(&[DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 0.3, 1e-4)]);
@@ -131,8 +139,14 @@ fn frame_of(
     let models = placements[..count].iter().map(|&(translate, scale)| model(translate, scale)).collect();
     let single = |vertices: &[DVec3; 3]| Triangle { vertices: *vertices, uvs: None, material: 0 };
     let few = random.below(4) == 0;
-    let spheres = Sphere { center: random.vector(), radius: random.ten_to(-3.0, -0.5), material: 0 };
-    let planes = Plane { point: random.vector(), normal: random.vector(), material: 0 };
+    let spheres = Sphere {
+        center: random.vector(),
+        radius: random.ten_to(-3.0, -0.5),
+        material: 0,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    };
+    let planes = Plane { point: random.vector(), normal: random.vector(), material: 0, size: 1.0 };
     let scene = Scene {
         ambient: Vec3::ZERO,
         render: RenderSettings { width, height, samples, ..RenderSettings::default() },
@@ -145,6 +159,8 @@ fn frame_of(
         spheres: vec![spheres; usize::from(few)],
         planes: vec![planes; usize::from(few)],
         triangles: singles.iter().map(single).collect(),
+        background_visible: true,
+        disks: Vec::new(),
     };
     let view = FrameView::of(&scene);
     PreparedFrame::new(Arc::new(CompiledScene::new(scene, mesh, []).unwrap()), &view).unwrap()
@@ -159,7 +175,9 @@ fn primitives(frame: &PreparedFrame) -> Vec<PrimitiveId> {
                 let triangles = frame.instances[index].mesh.triangles();
                 all.extend(triangles.map(|triangle| PrimitiveId { item, triangle }));
             }
-            Item::Sphere(_) | Item::Triangle(_) => all.push(PrimitiveId { item, triangle: 0 }),
+            Item::Sphere(_) | Item::Triangle(_) | Item::Disk(_) => {
+                all.push(PrimitiveId { item, triangle: 0 })
+            }
         }
     }
     let planes = 0..frame.planes.len() as u32;

@@ -5,7 +5,7 @@ use crate::material::Material;
 use crate::texture::Filter;
 
 /// Features that a scene uses. Only materials that are assigned to some geometry count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
     /// A material has a specular colour: directions to the viewer are needed.
     pub specular: bool,
@@ -27,6 +27,20 @@ pub struct SceneFeatures {
     pub smooth: bool,
     /// A light casts shadows.
     pub shadows: bool,
+    /// A material reflects or transmits: rays bounce.
+    pub bounces: bool,
+    /// A material transmits: sides are told apart, and shadows are not all or nothing.
+    pub transparent: bool,
+    /// A material emits or transmits: the front of a surface differs from its back.
+    pub sided: bool,
+    /// A material of some geometry casts no shadow.
+    pub shadowless: bool,
+    /// A light that casts shadows has an extent.
+    pub soft_shadows: bool,
+    /// A material has a checker pattern.
+    pub checkered: bool,
+    /// A material has a normal map.
+    pub normal_mapped: bool,
 }
 
 impl SceneFeatures {
@@ -47,6 +61,13 @@ impl SceneFeatures {
             cut_out: any(|material| material.cutout.is_some()),
             smooth: scene.models.iter().any(|model| model.normals == NormalMode::Smooth),
             shadows: scene.lights.iter().any(|light| light.shadows),
+            bounces: any(Material::bounces),
+            transparent: any(Material::is_transparent),
+            sided: any(|material| material.is_emissive() || material.is_transparent()),
+            shadowless: any(|material| !material.casts_shadow),
+            soft_shadows: scene.lights.iter().any(|light| light.shadows && light.radius > 0.0),
+            checkered: any(|material| material.checker.is_some()),
+            normal_mapped: any(|material| material.normal_map.is_some()),
         }
     }
 
@@ -59,6 +80,8 @@ impl SceneFeatures {
             powers: self.powers && full,
             filtered: self.filtered && quality.filter != Some(Filter::Nearest),
             shadows: self.shadows && quality.shadows,
+            soft_shadows: self.soft_shadows && quality.shadows,
+            bounces: self.bounces && quality.max_depth > 0,
             ..self
         }
     }
@@ -69,6 +92,7 @@ fn assigned(scene: &Scene) -> impl Iterator<Item = u32> {
     let on_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
     on_models
         .chain(scene.spheres.iter().map(|sphere| sphere.material))
+        .chain(scene.disks.iter().map(|disk| disk.material))
         .chain(scene.planes.iter().map(|plane| plane.material))
         .chain(scene.triangles.iter().map(|triangle| triangle.material))
 }
@@ -83,18 +107,33 @@ mod tests {
     use super::*;
 
     fn scene(material: Material, assigned: bool) -> Scene {
-        let sphere = Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 };
+        let sphere = Sphere {
+            center: DVec3::ZERO,
+            radius: 1.0,
+            material: 0,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        };
         let position = DVec3::Y;
         Scene {
             ambient: Vec3::ZERO,
             render: RenderSettings::default(),
-            camera: Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+            camera: Camera {
+                position: DVec3::Z,
+                look_at: DVec3::ZERO,
+                up: DVec3::Y,
+                fov: 40.0,
+                zoom: 1.0,
+                kind: crate::scene::CameraKind::PINHOLE,
+            },
             background: Background::Color(Vec3::ZERO),
             lights: vec![Light {
                 kind: LightKind::Point { position },
                 color: Vec3::ONE,
                 attenuation: Attenuation::None,
                 shadows: true,
+                radius: 0.0,
+                shadow_samples: None,
             }],
             materials: vec![material],
             textures: Vec::new(),
@@ -102,6 +141,8 @@ mod tests {
             spheres: if assigned { vec![sphere] } else { Vec::new() },
             planes: Vec::new(),
             triangles: Vec::new(),
+            disks: Vec::new(),
+            background_visible: true,
         }
     }
 

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// A light without extent.
+/// A light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Light {
     /// Position and direction.
@@ -14,6 +14,10 @@ pub struct Light {
     pub attenuation: Attenuation,
     /// Whether occluders cast shadows in its light.
     pub shadows: bool,
+    /// Radius of a point light or a spot in world units: its shadows are soft. 0 is a light without extent; directional lights have none.
+    pub radius: f64,
+    /// Points on the light that shadow rays go to, instead of [`super::Quality::shadow_samples`]; only with a radius.
+    pub shadow_samples: Option<u16>,
 }
 
 /// The kinds of light.

@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 
 pub use features::SceneFeatures;
 pub use light::{Attenuation, Light, LightKind};
-pub use objects::{Model, NormalMode, Plane, Sphere, Triangle};
+pub use objects::{Disk, Model, NormalMode, Plane, Sphere, Triangle};
 pub use quality::{ColorDepth, ExponentPrecision, Quality, Shading, word_of};
 pub use scale::RenderScale;
 pub use setting::Setting;
-pub use view::{Background, Camera, FrameView, RenderSettings};
+pub use view::{Background, Camera, CameraKind, FovAxis, FrameView, RenderSettings, Sky, SkyPicture};
 
 use crate::material::Material;
 use crate::texture::TextureMap;
@@ -33,6 +33,8 @@ pub struct Scene {
     pub camera: Camera,
     /// Radiance of rays that hit nothing.
     pub background: Background,
+    /// Whether rays of the camera see the background; without, they see black. Reflected and transmitted rays see it always.
+    pub background_visible: bool,
     /// Lights; never empty after loading (a scene without one gets the default light).
     pub lights: Vec<Light>,
     /// Materials; the range of every material index of the scene.
@@ -43,6 +45,8 @@ pub struct Scene {
     pub models: Vec<Model>,
     /// Analytic spheres.
     pub spheres: Vec<Sphere>,
+    /// Flat disks.
+    pub disks: Vec<Disk>,
     /// Infinite planes.
     pub planes: Vec<Plane>,
     /// Single triangles of the scene file.

@@ -1,6 +1,6 @@
 //! Geometry of a scene: instances of meshes, spheres, planes, single triangles.
 
-use glam::{DVec3, Vec2};
+use glam::{DMat3, DVec3, Vec2};
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::MeshId;
@@ -14,7 +14,7 @@ pub enum NormalMode {
     Flat,
 }
 
-/// An instance of a compiled mesh: scaled, then rotated about x, y and z in turn, then translated.
+/// An instance of a compiled mesh: scaled, rotated about x, y and z in turn, transformed by its groups, then translated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Hash of the compiled mesh.
@@ -29,6 +29,8 @@ pub struct Model {
     pub rotate: DVec3,
     /// Factors along the mesh's own axes; none is zero.
     pub scale: DVec3,
+    /// Linear part of the transforms of the groups that the model is in, after its own rotation; invertible. `translate` is final.
+    pub group: DMat3,
 }
 
 /// An analytic sphere.
@@ -40,6 +42,10 @@ pub struct Sphere {
     pub radius: f64,
     /// Index into [`crate::scene::Scene::materials`].
     pub material: u32,
+    /// Whether its front side is the inside: a bubble in a transparent material.
+    pub inside_out: bool,
+    /// Rotation of its texture coordinates, which are those of a panorama: degrees about x, then y, then z.
+    pub uv_rotate: DVec3,
 }
 
 /// An infinite plane.
@@ -49,6 +55,21 @@ pub struct Plane {
     pub point: DVec3,
     /// Unit normal; both sides are visible.
     pub normal: DVec3,
+    /// Index into [`crate::scene::Scene::materials`].
+    pub material: u32,
+    /// World units per repeat of a texture.
+    pub size: f64,
+}
+
+/// A flat disk.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Disk {
+    /// World position of the centre.
+    pub center: DVec3,
+    /// Unit normal; both sides are visible.
+    pub normal: DVec3,
+    /// Radius in scene units, above zero.
+    pub radius: f64,
     /// Index into [`crate::scene::Scene::materials`].
     pub material: u32,
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::texture::Filter;
 
 /// Accuracy of a frame. The default is full quality: everything that the scene requests, exactly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Whether lights that cast shadows do. Without, no shadow ray is traced.
     pub shadows: bool,
@@ -23,6 +23,15 @@ pub struct Quality {
     pub colors: ColorDepth,
     /// Whether pixels are dithered where light is quantised to bytes, which replaces bands by a pattern.
     pub dither: bool,
+    /// Largest number of reflections and transmissions between the camera and a surface; 0 traces none.
+    pub max_depth: u8,
+    /// A reflection or transmission that can add less than this, in its brightest channel, is not traced.
+    pub min_contribution: f32,
+    /// Points of a light with a radius that shadow rays go to, where the light itself has no number.
+    pub shadow_samples: u16,
+    /// Whether points with interpolated normals are lit as if the surface were smooth, so that the shadow's edge does not show the
+    /// triangles.
+    pub smooth_terminator: bool,
 }
 
 impl Default for Quality {
@@ -35,6 +44,10 @@ impl Default for Quality {
             exponent: ExponentPrecision::Exact,
             colors: ColorDepth::Exact,
             dither: false,
+            max_depth: 5,
+            min_contribution: 0.004,
+            shadow_samples: 16,
+            smooth_terminator: true,
         }
     }
 }
@@ -46,6 +59,14 @@ pub enum Shading {
     Full,
     /// The diffuse and the ambient term: no specular term, and no vectors to the viewer.
     Diffuse,
+    /// Not light but the shading normal, turned to the viewer, in world space: (n + 1) / 2 as a linear colour.
+    Normals,
+    /// Not light but the distance from the camera, in greys: nearer is brighter.
+    Depth,
+    /// Not light but a colour for each object.
+    Item,
+    /// Not light but the diffuse colour with its textures.
+    Albedo,
 }
 
 /// Precision of the power (N.H)^p of a highlight.

@@ -3,7 +3,7 @@
 use super::{Quality, RenderScale};
 
 /// Sample count, scale and quality knobs of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     /// Rays per pixel, a square number.
     pub samples: u32,

@@ -14,10 +14,6 @@ pub struct RenderSettings {
     pub height: u32,
     /// Rays per pixel: a square number, n * n on a regular grid.
     pub samples: u32,
-    /// Bounces of reflection and transmission. No material reflects or transmits yet, so no picture depends on it.
-    pub max_depth: u32,
-    /// A bounce that can add less than this is not traced.
-    pub min_contribution: f32,
     /// Quality knobs.
     pub quality: Quality,
     /// Share of width and height that is rendered.
@@ -26,15 +22,7 @@ pub struct RenderSettings {
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self {
-            width: 1024,
-            height: 768,
-            samples: 1,
-            max_depth: 5,
-            min_contribution: 0.004,
-            quality: Quality::default(),
-            scale: RenderScale::Full,
-        }
+        Self { width: 1024, height: 768, samples: 1, quality: Quality::default(), scale: RenderScale::Full }
     }
 }
 
@@ -51,19 +39,60 @@ impl RenderSettings {
     }
 }
 
-/// A pinhole camera. `look_at` differs from `position`, and `up` is not parallel to the view direction.
+/// A camera. `look_at` differs from `position`, and `up` is not parallel to the view direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
+    /// How points are projected.
+    pub kind: CameraKind,
     /// World position.
     pub position: DVec3,
     /// The point at the centre of the picture; the centre of orbits.
     pub look_at: DVec3,
     /// Up direction in the picture; any length, not necessarily perpendicular to the view direction.
     pub up: DVec3,
-    /// Vertical field of view in degrees, inside (0, 180).
+    /// Field of view in degrees: of a pinhole camera along its [`FovAxis`], inside (0, 180); of a fisheye camera the full angle of
+    /// its circle, in (0, 360]. An orthographic camera has none.
     pub fov: f64,
-    /// Divides the view plane's size.
+    /// Divides the view plane's size. A fisheye camera has no view plane.
     pub zoom: f64,
+}
+
+/// The kinds of camera.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum CameraKind {
+    /// All rays start at the position, through the pixels of a view plane.
+    Pinhole {
+        /// The side of the picture that the field of view spans.
+        fov_axis: FovAxis,
+    },
+    /// All rays are parallel to the view direction, and start on the plane through the position across it.
+    Orthographic {
+        /// Height of the picture in world units, before the zoom.
+        view_height: f64,
+    },
+    /// All rays start at the position, at an angle to the view direction of r fov / 2 (equidistant), where r is the distance from the
+    /// picture's centre in units of half its smaller side. Pixels with r > 1 show the background.
+    Fisheye,
+}
+
+impl CameraKind {
+    /// A pinhole camera with a vertical field of view.
+    pub const PINHOLE: Self = Self::Pinhole { fov_axis: FovAxis::Vertical };
+}
+
+/// The side of a picture that a field of view spans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FovAxis {
+    /// From the top to the bottom.
+    Vertical,
+    /// From the left to the right.
+    Horizontal,
+}
+
+impl FovAxis {
+    /// Each value with its word.
+    pub const WORDS: [(&'static str, Self); 2] =
+        [("vertical", Self::Vertical), ("horizontal", Self::Horizontal)];
 }
 
 /// Radiance of rays that hit nothing, linear RGB.
@@ -78,6 +107,29 @@ pub enum Background {
         /// Colour at d.y = +1.
         top: Vec3,
     },
+    /// A picture all around.
+    Sky(Sky),
+}
+
+/// A sky: a picture all around the scene, infinitely far away.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sky {
+    /// The picture.
+    pub picture: SkyPicture,
+    /// Degrees by which the sky is rotated about +Y, in the sense of [`crate::scene::Model::rotate`].
+    pub rotate: f64,
+    /// Factor of its radiance.
+    pub strength: f32,
+}
+
+/// The picture of a sky; textures are indices into [`Scene::textures`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum SkyPicture {
+    /// Equirectangular: a ray with unit direction d sees u = 1/2 + atan2(d.x, -d.z) / 2 pi from the left and acos(d.y) / pi from the
+    /// top.
+    Panorama(u32),
+    /// The six faces of a cube, +X, -X, +Y, -Y, +Z, -Z, laid out by OpenGL's table of cube map faces.
+    Cubemap([u32; 6]),
 }
 
 /// The part of a frame that changes while the scene stays the same: under 200 bytes on the wire.
@@ -126,8 +178,14 @@ impl FrameView {
 mod tests {
     use super::*;
 
-    const CAMERA: Camera =
-        Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 };
+    const CAMERA: Camera = Camera {
+        position: DVec3::Z,
+        look_at: DVec3::ZERO,
+        up: DVec3::Y,
+        fov: 40.0,
+        zoom: 1.0,
+        kind: crate::scene::CameraKind::PINHOLE,
+    };
 
     #[test]
     fn settings_round_trip() {

@@ -18,6 +18,10 @@ impl Setting {
             exponent: ExponentPrecision::Exact,
             colors: ColorDepth::Exact,
             dither: false,
+            max_depth: 5,
+            min_contribution: 0.004,
+            shadow_samples: 16,
+            smooth_terminator: true,
         },
     };
 

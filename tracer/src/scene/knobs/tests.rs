@@ -7,18 +7,7 @@ use crate::scene::validate::{MAX_SAMPLES, is_sample_count};
 use crate::texture::Filter;
 
 fn all_off() -> SceneFeatures {
-    SceneFeatures {
-        specular: false,
-        powers: false,
-        textured: false,
-        filtered: false,
-        vertex_colors: false,
-        emissive: false,
-        unlit: false,
-        cut_out: false,
-        smooth: false,
-        shadows: false,
-    }
+    SceneFeatures::default()
 }
 
 fn names(pick: fn(&Knob) -> &'static str) -> Vec<&'static str> {
@@ -128,7 +117,7 @@ fn a_limit_makes_nothing_better() {
 #[test]
 fn knobs_that_make_no_difference_are_left_at_their_best() {
     let setting = cheapest().without_idle(&all_off());
-    let Quality { shadows, adaptive, shading, filter, exponent, colors, dither } = setting.quality;
+    let Quality { shadows, adaptive, shading, filter, exponent, colors, dither, .. } = setting.quality;
     assert_eq!((shadows, shading, filter), (true, Shading::Full, None));
     assert_eq!((exponent, colors), (ExponentPrecision::Exact, ColorDepth::Reduced));
     assert!(adaptive && dither && setting.scale == RenderScale::Quarter);

@@ -156,6 +156,7 @@ impl Models {
             translate: text.translate,
             rotate: text.rotate,
             scale: text.scale,
+            group: glam::DMat3::IDENTITY,
         })
     }
 

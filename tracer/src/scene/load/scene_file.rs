@@ -78,6 +78,8 @@ fn assemble(
         spheres: text.spheres,
         planes: text.planes,
         triangles: text.triangles,
+        disks: Vec::new(),
+        background_visible: true,
     };
     for model in &text.models {
         let instance = models.instance(model, &mut scene.materials, &text.textures, locate)?;
@@ -143,5 +145,5 @@ fn aimed(text: CameraText, bounds: Option<framing::Bounds>) -> Camera {
         Aim::Point(point) => point,
         Aim::Direction(direction) => framing::point_on_axis(position, direction, bounds),
     };
-    Camera { position, look_at, up, fov, zoom }
+    Camera { position, look_at, up, fov, zoom, kind: crate::scene::CameraKind::PINHOLE }
 }

@@ -109,6 +109,7 @@ mod tests {
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
             dither: true,
+            ..Quality::default()
         };
         let render_all = render(all).unwrap();
         assert_eq!((render_all.quality, render_all.scale), (reduced, RenderScale::ThreeQuarters));

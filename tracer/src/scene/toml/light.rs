@@ -45,6 +45,8 @@ pub(super) fn light(table: Table<'_>, reading: &mut Reading) -> Read<Light> {
         color: color(table)?,
         attenuation: table.read("attenuation", attenuation)?.unwrap_or(Attenuation::None),
         shadows: table.read("shadows", |value| value.boolean())?.unwrap_or(true),
+        radius: 0.0,
+        shadow_samples: None,
     };
     warn_about_unused_keys(table, kind, light.attenuation, reading)?;
     Ok(light)

@@ -87,6 +87,8 @@ pub(super) fn sphere(table: Table<'_>, materials: &mut Materials) -> Read<Sphere
         center: table.required("center")?.vector()?,
         radius: table.required("radius")?.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)?,
         material: materials.referred_plain(table, "use a material with a colour")?,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
     })
 }
 
@@ -96,6 +98,7 @@ pub(super) fn plane(table: Table<'_>, materials: &mut Materials) -> Read<Plane> 
         normal: table.required("normal")?.direction()?,
         material: materials
             .referred_plain(table, "use a material with a colour, or two triangles with `uvs`")?,
+        size: 1.0,
     })
 }
 

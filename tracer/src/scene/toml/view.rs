@@ -58,15 +58,17 @@ pub(super) fn render(table: Table<'_>) -> Read<RenderSettings> {
     let settings = RenderSettings {
         width: table.read("width", side)?.unwrap_or(default.width),
         height: table.read("height", side)?.unwrap_or(default.height),
-        max_depth: table
-            .read("max_depth", |value| value.whole("from 0 to 64", 0..=MAX_DEPTH))?
-            .unwrap_or(default.max_depth),
-        min_contribution: table
-            .read("min_contribution", share)?
-            .map_or(default.min_contribution, |share| share as f32),
         ..default
     };
-    Ok(settings.with_setting(knobs::setting(table, default.setting())?))
+    let mut setting = knobs::setting(table, default.setting())?;
+    let depth = |value: Value<'_>| value.whole("from 0 to 64", 0..=u32::from(MAX_DEPTH));
+    if let Some(depth) = table.read("max_depth", depth)? {
+        setting.quality.max_depth = depth as u8;
+    }
+    if let Some(share) = table.read("min_contribution", share)? {
+        setting.quality.min_contribution = share as f32;
+    }
+    Ok(settings.with_setting(setting))
 }
 
 pub(super) fn camera(table: Table<'_>, reading: &mut Reading) -> Read<CameraText> {

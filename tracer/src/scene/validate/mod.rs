@@ -6,10 +6,11 @@ use std::collections::BTreeSet;
 use glam::{DVec3, Vec3};
 
 use super::data::{
-    Attenuation, Background, Camera, FrameView, Light, LightKind, Model, RenderSettings, Scene, Triangle,
+    Attenuation, Background, Camera, CameraKind, FrameView, Light, LightKind, Model, Quality, RenderSettings,
+    Scene, SkyPicture, Triangle,
 };
 use crate::image::MAX_SIDE;
-use crate::material::{MAX_EXPONENT, Material};
+use crate::material::{Checker, MAX_EXPONENT, Material, NormalMap};
 use crate::mesh::MeshId;
 use crate::texture::{self, TextureId, TextureMap};
 
@@ -23,6 +24,8 @@ pub const MAX_TEXTURES: usize = 4096;
 pub const MAX_MODELS: usize = 1 << 16;
 /// Largest number of spheres.
 pub const MAX_SPHERES: usize = 1 << 20;
+/// Largest number of disks.
+pub const MAX_DISKS: usize = 1 << 20;
 /// Largest number of infinite planes; every ray tests all of them.
 pub const MAX_PLANES: usize = 1024;
 /// Largest number of single triangles; larger sets belong into a model.
@@ -31,8 +34,14 @@ pub const MAX_TRIANGLES: usize = 1 << 20;
 pub const MAX_SLOTS: usize = 1 << 16;
 /// Largest number of rays per pixel.
 pub const MAX_SAMPLES: u32 = 256;
-/// Largest number of bounces of a ray.
-pub const MAX_DEPTH: u32 = 64;
+/// Largest number of reflections and transmissions of a ray.
+pub const MAX_DEPTH: u8 = 64;
+/// Largest number of points of a light that shadow rays go to.
+pub const MAX_SHADOW_SAMPLES: u16 = 1024;
+/// Largest index of refraction; the smallest is its reciprocal.
+pub const MAX_IOR: f32 = 100.0;
+/// Largest factor of the tilt of a normal map.
+pub const MAX_NORMAL_STRENGTH: f32 = 100.0;
 /// Largest magnitude of a coordinate, radius, scale factor or degree: squares and their products stay finite in
 /// `f64`.
 pub const MAX_COORDINATE: f64 = 1e30;
@@ -94,7 +103,7 @@ impl Scene {
         require(is_color(self.ambient, MAX_LIGHT), || "ambient".into(), "finite and not negative")?;
         check_render(&self.render)?;
         check_camera(&self.camera)?;
-        check_background(&self.background)?;
+        self.check_background()?;
         each("lights", &self.lights, check_light)?;
         each("textures", &self.textures, check_texture)?;
         each("materials", &self.materials, |material, name| self.check_material(material, name))?;
@@ -102,12 +111,20 @@ impl Scene {
         each("spheres", &self.spheres, |sphere, name| {
             require(is_point(sphere.center), || format!("{name}.center"), FINITE)?;
             require(is_positive(sphere.radius), || format!("{name}.radius"), "above zero and finite")?;
-            self.check_plain_material(sphere.material, name)
+            require(is_point(sphere.uv_rotate), || format!("{name}.uv_rotate"), FINITE)?;
+            self.check_material_index(sphere.material, name)
+        })?;
+        each("disks", &self.disks, |disk, name| {
+            require(is_point(disk.center), || format!("{name}.center"), FINITE)?;
+            require(is_unit(disk.normal), || format!("{name}.normal"), UNIT)?;
+            require(is_positive(disk.radius), || format!("{name}.radius"), "above zero and finite")?;
+            self.check_plain_material(disk.material, name)
         })?;
         each("planes", &self.planes, |plane, name| {
             require(is_point(plane.point), || format!("{name}.point"), FINITE)?;
             require(is_unit(plane.normal), || format!("{name}.normal"), UNIT)?;
-            self.check_plain_material(plane.material, name)
+            require(is_positive(plane.size), || format!("{name}.size"), "above zero and finite")?;
+            self.check_material_index(plane.material, name)
         })?;
         each("triangles", &self.triangles, |triangle, name| self.check_triangle(triangle, name))
     }
@@ -119,6 +136,7 @@ impl Scene {
             ("textures", self.textures.len(), MAX_TEXTURES),
             ("models", self.models.len(), MAX_MODELS),
             ("spheres", self.spheres.len(), MAX_SPHERES),
+            ("disks", self.disks.len(), MAX_DISKS),
             ("planes", self.planes.len(), MAX_PLANES),
             ("single triangles", self.triangles.len(), MAX_TRIANGLES),
         ] {
@@ -138,7 +156,34 @@ impl Scene {
         require(is_point(model.translate), || format!("{name}.translate"), FINITE)?;
         require(is_point(model.rotate), || format!("{name}.rotate"), FINITE)?;
         let scale = is_point(model.scale) && model.scale.to_array().iter().all(|s| *s != 0.0);
-        require(scale, || format!("{name}.scale"), "finite and not zero along any axis")
+        require(scale, || format!("{name}.scale"), "finite and not zero along any axis")?;
+        let columns = [model.group.x_axis, model.group.y_axis, model.group.z_axis];
+        let invertible = columns.iter().all(|column| is_point(*column)) && {
+            let determinant = model.group.determinant();
+            determinant != 0.0 && determinant.is_finite() && model.group.inverse().is_finite()
+        };
+        require(invertible, || format!("{name}.group"), "finite and invertible")
+    }
+
+    fn check_background(&self) -> Check {
+        match &self.background {
+            Background::Color(color) => require(is_color(*color, MAX_LIGHT), || "background".into(), LIGHT),
+            Background::Gradient { bottom, top } => {
+                let fits = is_color(*bottom, MAX_LIGHT) && is_color(*top, MAX_LIGHT);
+                require(fits, || "background".into(), LIGHT)
+            }
+            Background::Sky(sky) => {
+                require(is_coordinate(sky.rotate), || "background.rotate".into(), FINITE)?;
+                let strength = (0.0..=MAX_LIGHT).contains(&sky.strength);
+                require(strength, || "background.strength".into(), LIGHT)?;
+                let listed = |texture: &u32| (*texture as usize) < self.textures.len();
+                let fits = match &sky.picture {
+                    SkyPicture::Panorama(texture) => listed(texture),
+                    SkyPicture::Cubemap(faces) => faces.iter().all(listed),
+                };
+                require(fits, || "background.picture".into(), "made of the scene's textures")
+            }
+        }
     }
 
     fn check_triangle(&self, triangle: &Triangle, name: &str) -> Check {
@@ -180,12 +225,14 @@ impl FrameView {
     pub fn validate(&self) -> Result<(), ValidateError> {
         check_camera(&self.camera)?;
         check_size(self.width, self.height, self.samples)?;
+        check_quality(&self.quality)?;
         require(is_coordinate(self.spin), || "spin".into(), FINITE)
     }
 }
 
 const FINITE: &str = "finite and at most 1e30 in magnitude";
 const UNIT: &str = "of unit length";
+const LIGHT: &str = "finite, not negative, at most 1e30";
 
 fn require(holds: bool, what: impl FnOnce() -> String, expected: &'static str) -> Check {
     if holds { Ok(()) } else { Err(ValidateError::Unfit { what: what(), expected }) }
@@ -197,9 +244,15 @@ fn each<T>(list: &str, items: &[T], check: impl Fn(&T, &str) -> Check) -> Check 
 
 fn check_render(render: &RenderSettings) -> Check {
     check_size(render.width, render.height, render.samples)?;
-    require(render.max_depth <= MAX_DEPTH, || "render.max_depth".into(), "at most 64")?;
-    let share = (0.0..=1.0).contains(&render.min_contribution);
-    require(share, || "render.min_contribution".into(), "from 0 to 1")
+    check_quality(&render.quality)
+}
+
+fn check_quality(quality: &Quality) -> Check {
+    require(quality.max_depth <= MAX_DEPTH, || "max_depth".into(), "at most 64")?;
+    let share = (0.0..=1.0).contains(&quality.min_contribution);
+    require(share, || "min_contribution".into(), "from 0 to 1")?;
+    let samples = (1..=MAX_SHADOW_SAMPLES).contains(&quality.shadow_samples);
+    require(samples, || "shadow_samples".into(), "from 1 to 1024")
 }
 
 fn check_size(width: u32, height: u32, samples: u32) -> Check {
@@ -213,7 +266,19 @@ fn check_camera(camera: &Camera) -> Check {
     require(is_point(camera.position), || "camera.position".into(), FINITE)?;
     require(is_point(camera.look_at), || "camera.look_at".into(), FINITE)?;
     require(is_point(camera.up), || "camera.up".into(), FINITE)?;
-    require(camera.fov > 0.0 && camera.fov < 180.0, || "camera.fov".into(), "above 0 and below 180 degrees")?;
+    match camera.kind {
+        CameraKind::Pinhole { .. } => {
+            let fits = camera.fov > 0.0 && camera.fov < 180.0;
+            require(fits, || "camera.fov".into(), "above 0 and below 180 degrees")?;
+        }
+        CameraKind::Fisheye => {
+            let fits = camera.fov > 0.0 && camera.fov <= 360.0;
+            require(fits, || "camera.fov".into(), "above 0 and at most 360 degrees")?;
+        }
+        CameraKind::Orthographic { view_height } => {
+            require(is_positive(view_height), || "camera.view_height".into(), "above zero and finite")?;
+        }
+    }
     require(is_positive(camera.zoom), || "camera.zoom".into(), "above zero and finite")?;
     let fault = view_fault(camera.look_at - camera.position, camera.up);
     require(fault.is_none(), || "camera".into(), fault.unwrap_or_default())
@@ -229,17 +294,13 @@ pub(in crate::scene) fn view_fault(direction: DVec3, up: DVec3) -> Option<&'stat
     parallel.then_some("turned so that `up` is not parallel to the view direction")
 }
 
-fn check_background(background: &Background) -> Check {
-    let fits = match background {
-        Background::Color(color) => is_color(*color, 1.0),
-        Background::Gradient { bottom, top } => is_color(*bottom, 1.0) && is_color(*top, 1.0),
-    };
-    require(fits, || "background".into(), "from 0 to 1 in every channel")
-}
-
 fn check_light(light: &Light, name: &str) -> Check {
     let color = is_color(light.color, MAX_LIGHT);
-    require(color, || format!("{name}.color"), "finite, not negative, at most 1e30")?;
+    require(color, || format!("{name}.color"), LIGHT)?;
+    let radius = light.radius >= 0.0 && is_coordinate(light.radius);
+    require(radius, || format!("{name}.radius"), "not negative and finite")?;
+    let samples = light.shadow_samples.is_none_or(|samples| (1..=MAX_SHADOW_SAMPLES).contains(&samples));
+    require(samples, || format!("{name}.shadow_samples"), "from 1 to 1024")?;
     if let Attenuation::Polynomial { constant, linear, quadratic } = light.attenuation {
         let terms = [constant, linear, quadratic];
         let fits = terms.iter().all(|t| is_coordinate(*t) && *t >= 0.0) && terms.iter().any(|t| *t > 0.0);
@@ -269,9 +330,24 @@ fn check_material(material: &Material, name: &str) -> Check {
     require(is_color(material.diffuse, 1.0), || format!("{name}.diffuse"), "from 0 to 1")?;
     require(is_color(material.specular, 1.0), || format!("{name}.specular"), "from 0 to 1")?;
     let emission = is_color(material.emission, MAX_LIGHT);
-    require(emission, || format!("{name}.emission"), "finite, not negative, at most 1e30")?;
+    require(emission, || format!("{name}.emission"), LIGHT)?;
     let exponent = (0.0..=MAX_EXPONENT).contains(&material.exponent);
-    require(exponent, || format!("{name}.exponent"), "from 0 to 1e6")
+    require(exponent, || format!("{name}.exponent"), "from 0 to 1e6")?;
+    require(is_color(material.reflect, 1.0), || format!("{name}.reflect"), "from 0 to 1")?;
+    require(is_color(material.transmit, 1.0), || format!("{name}.transmit"), "from 0 to 1")?;
+    let ior = (1.0 / MAX_IOR..=MAX_IOR).contains(&material.ior);
+    require(ior, || format!("{name}.ior"), "from 0.01 to 100")?;
+    let absorption = is_color(material.absorption, 1.0) && material.absorption.min_element() > 0.0;
+    require(absorption, || format!("{name}.absorption"), "above 0 and at most 1")?;
+    if let Some(Checker { colors, size, .. }) = &material.checker {
+        let colors = colors.iter().all(|color| is_color(*color, 1.0));
+        require(colors, || format!("{name}.checker"), "of colours from 0 to 1")?;
+        let size = f64::from(*size);
+        require(is_positive(size), || format!("{name}.checker.size"), "above zero and finite")?;
+    }
+    let strength = |map: NormalMap| (0.0..=MAX_NORMAL_STRENGTH).contains(&map.strength);
+    let fits = material.normal_map.is_none_or(strength);
+    require(fits, || format!("{name}.normal_map.strength"), "from 0 to 100")
 }
 
 /// Whether a pixel can have this number of samples: 1, 4, 9, ... 256.

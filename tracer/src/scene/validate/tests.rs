@@ -11,12 +11,21 @@ fn scene() -> Scene {
         color: Vec3::ONE,
         attenuation: Attenuation::Polynomial { constant: 1.0, linear: 0.0, quadratic: 0.5 },
         shadows: true,
+        radius: 0.0,
+        shadow_samples: None,
     };
     let position = DVec3::splat(3.0);
     Scene {
         ambient: Vec3::splat(0.1),
         render: RenderSettings::default(),
-        camera: Camera { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 },
+        camera: Camera {
+            position: DVec3::Z,
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            fov: 40.0,
+            zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
+        },
         background: Background::Gradient { bottom: Vec3::ZERO, top: Vec3::ONE },
         lights: vec![
             light(LightKind::Point { position }),
@@ -32,10 +41,19 @@ fn scene() -> Scene {
             translate: DVec3::ZERO,
             rotate: DVec3::ZERO,
             scale: DVec3::new(1.0, -2.0, 3.0),
+            group: glam::DMat3::IDENTITY,
         }],
-        spheres: vec![Sphere { center: DVec3::ZERO, radius: 1.0, material: 0 }],
-        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1 }],
+        spheres: vec![Sphere {
+            center: DVec3::ZERO,
+            radius: 1.0,
+            material: 0,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        }],
+        planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1, size: 1.0 }],
         triangles: vec![Triangle { vertices: [DVec3::X, DVec3::Y, DVec3::Z], uvs: None, material: 1 }],
+        disks: Vec::new(),
+        background_visible: true,
     }
 }
 
@@ -68,8 +86,8 @@ fn numbers_out_of_bounds_are_found_by_name() {
         (|s| s.render.width = 0, "width"),
         (|s| s.render.height = 16_385, "height"),
         (|s| s.render.samples = 8, "samples"),
-        (|s| s.render.max_depth = 65, "max_depth"),
-        (|s| s.render.min_contribution = -0.1, "min_contribution"),
+        (|s| s.render.quality.max_depth = 65, "max_depth"),
+        (|s| s.render.quality.min_contribution = -0.1, "min_contribution"),
         (|s| s.camera.position.x = f64::INFINITY, "camera.position"),
         (|s| s.camera.fov = 180.0, "camera.fov"),
         (|s| s.camera.zoom = 0.0, "camera.zoom"),

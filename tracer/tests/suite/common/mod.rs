@@ -24,6 +24,7 @@ pub(crate) fn empty(width: u32, height: u32) -> Scene {
             up: DVec3::Y,
             fov: 45.0,
             zoom: 1.0,
+            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
         },
         background: Background::Gradient { bottom: Vec3::new(0.3, 0.25, 0.2), top: Vec3::new(0.2, 0.4, 0.8) },
         lights: vec![],
@@ -37,11 +38,13 @@ pub(crate) fn empty(width: u32, height: u32) -> Scene {
         spheres: vec![],
         planes: vec![],
         triangles: vec![],
+        background_visible: true,
+        disks: Vec::new(),
     }
 }
 
 pub(crate) fn light(kind: LightKind, color: f32, attenuation: Attenuation) -> Light {
-    Light { kind, color: Vec3::splat(color), attenuation, shadows: true }
+    Light { kind, color: Vec3::splat(color), attenuation, shadows: true, radius: 0.0, shadow_samples: None }
 }
 
 pub(crate) fn point(x: f64, y: f64, z: f64) -> LightKind {
@@ -51,9 +54,15 @@ pub(crate) fn point(x: f64, y: f64, z: f64) -> LightKind {
 /// Spheres, a plane, triangles; point, spot and directional light; the three attenuations.
 pub(crate) fn analytic(width: u32, height: u32) -> Scene {
     let mut scene = empty(width, height);
-    scene.planes.push(Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 2 });
+    scene.planes.push(Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 2, size: 1.0 });
     for (x, z, radius, material) in [(-0.9, 0.0, 0.7, 0), (0.8, -0.8, 0.9, 1), (0.3, 1.2, 0.25, 2)] {
-        scene.spheres.push(Sphere { center: DVec3::new(x, radius - 1.0, z), radius, material });
+        scene.spheres.push(Sphere {
+            center: DVec3::new(x, radius - 1.0, z),
+            radius,
+            material,
+            inside_out: false,
+            uv_rotate: DVec3::ZERO,
+        });
     }
     let quad = [(-2.0, -1.0), (2.0, -1.0), (2.0, 1.6), (-2.0, 1.6)].map(|(x, y)| DVec3::new(x, y, -2.5));
     scene.triangles = vec![
@@ -130,7 +139,7 @@ fn mesh_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
 pub(crate) fn instanced(width: u32, height: u32) -> (Scene, Arc<CompiledMesh>) {
     let (mesh, _) = CompiledMesh::compile(&torus(40, 24)).unwrap();
     let mut scene = empty(width, height);
-    scene.planes.push(Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 2 });
+    scene.planes.push(Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 2, size: 1.0 });
     let model = |translate: [f64; 3], rotate: [f64; 3], scale: [f64; 3], normals| Model {
         mesh: mesh.id(),
         materials: vec![0, 1],
@@ -138,6 +147,7 @@ pub(crate) fn instanced(width: u32, height: u32) -> (Scene, Arc<CompiledMesh>) {
         translate: translate.into(),
         rotate: rotate.into(),
         scale: scale.into(),
+        group: glam::DMat3::IDENTITY,
     };
     scene.models = vec![
         model([-0.9, 0.0, 0.0], [70.0, 20.0, 5.0], [0.8; 3], NormalMode::Flat),

@@ -13,7 +13,7 @@ fn leaves(width: u32, height: u32, filter: Filter) -> LoadedScene {
     scene.textures = vec![TextureMap::new(texture.id(), filter)];
     let leaf = Material { texture: Some(0), cutout: Some(0), ..scene.materials[1] };
     scene.materials.extend([leaf, Material { texture: None, ..leaf }]);
-    scene.planes = vec![Plane { point: DVec3::NEG_Y, normal: DVec3::Y, material: 2 }];
+    scene.planes = vec![Plane { point: DVec3::NEG_Y, normal: DVec3::Y, material: 2, size: 1.0 }];
     scene.triangles.extend(square(|x, y| DVec3::new(x * 1.1 - 1.7, y * 1.2 - 0.6, 0.4 - x * 0.3), WHOLE, 3));
     scene.triangles.extend(square(|x, y| DVec3::new(x * 1.3 - 1.9, y * 1.2 - 0.7, -0.4), WHOLE, 4));
     let mut mesh = ball(8, 12);
@@ -28,6 +28,7 @@ fn leaves(width: u32, height: u32, filter: Filter) -> LoadedScene {
         translate: DVec3::new(x, 0.1, 0.2),
         rotate: DVec3::new(20.0, 30.0, 10.0),
         scale: scale.into(),
+        group: glam::DMat3::IDENTITY,
     };
     scene.models = vec![
         model(0.5, [0.7, 0.9, -0.7], NormalMode::Smooth, [3, 4]),
@@ -138,7 +139,7 @@ fn a_leaf_is_a_green_disc_on_nothing_and_its_shadow_has_its_shape() {
     loaded.scene.models[0].rotate = DVec3::new(-90.0, 0.0, 0.0);
     loaded.scene.materials.push(Material { diffuse: Vec3::ONE, specular: Vec3::ZERO, ..Material::NEUTRAL });
     let material = loaded.scene.materials.len() as u32 - 1;
-    loaded.scene.planes = vec![Plane { point: DVec3::NEG_Y, normal: DVec3::Y, material }];
+    loaded.scene.planes = vec![Plane { point: DVec3::NEG_Y, normal: DVec3::Y, material, size: 1.0 }];
     let sun = LightKind::Directional { direction: DVec3::NEG_Y };
     loaded.scene.lights = vec![light(sun, 1.0, Attenuation::None)];
     let frame = frame(&loaded, &FrameView::of(&loaded.scene));

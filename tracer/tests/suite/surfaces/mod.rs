@@ -166,8 +166,14 @@ fn emission_takes_textures_on_every_shape_and_lights_nothing() {
     scene.textures = vec![TextureMap::new(texture.id(), Filter::Bilinear)];
     scene.materials.extend([lamp, Material { emission_texture: Some(0), ..lamp }]);
     scene.materials.push(Material { texture: Some(0), unlit: true, ..scene.materials[0] });
-    scene.spheres = vec![Sphere { center: DVec3::new(-0.8, 0.2, 0.5), radius: 0.4, material: 3 }];
-    scene.planes = vec![Plane { point: DVec3::NEG_Y, normal: DVec3::NEG_Y, material: 3 }];
+    scene.spheres = vec![Sphere {
+        center: DVec3::new(-0.8, 0.2, 0.5),
+        radius: 0.4,
+        material: 3,
+        inside_out: false,
+        uv_rotate: DVec3::ZERO,
+    }];
+    scene.planes = vec![Plane { point: DVec3::NEG_Y, normal: DVec3::NEG_Y, material: 3, size: 1.0 }];
     scene.triangles.extend(square(|x, y| DVec3::new(x * 0.8 - 0.3, y * 0.8, 0.1 + x), WHOLE, 4));
     scene.triangles.extend(square(|x, y| DVec3::new(0.4 + x * 0.8, y * 0.8 - 0.5, x - y), WHOLE, 5));
     let mut mesh = ball(8, 10);
@@ -180,6 +186,7 @@ fn emission_takes_textures_on_every_shape_and_lights_nothing() {
         translate: DVec3::new(x, 1.0, -1.0),
         rotate: DVec3::new(10.0, 20.0, 30.0),
         scale: scale.into(),
+        group: glam::DMat3::IDENTITY,
     };
     // Nothing emits towards the inside; a mirrored sphere keeps its front outside.
     scene.models = vec![
@@ -258,6 +265,7 @@ fn colours_of_vertices_are_factors_of_textures_and_lit() {
         translate: DVec3::new(x, 0.0, 0.0),
         rotate: DVec3::new(10.0, 20.0, 30.0),
         scale: DVec3::splat(0.6),
+        group: glam::DMat3::IDENTITY,
     };
     scene.models = vec![
         model(-1.3, NormalMode::Smooth, [3, 1]),
@@ -321,6 +329,7 @@ fn every_wrap_scale_and_offset_matches_the_oracle() {
                     translate: DVec3::ZERO,
                     rotate: DVec3::ZERO,
                     scale: DVec3::ONE,
+                    group: glam::DMat3::IDENTITY,
                 };
                 (scene.models, scene.triangles) = (vec![model], vec![]);
                 let instance = loaded(scene, vec![mesh], vec![Arc::clone(&picture)]);

@@ -44,6 +44,7 @@ impl Stage {
                 up: DVec3::Y,
                 fov: 45.0,
                 zoom: 1.0,
+                kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
             },
             background: Background::Gradient { bottom: Vec3::ZERO, top: Vec3::new(0.3, 0.5, 0.9) },
             lights: vec![Light {
@@ -51,6 +52,8 @@ impl Stage {
                 color: Vec3::ONE,
                 attenuation: Attenuation::None,
                 shadows: true,
+                radius: 0.0,
+                shadow_samples: None,
             }],
             materials: vec![Material::NEUTRAL, Material { texture: Some(0), ..Material::NEUTRAL }],
             models: vec![Model {
@@ -60,11 +63,25 @@ impl Stage {
                 translate: DVec3::new(-0.8, 0.0, 0.0),
                 rotate: DVec3::new(0.0, 30.0, 0.0),
                 scale: DVec3::ONE,
+                group: glam::DMat3::IDENTITY,
             }],
-            spheres: vec![Sphere { center: DVec3::new(1.0, 0.0, 0.0), radius: 0.7, material: 0 }],
-            planes: vec![Plane { point: DVec3::new(0.0, -1.0, 0.0), normal: DVec3::Y, material: 0 }],
+            spheres: vec![Sphere {
+                center: DVec3::new(1.0, 0.0, 0.0),
+                radius: 0.7,
+                material: 0,
+                inside_out: false,
+                uv_rotate: DVec3::ZERO,
+            }],
+            planes: vec![Plane {
+                point: DVec3::new(0.0, -1.0, 0.0),
+                normal: DVec3::Y,
+                material: 0,
+                size: 1.0,
+            }],
             textures: vec![TextureMap::new(texture.id(), Filter::Bilinear)],
             triangles: vec![],
+            background_visible: true,
+            disks: Vec::new(),
         };
         let view = FrameView::of(&scene);
         let body = codec::encode(&scene).unwrap().into();

@@ -51,12 +51,15 @@ pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) 
             translate: DVec3::ZERO,
             rotate,
             scale,
+            group: glam::DMat3::IDENTITY,
         }],
         materials,
         textures: Vec::new(),
         spheres: Vec::new(),
         planes: Vec::new(),
         triangles: Vec::new(),
+        background_visible: true,
+        disks: Vec::new(),
     }
 }
 
@@ -129,7 +132,14 @@ impl Axes {
         let distance = from_x.max(from_y).max(reach.nearest + NEAREST * self.radius);
         let (x, y) = ((reach.right - reach.left) / 2.0, (reach.top - reach.bottom) / 2.0);
         let look_at = self.center + self.right * x + self.up * y;
-        Camera { position: look_at - self.forward * distance, look_at, up: DVec3::Y, fov: FOV, zoom: 1.0 }
+        Camera {
+            position: look_at - self.forward * distance,
+            look_at,
+            up: DVec3::Y,
+            fov: FOV,
+            zoom: 1.0,
+            kind: crate::scene::CameraKind::PINHOLE,
+        }
     }
 }
 
@@ -178,6 +188,8 @@ pub(super) fn default_light(camera: &Camera) -> Light {
         color: Vec3::ONE,
         attenuation: Attenuation::None,
         shadows: true,
+        radius: 0.0,
+        shadow_samples: None,
     }
 }
 

@@ -114,8 +114,14 @@ fn a_model_whose_z_points_up_is_turned_upright() {
 
 #[test]
 fn the_default_light_is_above_and_left_of_the_camera() {
-    let camera =
-        Camera { position: DVec3::Z * 2.0, look_at: DVec3::ZERO, up: DVec3::Y, fov: 40.0, zoom: 1.0 };
+    let camera = Camera {
+        position: DVec3::Z * 2.0,
+        look_at: DVec3::ZERO,
+        up: DVec3::Y,
+        fov: 40.0,
+        zoom: 1.0,
+        kind: crate::scene::CameraKind::PINHOLE,
+    };
     let light = default_light(&camera);
     assert_eq!(light.kind, LightKind::Point { position: DVec3::new(-0.7, 1.0, 2.0) });
     assert_eq!((light.color, light.attenuation, light.shadows), (Vec3::ONE, Attenuation::None, true));

@@ -1,0 +1,94 @@
+//! Secondary rays: what leaves a surface that reflects or transmits.
+
+use glam::DVec3;
+
+use super::media::Media;
+use crate::bsdf::{fresnel, on_side_of, reflected, refracted};
+use crate::frame::PreparedFrame;
+use crate::rays::{PrimitiveId, Ray};
+use crate::scene::Material;
+
+/// A reflected or transmitted ray.
+#[derive(Clone, Copy)]
+pub(super) struct Secondary {
+    /// Direction of unit length.
+    pub ray: Ray,
+    pub starts_on: PrimitiveId,
+    /// Factor of what it sees, in the colour of its sample.
+    pub weight: DVec3,
+    /// The bodies that it is inside of.
+    pub media: Media,
+    /// The sample of the tile that it contributes to.
+    pub sample: u16,
+}
+
+/// A hit of a ray with a surface that reflects or transmits.
+pub(super) struct Arrival<'a> {
+    /// Unit direction of the ray.
+    pub direction: DVec3,
+    pub point: DVec3,
+    pub primitive: PrimitiveId,
+    /// Geometric and shading unit normals on the side of the ray.
+    pub ng: DVec3,
+    pub ns: DVec3,
+    /// Whether the ray hits the front side.
+    pub front: bool,
+    /// Index of the material, and the material.
+    pub index: u32,
+    pub material: &'a Material,
+    /// Distance from the point within which other surfaces may coincide with this one, or 0.
+    pub coincidence: f64,
+    /// Weight of the ray where it arrives.
+    pub weight: DVec3,
+    pub media: Media,
+    pub sample: u16,
+}
+
+/// The rays that leave a surface: a reflected and a transmitted one, as far as they can contribute.
+pub(super) struct Departures {
+    pub reflected: Option<Secondary>,
+    pub transmitted: Option<Secondary>,
+}
+
+impl Arrival<'_> {
+    /// The rays that leave. Hall's terms c_r I(R) + c_t I(T): total internal reflection sends the transmitted share into R.
+    pub(super) fn departures(&self, frame: &PreparedFrame) -> Departures {
+        let materials = &frame.scene().materials;
+        let (mut reflect, mut transmit) =
+            (self.material.reflect.as_dvec3(), self.material.transmit.as_dvec3());
+        let mut through = None;
+        if self.material.is_transparent() || self.material.fresnel {
+            let interface = self.media.interface(materials, self.index, self.front);
+            let eta = if self.material.thin { 1.0 } else { interface.eta };
+            let refracted = refracted(self.direction, self.ns, eta);
+            if self.material.fresnel {
+                let share = fresnel(-self.direction.dot(self.ns), eta);
+                reflect *= share;
+                transmit *= 1.0 - share;
+            } else if refracted.is_none() {
+                reflect += transmit;
+            }
+            let behind = if self.material.thin { self.media } else { interface.behind };
+            through = refracted.map(|direction| (on_side_of(direction, -self.ng), behind));
+        }
+        let least = f64::from(frame.view().quality.min_contribution);
+        let leave = |direction: DVec3, share: DVec3, media: Media| {
+            let weight = self.weight * share;
+            let origin = self.point + self.ng * self.coincidence;
+            let enough = weight.max_element() >= least && weight.max_element() > 0.0;
+            let secondary = Secondary {
+                ray: Ray { origin, direction: direction.normalize() },
+                starts_on: self.primitive,
+                weight,
+                media,
+                sample: self.sample,
+            };
+            (enough && secondary.ray.direction.is_finite() && origin.is_finite()).then_some(secondary)
+        };
+        let mirrored = on_side_of(reflected(self.direction, self.ns), self.ng);
+        Departures {
+            reflected: leave(mirrored, reflect, self.media),
+            transmitted: through.and_then(|(direction, behind)| leave(direction, transmit, behind)),
+        }
+    }
+}

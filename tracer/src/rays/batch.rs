@@ -1,0 +1,94 @@
+//! Batches: up to 256 rays of any origins and directions, as sixteen blocks, so that they are shaded as a tile is.
+
+use super::block::LocalBlock;
+use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays};
+use crate::frame::{Instance, PreparedFrame};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{LANES, Simd};
+
+/// Most rays of a batch.
+pub(crate) const BATCH: usize = BLOCKS * LANES;
+
+/// Up to 256 rays, ray i in lane i % 16 of block i / 16.
+pub(crate) struct RayBatch<'a> {
+    frame: &'a PreparedFrame,
+    pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
+    /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
+    pub places: TileRays,
+}
+
+impl<'a> RayBatch<'a> {
+    /// A batch without live rays.
+    pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
+        let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
+        Self { frame, blocks, places: TileRays::empty() }
+    }
+
+    /// Removes all rays.
+    pub(crate) fn clear(&mut self) {
+        self.blocks.iter_mut().for_each(RayBlock::clear);
+    }
+
+    /// Sets ray `index`, below [`BATCH`]: hits within 0 < t < `t_max` count, except on the primitive that it starts on.
+    pub(crate) fn set(&mut self, index: usize, ray: Ray, t_max: f64, starts_on: Option<PrimitiveId>) {
+        self.blocks[index / LANES].set(index % LANES, ray, t_max, starts_on);
+    }
+}
+
+impl RaySource for RayBatch<'_> {
+    fn frame(&self) -> &PreparedFrame {
+        self.frame
+    }
+
+    #[inline(always)]
+    fn live(&self, block: usize) -> u32 {
+        self.blocks[block].live(0)
+    }
+
+    fn ray(&self, block: usize, lane: usize) -> Ray {
+        self.blocks[block].ray(0, lane)
+    }
+
+    fn starts_on(&self, block: usize, lane: usize) -> Option<PrimitiveId> {
+        self.blocks[block].starts_on(0, lane)
+    }
+}
+
+impl SurfaceSource for RayBatch<'_> {
+    const BLOCKS: usize = BLOCKS;
+    const COMMON_ORIGIN: bool = false;
+    type Local = LocalBatch;
+
+    #[inline(always)]
+    fn directions<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
+        self.blocks[block].directions(simd)
+    }
+
+    #[inline(always)]
+    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
+        self.blocks[block].origins(simd)
+    }
+
+    fn local(&self, instance: Option<&Instance>) -> LocalBatch {
+        LocalBatch(Box::new(std::array::from_fn(|block| self.blocks[block].local(instance))))
+    }
+
+    fn places(&self) -> &TileRays {
+        &self.places
+    }
+}
+
+/// A batch of rays in the space of a mesh, rounded.
+pub(crate) struct LocalBatch(Box<[LocalBlock; BLOCKS]>);
+
+impl LocalRays<RayBatch<'_>> for LocalBatch {
+    #[inline(always)]
+    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
+        self.0[block].origins(simd)
+    }
+
+    #[inline(always)]
+    fn directions<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+        self.0[block].directions(simd)
+    }
+}
