@@ -12,6 +12,8 @@
 
 mod media;
 mod secondary;
+#[cfg(test)]
+mod tests;
 
 use glam::DVec3;
 
@@ -202,10 +204,11 @@ impl<'a> Bounces<'a> {
                     media: secondary.media,
                     sample: secondary.sample,
                 };
-                if frame.features.transparent || (goes_on && hit.material(materials).bounces()) {
+                let goes_on = goes_on && hit.material(materials).bounces();
+                if goes_on || secondary.media.absorb(materials, hit.body()) {
                     let Some((arrival, _)) = hit.arrival(frame, primitive, &incoming) else { continue };
                     weight = arrival.weight;
-                    if goes_on && arrival.material.bounces() {
+                    if goes_on {
                         self.leave(&arrival, frame);
                     }
                 }
@@ -263,6 +266,11 @@ impl Hit<'_> {
         &materials[self.surface.material.0[self.lane] as usize]
     }
 
+    /// The material, and whether the ray hits its front.
+    fn body(&self) -> (u32, bool) {
+        (self.surface.material.0[self.lane], self.surface.front >> self.lane & 1 == 1)
+    }
+
     /// The arrival of a ray, and the share of light that its way inside a transparent body leaves.
     fn arrival<'m>(
         &self,
@@ -279,9 +287,8 @@ impl Hit<'_> {
         };
         let ng = vector(&surface.ng);
         let ns = if frame.features.smooth { vector(&surface.ns) } else { ng };
-        let index = surface.material.0[lane];
+        let (index, front) = self.body();
         let materials = &frame.scene().materials;
-        let front = surface.front >> lane & 1 == 1;
         let left = if frame.features.transparent {
             incoming.media.left_after(materials, (index, front), t * length / frame.per_unit)
         } else {
