@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{BLOCKS, LocalRays, PrimitiveId, Projection, Ray, RaySource, SurfaceSource, TileRays};
-use crate::frame::{Instance, PreparedFrame};
+use crate::frame::{Affine, Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, three};
 
@@ -47,6 +47,17 @@ impl<'a> EyeTile<'a> {
         let projection = Projection::new(picture, 1.0, false).drifting([near, far], 2.0 * frame.coarsest);
         let drift = [near, far];
         Self { frame, rays, projection, drift, grid, enlarged, center, live, steps, rounded_steps }
+    }
+
+    /// Map from eye space to the tile's picture.
+    pub(crate) fn picture(&self) -> Affine {
+        let [x, y] = self.center;
+        self.frame.to_picture.enlarged(self.enlarged).centered(x, y)
+    }
+
+    /// Error bounds of coincident surfaces in the tile's picture and in depth.
+    pub(crate) fn drift(&self) -> [f32; 2] {
+        self.drift
     }
 
     /// Projection of an instance's mesh.

@@ -7,6 +7,7 @@
 //!   projection   a point or a direction to project along, and the picture seen from there
 //!   tile         256 rays in such a picture
 //!   eye          tiles of the camera
+//!   mirror       tiles of a plane mirror: the reflected rays of a tile of the camera
 //!   shadow       tiles of a point light, or of a directional one: its rays are parallel
 //!   block        any sixteen rays
 //!   batch        sixteen blocks, which are shaded as a tile is
@@ -16,6 +17,7 @@ mod batch;
 mod block;
 mod eye;
 mod hit;
+mod mirror;
 mod projection;
 mod ray;
 mod shadow;
@@ -26,6 +28,7 @@ pub(crate) use batch::{BATCH, RayBatch};
 pub(crate) use block::RayBlock;
 pub(crate) use eye::EyeTile;
 pub(crate) use hit::{HitBlock, NO_ITEM, PrimitiveId};
+pub(crate) use mirror::{MirrorTile, MirroredRay};
 pub(crate) use projection::{Frustum, Projection, ROUNDING};
 pub(crate) use ray::Ray;
 pub use ray::RayCounts;

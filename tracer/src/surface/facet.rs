@@ -184,7 +184,7 @@ impl Surfaces {
         if frame.features.smooth {
             group.put(simd, ng, &mut surface.ns);
         }
-        if frame.features.sided {
+        if frame.features.emissive {
             surface.set_front(lanes, bits(along.simd_lt(zero)));
         }
         let sound = bias.simd_le(splat(simd, f32::MAX)) & along.abs().simd_le(splat(simd, f32::MAX));

@@ -44,7 +44,7 @@ pub(crate) struct SurfaceBlock {
     pub hit: u32,
     /// Bits of the hits that lights reach: not those of unlit materials.
     pub lit: u32,
-    /// Bits of the lanes that hit the front side. Only set if a material of the scene emits or transmits light.
+    /// Bits of the lanes that hit the front side. Only set if a material of the scene emits light.
     pub front: u32,
     /// Points in eye space.
     pub point: [Lanes; 3],

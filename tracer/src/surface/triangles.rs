@@ -145,7 +145,7 @@ impl Surfaces {
         } else if frame.features.smooth {
             group.put(simd, ng, &mut surface.ns);
         }
-        if frame.features.sided {
+        if frame.features.emissive {
             surface.set_front(lanes, bits(along.simd_lt(zero)));
         }
         if let (true, Some(texels)) = (corners.uvs.is_some() || corners.colors.is_some(), &mut self.texels) {

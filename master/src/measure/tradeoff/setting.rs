@@ -115,7 +115,6 @@ mod tests {
         shadows: false,
         bounces: false,
         transparent: false,
-        sided: false,
         shadowless: false,
         soft_shadows: false,
         checkered: false,

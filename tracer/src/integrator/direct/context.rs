@@ -5,7 +5,7 @@ use super::bounce::{self, Bounces};
 use super::{Scratch, shade};
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
-use crate::intersect::tile;
+use crate::intersect::tile::{self, PictureTile};
 use crate::rays::{BLOCKS, EyeTile, HitBlock, RayCounts};
 use crate::simd::Simd;
 use crate::surface::Surfaces;

@@ -1,12 +1,16 @@
-//! The closest hits of the rays of a tile of the camera.
+//! The closest hits of the rays of a tile: one of the camera, or of a plane mirror.
 
 use super::projected_triangles::{At, ProjectedTriangles};
 use super::query::{TileQuery, cover_nearest_first, cover_projected};
 use super::traversal::{NodeFilter, Traversal};
 use super::{Picture, Scratch};
 use crate::compile::Item;
+use crate::frame::Instance;
 use crate::intersect::{Hit, cutout};
-use crate::rays::{ALL_BLOCKS, BLOCKS, EyeTile, HitBlock, NO_ITEM, PrimitiveId, ROUNDING, RaySource};
+use crate::rays::{
+    ALL_BLOCKS, BLOCKS, EyeTile, HitBlock, MirrorTile, NO_ITEM, PrimitiveId, Projection, ROUNDING, RaySource,
+    TileRays,
+};
 use crate::simd::{
     Lanes, Simd, SimdBase, bits, each_bit, f32x16, mask_of, select, select_indices, splat, u32x16,
 };
@@ -55,81 +59,168 @@ impl Closeness {
         }
     }
 
-    /// Records an exact hit. Hits that coincide with it are at most `slack` behind it.
-    fn record(&mut self, block: usize, lane: usize, t: f64, slack: f64) {
-        let closeness = |t: f64| (1.0 / t) as f32;
-        self.low[block].0[lane] = closeness(t + slack) * (1.0 - ROUNDING);
-        self.high[block].0[lane] = closeness(t) * (1.0 + ROUNDING);
+    /// Records an exact hit at a depth. Hits that coincide with it are not behind `farthest`.
+    fn record(&mut self, block: usize, lane: usize, depth: f64, farthest: f64) {
+        let closeness = |depth: f64| (1.0 / depth) as f32;
+        self.low[block].0[lane] = closeness(farthest) * (1.0 - ROUNDING);
+        self.high[block].0[lane] = closeness(depth) * (1.0 + ROUNDING);
     }
 }
 
-impl EyeTile<'_> {
+/// A tile of rays that start at one point of the picture, or seem to.
+pub(crate) trait PictureTile: RaySource + Sized {
+    /// Whether the rays start at a depth of their own, on one primitive; else they start at depth 0.
+    const STARTS: bool;
+
+    /// Places of the rays.
+    fn places(&self) -> &TileRays;
+
+    /// Projection of eye space.
+    fn projection(&self) -> &Projection;
+
+    /// Projection of an instance's mesh.
+    fn projection_of(&self, instance: &Instance) -> Projection;
+
+    /// Depth of the point at `t` along a ray.
+    fn depth(&self, block: usize, lane: usize, t: f64) -> f64;
+
+    /// Whether the rays start on this primitive.
+    fn is_start(&self, primitive: PrimitiveId) -> bool;
+
+    /// Bits of the rays of a block that start before a closeness, within bounds: those that may, and those that do for certain.
+    fn started<S: Simd>(&self, simd: S, block: usize, z_low: f32x16<S>, z_high: f32x16<S>) -> [u32; 2];
+
     /// Finds the closest hit of each live ray.
     #[inline(always)]
-    pub(crate) fn find_closest<S: Simd>(
-        &self,
-        simd: S,
-        hits: &mut [HitBlock; BLOCKS],
-        scratch: &mut Scratch,
-    ) {
+    fn find_closest<S: Simd>(&self, simd: S, hits: &mut [HitBlock; BLOCKS], scratch: &mut Scratch) {
         let Scratch { scene_stack, mesh_stack, projected, closeness, .. } = scratch;
-        closeness.clear(simd, &self.live);
+        let frame = self.frame();
+        closeness.clear(simd, &std::array::from_fn(|block| self.live(block)));
         for hits in hits.iter_mut() {
             *hits = HitBlock::NONE;
         }
-        let picture = Picture { projection: &self.projection, rays: self.rays };
+        let picture = Picture { projection: self.projection(), rays: self.places() };
         let mut query = ClosestQuery { tile: self, item: NO_ITEM, cutouts: &[], closeness, hits };
-        let mut traversal = Traversal::new(&self.frame.nodes, &[], picture, scene_stack).around_last();
+        let mut traversal = Traversal::new(&frame.nodes, &[], picture, scene_stack).around_last();
         while let Some((leaf, _)) = traversal.next(simd, &query) {
-            for &item in self.frame.items_of(leaf) {
+            for &item in frame.items_of(leaf) {
                 query.item = item;
-                query.cutouts = self.frame.cutouts_of(item);
-                match self.frame.items.get(item) {
+                query.cutouts = frame.cutouts_of(item);
+                match frame.items.get(item) {
                     Item::Model(index) => {
-                        let instance = &self.frame.instances[index];
+                        let instance = &frame.instances[index];
                         let projection = self.projection_of(instance);
-                        let picture = Picture { projection: &projection, rays: self.rays };
+                        let picture = Picture { projection: &projection, rays: self.places() };
                         cover_nearest_first(simd, &instance.mesh, picture, mesh_stack, projected, &mut query);
                     }
                     Item::Triangle(index) => {
-                        let corners = self.frame.triangles[index].corners;
-                        projected.project_exactly(0, &self.projection, corners, self.rays);
+                        let corners = frame.triangles[index].corners;
+                        projected.project_exactly(0, self.projection(), corners, self.places());
                         cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
                     }
                     Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
                 }
             }
         }
-        for plane in 0..self.frame.planes.len() as u32 {
-            query.item = self.frame.items.first_plane() + plane;
+        for plane in 0..frame.planes.len() as u32 {
+            query.item = frame.items.first_plane() + plane;
             query.test_every_ray(simd);
         }
         if hits.iter().any(|hits| hits.coincident != 0) {
-            self.resolve_coincident(hits);
+            resolve_coincident(self, hits);
         }
     }
+}
 
-    /// Rays whose nearest hit may coincide with others hit one of the same surface everywhere: see `intersect::coincide`.
-    #[cold]
-    #[inline(never)]
-    fn resolve_coincident(&self, hits: &mut [HitBlock; BLOCKS]) {
-        for (block, hits) in hits.iter_mut().enumerate() {
-            for lane in each_bit(hits.coincident) {
-                let nearest = hits.slot(lane);
-                let ray = self.ray(block, lane);
-                let (preferred, others) =
-                    self.frame.preferred(&ray, nearest, f64::INFINITY, self.starts_on(block, lane));
-                hits.coincident &= !(u32::from(!others) << lane);
-                hits.set(lane, preferred);
-            }
+impl PictureTile for EyeTile<'_> {
+    const STARTS: bool = false;
+
+    #[inline(always)]
+    fn places(&self) -> &TileRays {
+        self.rays
+    }
+
+    #[inline(always)]
+    fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    #[inline(always)]
+    fn projection_of(&self, instance: &Instance) -> Projection {
+        EyeTile::projection_of(self, instance)
+    }
+
+    #[inline(always)]
+    fn depth(&self, _: usize, _: usize, t: f64) -> f64 {
+        t
+    }
+
+    #[inline(always)]
+    fn is_start(&self, _: PrimitiveId) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn started<S: Simd>(&self, _: S, _: usize, _: f32x16<S>, _: f32x16<S>) -> [u32; 2] {
+        [0xffff; 2]
+    }
+}
+
+impl PictureTile for MirrorTile<'_> {
+    const STARTS: bool = true;
+
+    #[inline(always)]
+    fn places(&self) -> &TileRays {
+        self.rays()
+    }
+
+    #[inline(always)]
+    fn projection(&self) -> &Projection {
+        MirrorTile::projection(self)
+    }
+
+    #[inline(always)]
+    fn projection_of(&self, instance: &Instance) -> Projection {
+        MirrorTile::projection_of(self, instance)
+    }
+
+    fn depth(&self, block: usize, lane: usize, t: f64) -> f64 {
+        MirrorTile::depth(self, block, lane, t)
+    }
+
+    #[inline(always)]
+    fn is_start(&self, primitive: PrimitiveId) -> bool {
+        self.mirror() == primitive
+    }
+
+    #[inline(always)]
+    fn started<S: Simd>(&self, simd: S, block: usize, z_low: f32x16<S>, z_high: f32x16<S>) -> [u32; 2] {
+        let (low, high) = self.starts(block);
+        // All that is not before the start for certain, even if a number is NaN.
+        [0xffff & !bits(z_low.simd_gt(high.load(simd))), bits(z_high.simd_lt(low.load(simd)))]
+    }
+}
+
+/// Rays whose nearest hit may coincide with others hit one of the same surface everywhere: see `intersect::coincide`.
+#[cold]
+#[inline(never)]
+fn resolve_coincident<T: PictureTile>(tile: &T, hits: &mut [HitBlock; BLOCKS]) {
+    for (block, hits) in hits.iter_mut().enumerate() {
+        for lane in each_bit(hits.coincident) {
+            let nearest = hits.slot(lane);
+            let ray = tile.ray(block, lane);
+            let (preferred, others) =
+                tile.frame().preferred(&ray, nearest, f64::INFINITY, tile.starts_on(block, lane));
+            hits.coincident &= !(u32::from(!others) << lane);
+            hits.set(lane, preferred);
         }
     }
 }
 
 /// Query for the closest triangle. While a tile is searched, [`HitBlock::coincident`] has the rays whose hit may coincide
 /// with others.
-struct ClosestQuery<'a, 'b> {
-    tile: &'a EyeTile<'a>,
+struct ClosestQuery<'a, 'b, T> {
+    tile: &'a T,
     /// The item whose triangles are tested.
     item: u32,
     /// Bits of its triangles that alpha cuts out.
@@ -147,12 +238,12 @@ struct Nearest<S: Simd> {
     changed: u32,
 }
 
-impl ClosestQuery<'_, '_> {
+impl<T: PictureTile> ClosestQuery<'_, '_, T> {
     /// Tests an item without lines in the picture, exactly, ray by ray.
     #[inline(always)]
     fn test_every_ray<S: Simd>(&mut self, simd: S) {
         for block in 0..BLOCKS {
-            for lane in each_bit(self.tile.live[block]) {
+            for lane in each_bit(self.tile.live(block)) {
                 self.test_exactly(block, lane, 0);
             }
         }
@@ -163,7 +254,7 @@ impl ClosestQuery<'_, '_> {
     #[inline(never)]
     fn test_exactly(&mut self, block: usize, lane: usize, triangle: u32) {
         let (ray, starts_on) = (self.tile.ray(block, lane), self.tile.starts_on(block, lane));
-        let frame = self.tile.frame;
+        let frame = self.tile.frame();
         let primitive = PrimitiveId { item: self.item, triangle };
         let Some(hit) = frame.hit_of(&ray, primitive, starts_on) else { return };
         let slack = frame.slack(&ray, primitive, hit.t);
@@ -175,7 +266,8 @@ impl ClosestQuery<'_, '_> {
         }
         if best.is_none_or(|best| hit.wins_over(&best, frame)) {
             hits.set(lane, primitive);
-            self.closeness.record(block, lane, hit.t, slack);
+            let depth = |t: f64| self.tile.depth(block, lane, t);
+            self.closeness.record(block, lane, depth(hit.t), depth(hit.t + slack));
         }
     }
 
@@ -207,7 +299,7 @@ impl ClosestQuery<'_, '_> {
         triangles: u32,
         block: usize,
     ) -> bool {
-        let rays = self.tile.rays;
+        let rays = self.tile.places();
         let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
         let mut nearest = self.load(simd, block, 0);
         let mut tested = 0;
@@ -216,8 +308,17 @@ impl ClosestQuery<'_, '_> {
             let error = splat(simd, projected.z_error.0[lane]);
             let (z_low, z_high) = (z - error, z + error);
             // All that is not farther for certain, even if a number is NaN.
-            let maybe = maybe & !bits(z_high.simd_lt(nearest.low));
-            let certain = maybe & certain & bits(z_low.simd_gt(nearest.high));
+            let mut maybe = maybe & !bits(z_high.simd_lt(nearest.low));
+            let mut certain = maybe & certain & bits(z_low.simd_gt(nearest.high));
+            if T::STARTS {
+                let triangle = first + lane as u32;
+                if self.tile.is_start(PrimitiveId { item: self.item, triangle }) {
+                    continue;
+                }
+                let [may_have, has] = self.tile.started(simd, block, z_low, z_high);
+                maybe &= may_have;
+                certain &= has;
+            }
             let mask = mask_of(simd, certain);
             nearest.low = select(mask, z_low, nearest.low);
             nearest.high = select(mask, z_high, nearest.high);
@@ -252,7 +353,7 @@ impl ClosestQuery<'_, '_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let rays = self.tile.rays;
+                let rays = self.tile.places();
                 let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
                 let mut tested = 0;
                 for lane in each_bit(triangles) {
@@ -270,7 +371,7 @@ impl ClosestQuery<'_, '_> {
     }
 }
 
-impl<S: Simd> NodeFilter<S> for ClosestQuery<'_, '_> {
+impl<S: Simd, T: PictureTile> NodeFilter<S> for ClosestQuery<'_, '_, T> {
     const ON_GRID: bool = true;
 
     fn least(&self) -> &Lanes {
@@ -287,14 +388,14 @@ impl<S: Simd> NodeFilter<S> for ClosestQuery<'_, '_> {
     }
 }
 
-impl<S: Simd> TileQuery<S> for ClosestQuery<'_, '_> {
+impl<S: Simd, T: PictureTile> TileQuery<S> for ClosestQuery<'_, '_, T> {
     /// Block by block, so that the hits of a block stay in registers.
     #[inline(always)]
     fn cover(&mut self, simd: S, projected: &ProjectedTriangles, first: u32, blocks: u32) {
         let mut changed = 0;
         let cut = cutout::bits_at(self.cutouts, first);
         for block in each_bit(blocks) {
-            let rectangle = self.tile.rays.around(block);
+            let rectangle = self.tile.places().around(block);
             let triangles = projected.touching(simd, rectangle, self.closeness.least.0[block]);
             if triangles != 0 {
                 let mut any = self.cover_block(simd, projected, first, triangles & !cut, block);

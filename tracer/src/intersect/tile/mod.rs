@@ -32,6 +32,7 @@ mod traversal;
 
 use crate::rays::{Projection, TileRays};
 use closest::Closeness;
+pub(crate) use closest::PictureTile;
 use points::Points;
 use projected_triangles::ProjectedTriangles;
 use traversal::{Frontier, TraversalStack};

@@ -7,12 +7,14 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::Scratch;
+use super::closest::PictureTile;
 use crate::compile::{CompiledScene, Item};
 use crate::frame::{PinholeRays, PreparedFrame};
 use crate::light::SHADOW_T_MAX;
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::rays::{
-    BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, SIDE, ShadowTarget, ShadowTile, TileRays, place,
+    BATCH, BLOCKS, EyeTile, HitBlock, MirrorTile, MirroredRay, PrimitiveId, Ray, SIDE, ShadowTarget,
+    ShadowTile, TileRays, place,
 };
 use crate::scene::{
     Background, Camera, FrameView, Material, Model, NormalMode, Plane, Quality, RenderSettings, Scene,
@@ -120,6 +122,7 @@ fn frame_of(
     triangles: &[[DVec3; 3]],
     camera: Camera,
     (width, height, samples): (u32, u32, u32),
+    mirror: Option<Plane>,
 ) -> PreparedFrame {
     let (singles, rest) = triangles.split_at(4);
     let mesh = mesh_of(rest).map(Arc::new);
@@ -157,7 +160,7 @@ fn frame_of(
         textures: vec![],
         models,
         spheres: vec![spheres; usize::from(few)],
-        planes: vec![planes; usize::from(few)],
+        planes: std::iter::repeat_n(planes, usize::from(few)).chain(mirror).collect(),
         triangles: singles.iter().map(single).collect(),
         background_visible: true,
         disks: Vec::new(),
@@ -237,7 +240,7 @@ fn closest_hits_of_tiles_are_those_of_brute_force() {
         let targets: Vec<DVec3> =
             (0..side * side).map(|i| rays.of_sample(corner.0 + i % side, corner.1 + i / side)).collect();
         let triangles = hard_triangles(random, DVec3::ZERO, &targets, 60);
-        let mut frame = frame_of(random, &triangles, camera, size);
+        let mut frame = frame_of(random, &triangles, camera, size, None);
         let live = some_lanes(random);
         let primitives = primitives(&frame);
         let closest = |ray: &Ray| frame.preferred_of(ray, primitives.iter().copied(), f64::INFINITY, None);
@@ -258,6 +261,98 @@ fn closest_hits_of_tiles_are_those_of_brute_force() {
             }
         }
     }
+}
+
+/// A plane that a camera in the origin sees, and the map of directions that it reflects.
+fn mirror_before(random: &mut Random, camera: &Camera) -> (Plane, impl Fn(DVec3) -> DVec3 + use<>) {
+    let ahead = camera.look_at.normalize();
+    let tilt = random.one_of(&[0.0, 0.3, 2.0, 30.0]);
+    let normal = (random.vector() * tilt - ahead).normalize();
+    let point = ahead * random.ten_to(-2.0, 0.5);
+    let plane = Plane { point, normal, material: 0, size: 1.0 };
+    (plane, move |direction: DVec3| direction - normal * (2.0 * direction.dot(normal)))
+}
+
+#[inline(always)]
+fn find_mirrored<S: Simd>(
+    simd: S,
+    frame: &PreparedFrame,
+    (mirror, live, reflected): (PrimitiveId, [u32; BLOCKS], &[MirroredRay; BATCH]),
+    corner: (u32, u32),
+    hits: &mut [HitBlock; BLOCKS],
+) {
+    let rays = TileRays::grid(simd);
+    let center = [corner.0, corner.1].map(|corner| f64::from(corner + SIDE as u32 / 2));
+    let eye = EyeTile::new(frame, &rays, live, center, frame.rays.grid());
+    let plane = frame.planes.last().unwrap();
+    MirrorTile::new(simd, &eye, mirror, (plane.normal, plane.offset), live, reflected).find_closest(
+        simd,
+        hits,
+        &mut Scratch::new(),
+    );
+}
+
+#[test]
+fn closest_hits_of_mirrored_tiles_are_those_of_brute_force() {
+    let mut hits = [const { HitBlock::NONE }; BLOCKS];
+    let mut tested = 0;
+    for seed in 0..400 {
+        let random = &mut Random(seed ^ 0x5eed);
+        let camera = camera(random);
+        let grid = 1 + random.below(4) as u32;
+        let size = (1 + random.below(40) as u32, 1 + random.below(40) as u32, grid * grid);
+        let (width, height, samples) = size;
+        let view = FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() };
+        let rays = PinholeRays::new(&view);
+        let corner = (random.below(width as usize * 4) as u32, random.below(height as usize * 4) as u32);
+        let side = SIDE as u32;
+        let (plane, reflect) = mirror_before(random, &camera);
+        let image = plane.normal * (2.0 * plane.normal.dot(plane.point));
+        let targets: Vec<DVec3> = (0..side * side)
+            .map(|i| image + reflect(rays.of_sample(corner.0 + i % side, corner.1 + i / side)))
+            .collect();
+        let triangles = hard_triangles(random, image, &targets, 60);
+        let mut frame = frame_of(random, &triangles, camera, size, Some(plane));
+        let mirror =
+            PrimitiveId { item: frame.items.first_plane() + frame.planes.len() as u32 - 1, triangle: 0 };
+        let mut live = some_lanes(random);
+        let mut reflected = Box::new([MirroredRay::NONE; BATCH]);
+        for (block, lane) in each_lane(&live.clone()) {
+            let (column, row) = place(block, lane);
+            let direction = frame.rays.of_sample(corner.0 + column as u32, corner.1 + row as u32);
+            let arriving = Ray { origin: DVec3::ZERO, direction };
+            let Some(t) = frame.t_of(&arriving, mirror, None) else {
+                live[block] &= !(1 << lane);
+                continue;
+            };
+            let normal = frame.planes.last().unwrap().normal;
+            let leaving = (direction - normal * (2.0 * direction.dot(normal))).normalize();
+            reflected[block * LANES + lane] = MirroredRay {
+                ray: Ray { origin: direction * t, direction: leaving },
+                start: t,
+                speed: 1.0 / direction.length(),
+            };
+        }
+        let primitives = primitives(&frame);
+        let expected: Vec<(usize, usize, Option<PrimitiveId>)> = each_lane(&live)
+            .map(|(block, lane)| {
+                let ray = reflected[block * LANES + lane].ray;
+                let hit = frame.preferred_of(&ray, primitives.iter().copied(), f64::INFINITY, Some(mirror));
+                (block, lane, hit.map(|(_, primitive)| primitive))
+            })
+            .collect();
+        tested += expected.iter().filter(|(_, _, hit)| hit.is_some()).count();
+        for level in simd::all() {
+            frame.level = level;
+            let rays = (mirror, live, &*reflected);
+            dispatch!(level, simd => find_mirrored(simd, &frame, rays, corner, &mut hits));
+            for &(block, lane, expected) in &expected {
+                let found = hits[block].primitive(lane);
+                assert_eq!(found, expected, "seed {seed}, {}, {block}/{lane}", simd::name(level));
+            }
+        }
+    }
+    assert!(tested > 1000, "only {tested} rays hit something");
 }
 
 /// Points of a tile: a patch of a surface, smooth or rough, in two parts, or in one place.
@@ -319,7 +414,7 @@ fn check_shadows(seed: u64, far: f64) {
     let targets: Vec<DVec3> = lanes.iter().map(|&lane| point_of(&points, lane)).collect();
     let triangles = hard_triangles(random, light, &targets, 60);
     let camera = camera(random);
-    let mut frame = frame_of(random, &triangles, camera, (16, 16, 1));
+    let mut frame = frame_of(random, &triangles, camera, (16, 16, 1), None);
     let scale = frame.per_unit;
     for block in &mut points {
         block.iter_mut().for_each(|lanes| lanes.0.iter_mut().for_each(|x| *x *= scale as f32));

@@ -31,8 +31,6 @@ pub struct SceneFeatures {
     pub bounces: bool,
     /// A material transmits: sides are told apart, and shadows are not all or nothing.
     pub transparent: bool,
-    /// A material emits or transmits: the front of a surface differs from its back.
-    pub sided: bool,
     /// A material of some geometry casts no shadow.
     pub shadowless: bool,
     /// A light that casts shadows has an extent.
@@ -63,7 +61,6 @@ impl SceneFeatures {
             shadows: scene.lights.iter().any(|light| light.shadows),
             bounces: any(Material::bounces),
             transparent: any(Material::is_transparent),
-            sided: any(|material| material.is_emissive() || material.is_transparent()),
             shadowless: any(|material| !material.casts_shadow),
             soft_shadows: scene.lights.iter().any(|light| light.shadows && light.radius > 0.0),
             checkered: any(|material| material.checker.is_some()),

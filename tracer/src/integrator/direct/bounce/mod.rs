@@ -8,9 +8,11 @@
 //! ```text
 //!   secondary   rays that leave a surface
 //!   media       the transparent bodies around a ray
+//!   mirrors     rays that one plane reflects: traced as a tile
 //! ```
 
 mod media;
+mod mirrors;
 mod secondary;
 #[cfg(test)]
 mod tests;
@@ -25,6 +27,7 @@ use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, 
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::SurfaceBlock;
 use media::Media;
+use mirrors::Mirrors;
 use secondary::{Arrival, Secondary};
 
 /// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
@@ -42,6 +45,7 @@ pub(super) struct Bounces<'a> {
     /// Rays of each sample so far.
     counts: [u16; BATCH],
     batch: RayBatch<'a>,
+    mirrors: Mirrors,
 }
 
 impl<'a> Bounces<'a> {
@@ -55,6 +59,7 @@ impl<'a> Bounces<'a> {
                 transmitted: Vec::new(),
                 counts: [0; BATCH],
                 batch: RayBatch::new(frame),
+                mirrors: Mirrors::new(),
             })
         })
     }
@@ -88,6 +93,7 @@ impl<'a> Bounces<'a> {
             return Ok(());
         }
         self.sums = context.direct.colors;
+        self.mirrors.find(simd, tile, &self.reflected, &mut context.tile);
         let max_depth = context.frame.view().quality.max_depth;
         for depth in 1..=max_depth {
             self.queue.clear();
@@ -95,7 +101,7 @@ impl<'a> Bounces<'a> {
             self.queue.append(&mut self.transmitted);
             let queue = std::mem::take(&mut self.queue);
             for rays in queue.chunks(BATCH) {
-                self.trace_batch(simd, tile, rays, context)?;
+                self.trace_batch(simd, tile, rays, depth, context)?;
                 self.collect(rays, depth < max_depth, context);
             }
             self.queue = queue;
@@ -153,6 +159,7 @@ impl<'a> Bounces<'a> {
         simd: S,
         tile: &EyeTile<'_>,
         rays: &[Secondary],
+        depth: u8,
         context: &mut TileContext<'a, W>,
     ) -> Result<(), Cancelled> {
         if context.is_cancelled() {
@@ -160,6 +167,7 @@ impl<'a> Bounces<'a> {
         }
         context.watch.enter(Stage::Secondary);
         context.counts.secondary += rays.len() as u64;
+        context.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
         let batch = &mut self.batch;
         batch.clear();
         for (index, secondary) in rays.iter().enumerate() {
@@ -170,11 +178,14 @@ impl<'a> Bounces<'a> {
             batch.places.y[to_block].0[to_lane] = tile.rays.y[block].0[lane];
         }
         for (block, hits) in context.hits.iter_mut().enumerate() {
-            *hits = if batch.live(block) == 0 {
-                HitBlock::NONE
-            } else {
-                context.frame.closest_hits_of(&batch.blocks[block])
-            };
+            let start = (block * LANES).min(rays.len());
+            let of_block = &rays[start..rays.len().min(start + LANES)];
+            // Only the first generation leaves a tile of the camera.
+            let known = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
+            let rest = batch.live(block) & !known;
+            if rest != 0 {
+                context.frame.closest_hits_of(&batch.blocks[block], rest, hits);
+            }
         }
         context.watch.enter(Stage::Surfaces);
         simd.vectorize(
@@ -204,8 +215,9 @@ impl<'a> Bounces<'a> {
                     media: secondary.media,
                     sample: secondary.sample,
                 };
-                let goes_on = goes_on && hit.material(materials).bounces();
-                if goes_on || secondary.media.absorb(materials, hit.body()) {
+                let material = hit.material(materials);
+                let goes_on = goes_on && material.bounces();
+                if goes_on || secondary.media.may_absorb(materials, material) {
                     let Some((arrival, _)) = hit.arrival(frame, primitive, &incoming) else { continue };
                     weight = arrival.weight;
                     if goes_on {
@@ -266,11 +278,6 @@ impl Hit<'_> {
         &materials[self.surface.material.0[self.lane] as usize]
     }
 
-    /// The material, and whether the ray hits its front.
-    fn body(&self) -> (u32, bool) {
-        (self.surface.material.0[self.lane], self.surface.front >> self.lane & 1 == 1)
-    }
-
     /// The arrival of a ray, and the share of light that its way inside a transparent body leaves.
     fn arrival<'m>(
         &self,
@@ -281,14 +288,19 @@ impl Hit<'_> {
         let (surface, lane) = (self.surface, self.lane);
         let t = frame.t_of(self.ray, primitive, incoming.starts_on)?;
         let length = self.ray.direction.length();
-        let vector = |lanes: &[Lanes; 3]| {
-            DVec3::new(f64::from(lanes[0].0[lane]), f64::from(lanes[1].0[lane]), f64::from(lanes[2].0[lane]))
-                .normalize()
-        };
-        let ng = vector(&surface.ng);
-        let ns = if frame.features.smooth { vector(&surface.ns) } else { ng };
-        let (index, front) = self.body();
+        let point = self.ray.origin + self.ray.direction * t;
+        let outwards = frame.front_normal(primitive, point);
+        let front = outwards.dot(self.ray.direction) < 0.0;
+        let ng = if front { outwards } else { -outwards };
+        let index = surface.material.0[lane];
         let materials = &frame.scene().materials;
+        let material = &materials[index as usize];
+        let flat = frame.is_flat(primitive) && material.normal_map.is_none();
+        let ns = if flat {
+            ng
+        } else {
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(surface.ns[axis].0[lane]))).normalize()
+        };
         let left = if frame.features.transparent {
             incoming.media.left_after(materials, (index, front), t * length / frame.per_unit)
         } else {
@@ -297,13 +309,15 @@ impl Hit<'_> {
         let coincides = self.hits.coincident >> lane & 1 == 1;
         let arrival = Arrival {
             direction: self.ray.direction / length,
-            point: self.ray.origin + self.ray.direction * t,
+            point,
+            t,
             primitive,
             ng,
             ns,
+            on_plane: flat && frame.is_planar(primitive),
             front,
             index,
-            material: &materials[index as usize],
+            material,
             coincidence: if coincides { 4.0 * frame.coarsest } else { 0.0 },
             weight: left.map_or(incoming.weight, |left| incoming.weight * left),
             media: incoming.media,

@@ -1,0 +1,128 @@
+//! Tiles of a plane mirror: the reflected rays of a tile of the camera, which seem to start at the eye's mirror image.
+//!
+//! Seen from there the scene has the places of the camera's picture, if the scene is mirrored at the plane first. So the reflected
+//! rays of one plane are a tile again, whose rays start at a depth of their own: on the mirror.
+
+use glam::{DMat3, DVec3};
+
+use super::{BATCH, BLOCKS, EyeTile, PrimitiveId, Projection, ROUNDING, Ray, RaySource, TileRays};
+use crate::frame::{Affine, Instance, PreparedFrame};
+use crate::simd::{LANES, Lanes, Simd};
+
+/// Error bound of the places of mirrored rays, in samples: they are computed from the mirror's points, not from the picture.
+const PLACE_ERROR: f32 = 1.0 / (1 << 18) as f32;
+
+/// The rays of a tile that one plane reflects.
+pub(crate) struct MirrorTile<'a> {
+    frame: &'a PreparedFrame,
+    /// The primitive that all rays start on.
+    mirror: PrimitiveId,
+    rays: TileRays,
+    live: [u32; BLOCKS],
+    projection: Projection,
+    /// Map from eye space, mirrored, to the tile's picture.
+    picture: Affine,
+    /// See `EyeTile`.
+    drift: [f32; 2],
+    reflected: &'a [MirroredRay; BATCH],
+    /// Bounds of the closeness of the rays' starts.
+    low: [Lanes; BLOCKS],
+    high: [Lanes; BLOCKS],
+}
+
+/// A reflected ray, and where it starts.
+#[derive(Clone, Copy)]
+pub(crate) struct MirroredRay {
+    pub ray: Ray,
+    /// Depth of its start, seen from the eye's mirror image.
+    pub start: f64,
+    /// Depth along the ray, per t.
+    pub speed: f64,
+}
+
+impl MirroredRay {
+    /// A ray that is not live.
+    pub(crate) const NONE: Self =
+        Self { ray: Ray { origin: DVec3::ZERO, direction: DVec3::X }, start: 1.0, speed: 1.0 };
+}
+
+impl<'a> MirrorTile<'a> {
+    /// The rays of the lanes `live` of a tile, which the plane n . x = `offset` of the primitive `mirror` reflects.
+    pub(crate) fn new<S: Simd>(
+        simd: S,
+        eye: &EyeTile<'a>,
+        mirror: PrimitiveId,
+        (normal, offset): (DVec3, f64),
+        live: [u32; BLOCKS],
+        reflected: &'a [MirroredRay; BATCH],
+    ) -> Self {
+        let frame = eye.frame;
+        // x -> x - 2 (n.x - offset) n.
+        let columns = [0, 1, 2].map(|i| DVec3::AXES[i] - normal * (2.0 * normal[i]));
+        let at_plane =
+            Affine::new(DMat3::from_cols(columns[0], columns[1], columns[2]), normal * (2.0 * offset));
+        let picture = eye.picture().after(&at_plane);
+        let drift = eye.drift();
+        let projection = Projection::new(picture, 1.0, false).drifting(drift, 2.0 * frame.coarsest);
+        let mut rays = eye.rays.clone();
+        rays.bound(simd, &live);
+        rays.widen(simd, PLACE_ERROR);
+        let (mut low, mut high) = ([Lanes::ZERO; BLOCKS], [Lanes::ZERO; BLOCKS]);
+        for (index, mirrored) in reflected.iter().enumerate() {
+            let closeness = (1.0 / mirrored.start) as f32;
+            low[index / LANES].0[index % LANES] = closeness * (1.0 - ROUNDING);
+            high[index / LANES].0[index % LANES] = closeness * (1.0 + ROUNDING);
+        }
+        Self { frame, mirror, rays, live, projection, picture, drift, reflected, low, high }
+    }
+
+    pub(crate) fn rays(&self) -> &TileRays {
+        &self.rays
+    }
+
+    pub(crate) fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    /// Projection of an instance's mesh.
+    #[inline(always)]
+    pub(crate) fn projection_of(&self, instance: &Instance) -> Projection {
+        Projection::new(self.picture.after(&instance.placement), 1.0, false)
+            .drifting(self.drift, f64::from(instance.drift))
+    }
+
+    /// The primitive that all rays start on.
+    pub(crate) fn mirror(&self) -> PrimitiveId {
+        self.mirror
+    }
+
+    /// Bounds of the closeness of the starts of a block's rays.
+    pub(crate) fn starts(&self, block: usize) -> (&Lanes, &Lanes) {
+        (&self.low[block], &self.high[block])
+    }
+
+    /// Depth of the point at `t` along a ray.
+    pub(crate) fn depth(&self, block: usize, lane: usize, t: f64) -> f64 {
+        let MirroredRay { start, speed, .. } = self.reflected[block * LANES + lane];
+        start + speed * t
+    }
+}
+
+impl RaySource for MirrorTile<'_> {
+    fn frame(&self) -> &PreparedFrame {
+        self.frame
+    }
+
+    #[inline(always)]
+    fn live(&self, block: usize) -> u32 {
+        self.live[block]
+    }
+
+    fn ray(&self, block: usize, lane: usize) -> Ray {
+        self.reflected[block * LANES + lane].ray
+    }
+
+    fn starts_on(&self, _: usize, _: usize) -> Option<PrimitiveId> {
+        Some(self.mirror)
+    }
+}
