@@ -3,7 +3,7 @@
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.
 
-use super::{PrimitiveId, Ray, TileRays};
+use super::{PrimitiveId, Projection, Ray, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, f32x16};
@@ -54,10 +54,25 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     }
 }
 
+/// Tiles of a camera with a projection: their closest hits are found together, see `intersect::tile`.
+pub(crate) trait CameraTile: SurfaceSource {
+    /// Whether rays are parallel and start at depth 0, and do not start at a point.
+    const PARALLEL: bool;
+
+    /// The samples of the tile.
+    fn samples(&self) -> &TileSamples<'_>;
+
+    /// Projection of eye space.
+    fn projection(&self) -> &Projection;
+
+    /// Projection of an instance's mesh.
+    fn projection_of(&self, instance: &Instance) -> Projection;
+}
+
 /// The rays of a source in another space, rounded.
 pub(crate) trait LocalRays<R> {
     /// Origins of the rays of a block.
-    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
+    fn origins<S: Simd>(&self, simd: S, rays: &R, block: usize) -> Vec3x16<S>;
 
     /// Directions of the rays of a block.
     fn directions<S: Simd>(&self, simd: S, rays: &R, block: usize) -> Vec3x16<S>;

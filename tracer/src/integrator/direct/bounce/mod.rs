@@ -16,10 +16,10 @@ mod secondary;
 use glam::DVec3;
 
 use super::super::stage::{Stage, Watch};
-use super::{TileContext, shade};
+use super::TileContext;
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
-use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, RaySource, TileColors};
+use crate::rays::{BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, SurfaceSource, TileColors, TileRays};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::SurfaceBlock;
 use media::Media;
@@ -63,13 +63,14 @@ impl<'a> Bounces<'a> {
 /// # Errors
 /// [`Cancelled`], polled before each batch.
 #[inline(never)]
-pub(super) fn add<S: Simd, W: Watch>(
+pub(super) fn add<S: Simd, R: SurfaceSource, W: Watch>(
     simd: S,
-    tile: &EyeTile<'_>,
+    tile: &R,
     context: &mut TileContext<'_, W>,
 ) -> Result<(), Cancelled> {
     let Some(mut bounces) = context.bounces.take() else { return Ok(()) };
-    let result = bounces.trace(simd, tile, context);
+    bounces.begin(tile, context);
+    let result = bounces.trace(simd, tile.places(), context);
     context.bounces = Some(bounces);
     result
 }
@@ -78,10 +79,9 @@ impl<'a> Bounces<'a> {
     fn trace<S: Simd, W: Watch>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         context: &mut TileContext<'a, W>,
     ) -> Result<(), Cancelled> {
-        self.begin(tile, context);
         if self.reflected.is_empty() && self.transmitted.is_empty() {
             return Ok(());
         }
@@ -93,7 +93,7 @@ impl<'a> Bounces<'a> {
             self.queue.append(&mut self.transmitted);
             let queue = std::mem::take(&mut self.queue);
             for rays in queue.chunks(BATCH) {
-                self.trace_batch(simd, tile, rays, context)?;
+                self.trace_batch(simd, places, rays, context)?;
                 self.collect(rays, depth < max_depth, context);
             }
             self.queue = queue;
@@ -103,7 +103,7 @@ impl<'a> Bounces<'a> {
     }
 
     /// Starts the first generation from the hits of a tile.
-    fn begin<W>(&mut self, tile: &EyeTile<'_>, context: &mut TileContext<'_, W>) {
+    fn begin<R: SurfaceSource, W>(&mut self, tile: &R, context: &mut TileContext<'_, W>) {
         self.reflected.clear();
         self.transmitted.clear();
         self.counts = [0; BATCH];
@@ -149,7 +149,7 @@ impl<'a> Bounces<'a> {
     fn trace_batch<S: Simd, W: Watch>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         rays: &[Secondary],
         context: &mut TileContext<'a, W>,
     ) -> Result<(), Cancelled> {
@@ -164,25 +164,10 @@ impl<'a> Bounces<'a> {
             batch.set(index, secondary.ray, f64::INFINITY, Some(secondary.starts_on));
             let (block, lane) = place_of(usize::from(secondary.sample));
             let (to_block, to_lane) = place_of(index);
-            batch.places.x[to_block].0[to_lane] = tile.rays.x[block].0[lane];
-            batch.places.y[to_block].0[to_lane] = tile.rays.y[block].0[lane];
+            batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
+            batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
         }
-        for (block, hits) in context.hits.iter_mut().enumerate() {
-            *hits = if batch.live(block) == 0 {
-                HitBlock::NONE
-            } else {
-                context.frame.closest_hits_of(&batch.blocks[block])
-            };
-        }
-        context.watch.enter(Stage::Surfaces);
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                context.surfaces.find(simd, batch, &context.hits);
-                context.watch.enter(Stage::Shading);
-                shade(simd, batch, context);
-            },
-        );
+        context.trace_batch(simd, batch);
         Ok(())
     }
 
