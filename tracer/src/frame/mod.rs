@@ -5,7 +5,7 @@
 //! numbers, bit for bit.
 //!
 //! ```text
-//!   camera     pixels to directions, and the camera's map from eye space to its picture
+//!   camera     pixels to rays, and the camera's map from eye space to its picture
 //!   affine     the maps
 //!   instance   placed meshes
 //!   rounding   error bounds of placed geometry
@@ -31,7 +31,7 @@ use crate::texture::Texture;
 
 pub(crate) use affine::Affine;
 pub use camera::Basis;
-pub(crate) use camera::PinholeRays;
+pub(crate) use camera::{CameraRays, FisheyeRay, FisheyeRays, ParallelRays, PinholeRays};
 pub(crate) use instance::Instance;
 use instance::ToEye;
 use rounding::placement_rounding;
@@ -47,8 +47,8 @@ pub struct PreparedFrame {
     view: FrameView,
     /// Eye units per world unit: a power of two.
     pub(crate) per_unit: f64,
-    pub(crate) rays: PinholeRays,
-    /// Map from eye space to the camera's picture: see [`PinholeRays::picture_map`].
+    pub(crate) rays: CameraRays,
+    /// Map from eye space to the camera's picture: see [`CameraRays::picture_map`].
     pub(crate) to_picture: Affine,
     pub(crate) items: Items,
     pub(crate) instances: Vec<Instance>,
@@ -101,7 +101,7 @@ impl PreparedFrame {
         go_on(cancelled)?;
         let source = scene.scene();
         let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
-        let rays = PinholeRays::new(view);
+        let rays = CameraRays::new(view, 1.0 / to_eye.unit);
         let to_picture = rays.picture_map();
         let mut instances: Vec<Instance> = source
             .models

@@ -83,7 +83,7 @@ pub(crate) struct LocalBatch(Box<[LocalBlock; BLOCKS]>);
 
 impl LocalRays<RayBatch<'_>> for LocalBatch {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
+    fn origins<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
         self.0[block].origins(simd)
     }
 

@@ -5,9 +5,12 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{BATCH, BLOCKS, EyeTile, PrimitiveId, Projection, ROUNDING, Ray, RaySource, TileRays};
+use super::{
+    BATCH, BLOCKS, EyeTile, PictureTile, PrimitiveId, Projection, ROUNDING, Ray, RaySource, SurfaceSource,
+    TileRays,
+};
 use crate::frame::{Affine, Instance, PreparedFrame};
-use crate::simd::{LANES, Lanes, Simd};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, f32x16};
 
 /// Error bound of the places of mirrored rays, in samples: they are computed from the mirror's points, not from the picture.
 const PLACE_ERROR: f32 = 1.0 / (1 << 18) as f32;
@@ -56,15 +59,15 @@ impl<'a> MirrorTile<'a> {
         live: [u32; BLOCKS],
         reflected: &'a [MirroredRay; BATCH],
     ) -> Self {
-        let frame = eye.frame;
+        let frame = eye.of_frame();
         // x -> x - 2 (n.x - offset) n.
         let columns = [0, 1, 2].map(|i| DVec3::AXES[i] - normal * (2.0 * normal[i]));
         let at_plane =
             Affine::new(DMat3::from_cols(columns[0], columns[1], columns[2]), normal * (2.0 * offset));
-        let picture = eye.picture().after(&at_plane);
+        let picture = eye.map().after(&at_plane);
         let drift = eye.drift();
         let projection = Projection::new(picture, 1.0, false).drifting(drift, 2.0 * frame.coarsest);
-        let mut rays = eye.rays.clone();
+        let mut rays = eye.places().clone();
         rays.bound(simd, &live);
         rays.widen(simd, PLACE_ERROR);
         let (mut low, mut high) = ([Lanes::ZERO; BLOCKS], [Lanes::ZERO; BLOCKS]);
@@ -74,37 +77,6 @@ impl<'a> MirrorTile<'a> {
             high[index / LANES].0[index % LANES] = closeness * (1.0 + ROUNDING);
         }
         Self { frame, mirror, rays, live, projection, picture, drift, reflected, low, high }
-    }
-
-    pub(crate) fn rays(&self) -> &TileRays {
-        &self.rays
-    }
-
-    pub(crate) fn projection(&self) -> &Projection {
-        &self.projection
-    }
-
-    /// Projection of an instance's mesh.
-    #[inline(always)]
-    pub(crate) fn projection_of(&self, instance: &Instance) -> Projection {
-        Projection::new(self.picture.after(&instance.placement), 1.0, false)
-            .drifting(self.drift, f64::from(instance.drift))
-    }
-
-    /// The primitive that all rays start on.
-    pub(crate) fn mirror(&self) -> PrimitiveId {
-        self.mirror
-    }
-
-    /// Bounds of the closeness of the starts of a block's rays.
-    pub(crate) fn starts(&self, block: usize) -> (&Lanes, &Lanes) {
-        (&self.low[block], &self.high[block])
-    }
-
-    /// Depth of the point at `t` along a ray.
-    pub(crate) fn depth(&self, block: usize, lane: usize, t: f64) -> f64 {
-        let MirroredRay { start, speed, .. } = self.reflected[block * LANES + lane];
-        start + speed * t
     }
 }
 
@@ -124,5 +96,43 @@ impl RaySource for MirrorTile<'_> {
 
     fn starts_on(&self, _: usize, _: usize) -> Option<PrimitiveId> {
         Some(self.mirror)
+    }
+}
+
+impl PictureTile for MirrorTile<'_> {
+    const PARALLEL: bool = false;
+    const STARTS: bool = true;
+
+    #[inline(always)]
+    fn picture(&self) -> &TileRays {
+        &self.rays
+    }
+
+    #[inline(always)]
+    fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    #[inline(always)]
+    fn projection_of(&self, instance: &Instance) -> Projection {
+        Projection::new(self.picture.after(&instance.placement), 1.0, false)
+            .drifting(self.drift, f64::from(instance.drift))
+    }
+
+    fn depth(&self, block: usize, lane: usize, t: f64) -> f64 {
+        let MirroredRay { start, speed, .. } = self.reflected[block * LANES + lane];
+        start + speed * t
+    }
+
+    #[inline(always)]
+    fn is_start(&self, primitive: PrimitiveId) -> bool {
+        self.mirror == primitive
+    }
+
+    #[inline(always)]
+    fn started<S: Simd>(&self, simd: S, block: usize, low: f32x16<S>, high: f32x16<S>) -> [u32; 2] {
+        let [least, most] = [self.low[block].load(simd), self.high[block].load(simd)];
+        // All that is not before the start for certain, even if a number is NaN.
+        [0xffff & !bits(low.simd_gt(most)), bits(high.simd_lt(least))]
     }
 }

@@ -245,7 +245,7 @@ impl Batch {
             Item::Sphere(_) | Item::Disk(_) => return,
         };
         let [a, b, c] = corners;
-        let to_a = a.sub(space.rays.origins(simd, 0));
+        let to_a = a.sub(space.rays.origins(simd, rays, 0));
         let normal = b.sub(a).cross(c.sub(a));
         let normal = normal.scale(to_unit(simd, normal.size()));
         // n.d is the same in eye space and in mesh space, up to the scale of the normal.

@@ -117,7 +117,7 @@ impl Surfaces {
         let surface = &mut self.blocks[block];
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let [a, b, c] = corners.places;
-        let to_a = a.sub(space.rays.origins(simd, block));
+        let to_a = a.sub(space.rays.origins(simd, rays, block));
         let (ab, ac) = (b.sub(a), c.sub(a));
         let normal = ab.cross(ac);
         let normal = normal.scale(to_unit(simd, normal.size()));

@@ -4,6 +4,7 @@
 
 mod adaptive;
 mod build_quality;
+mod cameras;
 mod coincident;
 mod common;
 mod cuts;

@@ -23,12 +23,14 @@ const WHITE: u32 = 0x00f4_f4f4;
 const SOFT: u32 = 0x00c4_ccd4;
 
 /// Keys of the window, and the effect of each.
-const KEYS: [(&str, &str); 16] = [
+const KEYS: [(&str, &str); 18] = [
     ("W A S D", "move"),
     ("Q E", "move down, up"),
     ("arrows", "look around"),
+    (", .", "roll left, right"),
     ("drag", "orbit"),
     ("wheel", "nearer, farther"),
+    ("+ -", "zoom (or page up, page down)"),
     ("R", "back to the start"),
     ("O", "hide the figures"),
     ("F", "workers and their time"),

@@ -1,29 +1,33 @@
-//! The closest hits of the rays of a tile: one of the camera, or of a plane mirror.
+//! The closest hits of the rays of a tile: one of a camera with a projection, or of a plane mirror.
+//!
+//! The closeness z of a hit at t is 1 / t for rays from a point, and -t for parallel rays; see `rays::Projection`. Parallel rays
+//! start at depth 0, and what is behind has a positive z.
 
 use super::projected_triangles::{At, ProjectedTriangles};
 use super::query::{TileQuery, cover_nearest_first, cover_projected};
 use super::traversal::{NodeFilter, Traversal};
 use super::{Picture, Scratch};
 use crate::compile::Item;
-use crate::frame::Instance;
 use crate::intersect::{Hit, cutout};
-use crate::rays::{
-    ALL_BLOCKS, BLOCKS, EyeTile, HitBlock, MirrorTile, NO_ITEM, PrimitiveId, Projection, ROUNDING, RaySource,
-    TileRays,
-};
+use crate::rays::{ALL_BLOCKS, BLOCKS, HitBlock, NO_ITEM, PictureTile, PrimitiveId, ROUNDING};
 use crate::simd::{
     Lanes, Simd, SimdBase, bits, each_bit, f32x16, mask_of, select, select_indices, splat, u32x16,
 };
 
-/// Closeness (1 / depth) of the hits of a tile, with error bounds.
+/// Closeness of the hits of a tile, with error bounds.
 pub(super) struct Closeness {
-    /// Bounds of the closeness of each ray's hit; 0 without a hit, infinity for rays that are not live.
+    /// Bounds of the closeness of each ray's hit; [`nowhere`] without a hit, infinity for rays that are not live.
     low: [Lanes; BLOCKS],
     high: [Lanes; BLOCKS],
     /// Least of `low` in each block.
     least: Lanes,
     /// Least of `least`.
     least_of_all: f32,
+}
+
+/// Closeness of what is infinitely far away.
+const fn nowhere<T: PictureTile>() -> f32 {
+    if T::PARALLEL { f32::NEG_INFINITY } else { 0.0 }
 }
 
 impl Closeness {
@@ -36,14 +40,14 @@ impl Closeness {
 
     /// Resets all rays to no hit.
     #[inline(always)]
-    fn clear<S: Simd>(&mut self, simd: S, live: &[u32; BLOCKS]) {
+    fn clear<S: Simd, T: PictureTile>(&mut self, simd: S, tile: &T) {
         let infinite = splat(simd, f32::INFINITY);
         self.least_of_all = f32::INFINITY;
         for block in 0..BLOCKS {
-            let start = select(mask_of(simd, live[block]), splat(simd, 0.0), infinite);
+            let start = select(mask_of(simd, tile.live(block)), splat(simd, nowhere::<T>()), infinite);
             self.low[block].store(start);
             self.high[block].store(start);
-            self.least.0[block] = if live[block] == 0 { f32::INFINITY } else { 0.0 };
+            self.least.0[block] = if tile.live(block) == 0 { f32::INFINITY } else { nowhere::<T>() };
             self.least_of_all = self.least_of_all.min(self.least.0[block]);
         }
     }
@@ -60,144 +64,61 @@ impl Closeness {
     }
 
     /// Records an exact hit at a depth. Hits that coincide with it are not behind `farthest`.
-    fn record(&mut self, block: usize, lane: usize, depth: f64, farthest: f64) {
-        let closeness = |depth: f64| (1.0 / depth) as f32;
-        self.low[block].0[lane] = closeness(farthest) * (1.0 - ROUNDING);
-        self.high[block].0[lane] = closeness(depth) * (1.0 + ROUNDING);
+    fn record<T: PictureTile>(&mut self, block: usize, lane: usize, depth: f64, farthest: f64) {
+        let (low, high) = if T::PARALLEL {
+            (-(farthest as f32) * (1.0 + ROUNDING), -(depth as f32) * (1.0 - ROUNDING))
+        } else {
+            let closeness = |depth: f64| (1.0 / depth) as f32;
+            (closeness(farthest) * (1.0 - ROUNDING), closeness(depth) * (1.0 + ROUNDING))
+        };
+        self.low[block].0[lane] = low;
+        self.high[block].0[lane] = high;
     }
 }
 
-/// A tile of rays that start at one point of the picture, or seem to.
-pub(crate) trait PictureTile: RaySource + Sized {
-    /// Whether the rays start at a depth of their own, on one primitive; else they start at depth 0.
-    const STARTS: bool;
-
-    /// Places of the rays.
-    fn places(&self) -> &TileRays;
-
-    /// Projection of eye space.
-    fn projection(&self) -> &Projection;
-
-    /// Projection of an instance's mesh.
-    fn projection_of(&self, instance: &Instance) -> Projection;
-
-    /// Depth of the point at `t` along a ray.
-    fn depth(&self, block: usize, lane: usize, t: f64) -> f64;
-
-    /// Whether the rays start on this primitive.
-    fn is_start(&self, primitive: PrimitiveId) -> bool;
-
-    /// Bits of the rays of a block that start before a closeness, within bounds: those that may, and those that do for certain.
-    fn started<S: Simd>(&self, simd: S, block: usize, z_low: f32x16<S>, z_high: f32x16<S>) -> [u32; 2];
-
-    /// Finds the closest hit of each live ray.
-    #[inline(always)]
-    fn find_closest<S: Simd>(&self, simd: S, hits: &mut [HitBlock; BLOCKS], scratch: &mut Scratch) {
-        let Scratch { scene_stack, mesh_stack, projected, closeness, .. } = scratch;
-        let frame = self.frame();
-        closeness.clear(simd, &std::array::from_fn(|block| self.live(block)));
-        for hits in hits.iter_mut() {
-            *hits = HitBlock::NONE;
-        }
-        let picture = Picture { projection: self.projection(), rays: self.places() };
-        let mut query = ClosestQuery { tile: self, item: NO_ITEM, cutouts: &[], closeness, hits };
-        let mut traversal = Traversal::new(&frame.nodes, &[], picture, scene_stack).around_last();
-        while let Some((leaf, _)) = traversal.next(simd, &query) {
-            for &item in frame.items_of(leaf) {
-                query.item = item;
-                query.cutouts = frame.cutouts_of(item);
-                match frame.items.get(item) {
-                    Item::Model(index) => {
-                        let instance = &frame.instances[index];
-                        let projection = self.projection_of(instance);
-                        let picture = Picture { projection: &projection, rays: self.places() };
-                        cover_nearest_first(simd, &instance.mesh, picture, mesh_stack, projected, &mut query);
-                    }
-                    Item::Triangle(index) => {
-                        let corners = frame.triangles[index].corners;
-                        projected.project_exactly(0, self.projection(), corners, self.places());
-                        cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
-                    }
-                    Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
+/// Finds the closest hit of each live ray of a tile.
+#[inline(always)]
+pub(crate) fn find_closest<S: Simd, T: PictureTile>(
+    simd: S,
+    tile: &T,
+    hits: &mut [HitBlock; BLOCKS],
+    scratch: &mut Scratch,
+) {
+    let (frame, rays) = (tile.frame(), tile.picture());
+    let Scratch { scene_stack, mesh_stack, projected, closeness, .. } = scratch;
+    closeness.clear(simd, tile);
+    for hits in hits.iter_mut() {
+        *hits = HitBlock::NONE;
+    }
+    let picture = Picture { projection: tile.projection(), rays };
+    let mut query = ClosestQuery { tile, item: NO_ITEM, cutouts: &[], closeness, hits };
+    let mut traversal = Traversal::new(&frame.nodes, &[], picture, scene_stack).around_last();
+    while let Some((leaf, _)) = traversal.next(simd, &query) {
+        for &item in frame.items_of(leaf) {
+            query.item = item;
+            query.cutouts = frame.cutouts_of(item);
+            match frame.items.get(item) {
+                Item::Model(index) => {
+                    let instance = &frame.instances[index];
+                    let projection = tile.projection_of(instance);
+                    let picture = Picture { projection: &projection, rays };
+                    cover_nearest_first(simd, &instance.mesh, picture, mesh_stack, projected, &mut query);
                 }
+                Item::Triangle(index) => {
+                    let corners = frame.triangles[index].corners;
+                    projected.project_exactly(0, tile.projection(), corners, rays);
+                    cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
+                }
+                Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
             }
         }
-        for plane in 0..frame.planes.len() as u32 {
-            query.item = frame.items.first_plane() + plane;
-            query.test_every_ray(simd);
-        }
-        if hits.iter().any(|hits| hits.coincident != 0) {
-            resolve_coincident(self, hits);
-        }
     }
-}
-
-impl PictureTile for EyeTile<'_> {
-    const STARTS: bool = false;
-
-    #[inline(always)]
-    fn places(&self) -> &TileRays {
-        self.rays
+    for plane in 0..frame.planes.len() as u32 {
+        query.item = frame.items.first_plane() + plane;
+        query.test_every_ray(simd);
     }
-
-    #[inline(always)]
-    fn projection(&self) -> &Projection {
-        &self.projection
-    }
-
-    #[inline(always)]
-    fn projection_of(&self, instance: &Instance) -> Projection {
-        EyeTile::projection_of(self, instance)
-    }
-
-    #[inline(always)]
-    fn depth(&self, _: usize, _: usize, t: f64) -> f64 {
-        t
-    }
-
-    #[inline(always)]
-    fn is_start(&self, _: PrimitiveId) -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn started<S: Simd>(&self, _: S, _: usize, _: f32x16<S>, _: f32x16<S>) -> [u32; 2] {
-        [0xffff; 2]
-    }
-}
-
-impl PictureTile for MirrorTile<'_> {
-    const STARTS: bool = true;
-
-    #[inline(always)]
-    fn places(&self) -> &TileRays {
-        self.rays()
-    }
-
-    #[inline(always)]
-    fn projection(&self) -> &Projection {
-        MirrorTile::projection(self)
-    }
-
-    #[inline(always)]
-    fn projection_of(&self, instance: &Instance) -> Projection {
-        MirrorTile::projection_of(self, instance)
-    }
-
-    fn depth(&self, block: usize, lane: usize, t: f64) -> f64 {
-        MirrorTile::depth(self, block, lane, t)
-    }
-
-    #[inline(always)]
-    fn is_start(&self, primitive: PrimitiveId) -> bool {
-        self.mirror() == primitive
-    }
-
-    #[inline(always)]
-    fn started<S: Simd>(&self, simd: S, block: usize, z_low: f32x16<S>, z_high: f32x16<S>) -> [u32; 2] {
-        let (low, high) = self.starts(block);
-        // All that is not before the start for certain, even if a number is NaN.
-        [0xffff & !bits(z_low.simd_gt(high.load(simd))), bits(z_high.simd_lt(low.load(simd)))]
+    if hits.iter().any(|hits| hits.coincident != 0) {
+        resolve_coincident(tile, hits);
     }
 }
 
@@ -267,7 +188,7 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
         if best.is_none_or(|best| hit.wins_over(&best, frame)) {
             hits.set(lane, primitive);
             let depth = |t: f64| self.tile.depth(block, lane, t);
-            self.closeness.record(block, lane, depth(hit.t), depth(hit.t + slack));
+            self.closeness.record::<T>(block, lane, depth(hit.t), depth(hit.t + slack));
         }
     }
 
@@ -299,7 +220,7 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
         triangles: u32,
         block: usize,
     ) -> bool {
-        let rays = self.tile.places();
+        let rays = self.tile.picture();
         let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
         let mut nearest = self.load(simd, block, 0);
         let mut tested = 0;
@@ -308,16 +229,21 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
             let error = splat(simd, projected.z_error.0[lane]);
             let (z_low, z_high) = (z - error, z + error);
             // All that is not farther for certain, even if a number is NaN.
-            let mut maybe = maybe & !bits(z_high.simd_lt(nearest.low));
+            let maybe = maybe & !bits(z_high.simd_lt(nearest.low));
             let mut certain = maybe & certain & bits(z_low.simd_gt(nearest.high));
+            let mut maybe = maybe;
             if T::STARTS {
-                let triangle = first + lane as u32;
-                if self.tile.is_start(PrimitiveId { item: self.item, triangle }) {
+                if self.tile.is_start(PrimitiveId { item: self.item, triangle: first + lane as u32 }) {
                     continue;
                 }
                 let [may_have, has] = self.tile.started(simd, block, z_low, z_high);
                 maybe &= may_have;
                 certain &= has;
+            }
+            if T::PARALLEL {
+                // Only the exact test distinguishes a triangle on the plane of the origins from one behind it.
+                certain &= bits(z_high.simd_lt(splat(simd, 0.0)));
+                maybe &= !bits(z_low.simd_gt(splat(simd, 0.0)));
             }
             let mask = mask_of(simd, certain);
             nearest.low = select(mask, z_low, nearest.low);
@@ -353,7 +279,7 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let rays = self.tile.places();
+                let rays = self.tile.picture();
                 let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
                 let mut tested = 0;
                 for lane in each_bit(triangles) {
@@ -373,6 +299,7 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
 
 impl<S: Simd, T: PictureTile> NodeFilter<S> for ClosestQuery<'_, '_, T> {
     const ON_GRID: bool = true;
+    const FROM_PLANE: bool = T::PARALLEL;
 
     fn least(&self) -> &Lanes {
         &self.closeness.least
@@ -395,7 +322,7 @@ impl<S: Simd, T: PictureTile> TileQuery<S> for ClosestQuery<'_, '_, T> {
         let mut changed = 0;
         let cut = cutout::bits_at(self.cutouts, first);
         for block in each_bit(blocks) {
-            let rectangle = self.tile.places().around(block);
+            let rectangle = self.tile.picture().around(block);
             let triangles = projected.touching(simd, rectangle, self.closeness.least.0[block]);
             if triangles != 0 {
                 let mut any = self.cover_block(simd, projected, first, triangles & !cut, block);

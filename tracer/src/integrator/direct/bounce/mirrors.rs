@@ -4,7 +4,7 @@
 
 use super::place_of;
 use super::secondary::Secondary;
-use crate::intersect::tile::{PictureTile, Scratch};
+use crate::intersect::tile::{Scratch, find_closest};
 use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, MirrorTile, MirroredRay, PrimitiveId, RaySource};
 use crate::simd::{Simd, each_bit};
 
@@ -37,7 +37,7 @@ impl Mirrors {
         reflected: &[Secondary],
         scratch: &mut Scratch,
     ) {
-        self.known = [0; BLOCKS];
+        self.clear();
         let mut rest = reflected;
         for _ in 0..MOST_MIRRORS {
             let Some(next) = rest.iter().position(|secondary| secondary.by_plane && !self.knows(secondary))
@@ -54,6 +54,11 @@ impl Mirrors {
             let others = rest.iter().position(|secondary| secondary.starts_on != mirror);
             rest = &rest[others.unwrap_or(rest.len())..];
         }
+    }
+
+    /// Forgets all hits.
+    pub(super) fn clear(&mut self) {
+        self.known = [0; BLOCKS];
     }
 
     fn knows(&self, secondary: &Secondary) -> bool {
@@ -91,7 +96,7 @@ impl Mirrors {
         let found = &mut self.found;
         simd.vectorize(
             #[inline(always)]
-            || mirrored.find_closest(simd, found, scratch),
+            || find_closest(simd, &mirrored, found, scratch),
         );
         for block in 0..BLOCKS {
             for lane in each_bit(live[block]) {

@@ -20,10 +20,10 @@ mod tests;
 use glam::DVec3;
 
 use super::super::stage::{Stage, Watch};
-use super::{TileContext, shade};
+use super::TileContext;
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
-use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, RaySource, TileColors};
+use crate::rays::{BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, SurfaceSource, TileColors, TileRays};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::SurfaceBlock;
 use media::Media;
@@ -70,13 +70,19 @@ impl<'a> Bounces<'a> {
 /// # Errors
 /// [`Cancelled`], polled before each batch.
 #[inline(never)]
-pub(super) fn add<S: Simd, W: Watch>(
+pub(super) fn add<S: Simd, R: SurfaceSource, W: Watch>(
     simd: S,
-    tile: &EyeTile<'_>,
+    tile: &R,
     context: &mut TileContext<'_, W>,
 ) -> Result<(), Cancelled> {
     let Some(mut bounces) = context.bounces.take() else { return Ok(()) };
-    let result = bounces.trace(simd, tile, context);
+    bounces.begin(tile, context);
+    if let Some(eye) = tile.eye() {
+        bounces.mirrors.find(simd, eye, &bounces.reflected, &mut context.tile);
+    } else {
+        bounces.mirrors.clear();
+    }
+    let result = bounces.trace(simd, tile.places(), context);
     context.bounces = Some(bounces);
     result
 }
@@ -85,15 +91,13 @@ impl<'a> Bounces<'a> {
     fn trace<S: Simd, W: Watch>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         context: &mut TileContext<'a, W>,
     ) -> Result<(), Cancelled> {
-        self.begin(tile, context);
         if self.reflected.is_empty() && self.transmitted.is_empty() {
             return Ok(());
         }
         self.sums = context.direct.colors;
-        self.mirrors.find(simd, tile, &self.reflected, &mut context.tile);
         let max_depth = context.frame.view().quality.max_depth;
         for depth in 1..=max_depth {
             self.queue.clear();
@@ -101,7 +105,7 @@ impl<'a> Bounces<'a> {
             self.queue.append(&mut self.transmitted);
             let queue = std::mem::take(&mut self.queue);
             for rays in queue.chunks(BATCH) {
-                self.trace_batch(simd, tile, rays, depth, context)?;
+                self.trace_batch(simd, places, rays, depth, context)?;
                 self.collect(rays, depth < max_depth, context);
             }
             self.queue = queue;
@@ -111,7 +115,7 @@ impl<'a> Bounces<'a> {
     }
 
     /// Starts the first generation from the hits of a tile.
-    fn begin<W>(&mut self, tile: &EyeTile<'_>, context: &mut TileContext<'_, W>) {
+    fn begin<R: SurfaceSource, W>(&mut self, tile: &R, context: &mut TileContext<'_, W>) {
         self.reflected.clear();
         self.transmitted.clear();
         self.counts = [0; BATCH];
@@ -157,7 +161,7 @@ impl<'a> Bounces<'a> {
     fn trace_batch<S: Simd, W: Watch>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         rays: &[Secondary],
         depth: u8,
         context: &mut TileContext<'a, W>,
@@ -168,34 +172,23 @@ impl<'a> Bounces<'a> {
         context.watch.enter(Stage::Secondary);
         context.counts.secondary += rays.len() as u64;
         context.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
+        let mut known = [0; BLOCKS];
         let batch = &mut self.batch;
         batch.clear();
         for (index, secondary) in rays.iter().enumerate() {
             batch.set(index, secondary.ray, f64::INFINITY, Some(secondary.starts_on));
             let (block, lane) = place_of(usize::from(secondary.sample));
             let (to_block, to_lane) = place_of(index);
-            batch.places.x[to_block].0[to_lane] = tile.rays.x[block].0[lane];
-            batch.places.y[to_block].0[to_lane] = tile.rays.y[block].0[lane];
+            batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
+            batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
         }
         for (block, hits) in context.hits.iter_mut().enumerate() {
             let start = (block * LANES).min(rays.len());
             let of_block = &rays[start..rays.len().min(start + LANES)];
             // Only the first generation leaves a tile of the camera.
-            let known = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
-            let rest = batch.live(block) & !known;
-            if rest != 0 {
-                context.frame.closest_hits_of(&batch.blocks[block], rest, hits);
-            }
+            known[block] = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
         }
-        context.watch.enter(Stage::Surfaces);
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                context.surfaces.find(simd, batch, &context.hits);
-                context.watch.enter(Stage::Shading);
-                shade(simd, batch, context);
-            },
-        );
+        context.trace_batch(simd, batch, known);
         Ok(())
     }
 
