@@ -5,8 +5,9 @@
 //!   channel = m 2^(e - 24)       bits 0-8, 9-17, 18-26: m of R, G, B; bits 27-31: e
 //! ```
 //!
-//! The largest channel of a colour has a mantissa of at least 256, so its relative error is at most 1/512; those of the others
-//! have at most the error of it. Every four bytes are a valid colour, and finite.
+//! From 2^-16 on the largest channel of a colour has a mantissa of at least 256, so its relative error is at most 1/512. The error of
+//! the other channels has the same bound, 1/512 of the largest channel; below 2^-16 the bound is 2^-25. Every four bytes are a valid
+//! colour, and finite.
 
 /// The largest channel: 511 * 2^7.
 pub const MAX_CHANNEL: f32 = 65_408.0;
@@ -25,8 +26,8 @@ fn power_of_two(exponent: i32) -> f32 {
 
 /// The four bytes nearest to a colour. NaN and negative channels count as 0, larger ones than [`MAX_CHANNEL`] as that.
 pub(super) fn pack(color: [f32; 3]) -> u32 {
-    // `max` returns the other number for NaN.
-    let color = color.map(|channel| channel.max(0.0).min(MAX_CHANNEL));
+    // The comparison is false for NaN.
+    let color = color.map(|channel| if channel > 0.0 { channel.min(MAX_CHANNEL) } else { 0.0 });
     let largest = color[0].max(color[1]).max(color[2]);
     let floor_of_log2 = (largest.to_bits() >> 23) as i32 - 127;
     // The exponent for which the largest mantissa is in [256, 512).
