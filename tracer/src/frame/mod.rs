@@ -24,7 +24,8 @@ use crate::bvh::WideNode;
 use crate::cancel::{IsCancelled, go_on, never};
 use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, transformed_bounds};
 use crate::light::EyeLight;
-use crate::scene::{Camera, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
+use crate::rotation::sin_cos_degrees;
+use crate::scene::{Background, Camera, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
 use crate::shape::{EyeDisk, EyePlane, EyeSphere};
 use crate::simd::{self, Level};
 use crate::texture::Texture;
@@ -59,6 +60,10 @@ pub struct PreparedFrame {
     /// Largest error bound of any surface, in eye units.
     pub(crate) coarsest: f64,
     pub(crate) lights: Vec<EyeLight>,
+    /// The background as rays of the camera see it.
+    pub(crate) seen_background: Background,
+    /// Sine and cosine of the rotation of a sky.
+    pub(crate) sky_rotation: [f32; 2],
     /// The scene's tree, with the boxes of this frame.
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) features: SceneFeatures,
@@ -131,6 +136,8 @@ impl PreparedFrame {
             planes,
             coarsest,
             lights: lights(source, &view.quality, &to_eye),
+            seen_background: seen_background(source),
+            sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
             features: scene.features().at(&view.quality),
             level: simd::best(),
@@ -220,6 +227,16 @@ fn lights(scene: &Scene, quality: &Quality, to_eye: &ToEye) -> Vec<EyeLight> {
     let cast = |light: &Light| Light { shadows: light.shadows && quality.shadows, ..*light };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
     scene.lights.iter().map(place).collect()
+}
+
+fn seen_background(scene: &Scene) -> Background {
+    if scene.background_visible { scene.background } else { Background::Color(Vec3::ZERO) }
+}
+
+fn sky_rotation(scene: &Scene) -> [f32; 2] {
+    let Background::Sky(sky) = scene.background else { return [0.0, 1.0] };
+    let (sin, cos) = sin_cos_degrees(sky.rotate);
+    [sin as f32, cos as f32]
 }
 
 fn spheres(scene: &Scene, to_eye: &ToEye) -> Vec<EyeSphere> {

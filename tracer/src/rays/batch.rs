@@ -57,6 +57,7 @@ impl RaySource for RayBatch<'_> {
 impl SurfaceSource for RayBatch<'_> {
     const BLOCKS: usize = BLOCKS;
     const COMMON_ORIGIN: bool = false;
+    const CAMERA: bool = false;
     type Local = LocalBatch;
 
     #[inline(always)]

@@ -85,6 +85,7 @@ impl RaySource for EyeTile<'_> {
 impl SurfaceSource for EyeTile<'_> {
     const BLOCKS: usize = BLOCKS;
     const COMMON_ORIGIN: bool = true;
+    const CAMERA: bool = true;
     type Local = LocalTile;
 
     #[inline(always)]

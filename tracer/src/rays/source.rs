@@ -31,6 +31,9 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     /// Whether all rays start at the origin of eye space.
     const COMMON_ORIGIN: bool;
 
+    /// Whether the rays are those of the camera, which do not see a background that is not visible.
+    const CAMERA: bool;
+
     /// The rays in the space of a mesh.
     type Local: LocalRays<Self>;
 

@@ -66,7 +66,7 @@ pub(super) fn shade<S: Simd, R: SurfaceSource, W: Watch>(
     for block in 0..BLOCKS {
         let hit = surfaces.blocks[block].hit;
         if rays.live(block) & !hit != 0 {
-            background::background(simd, &frame.scene().background, rays, block).store(&mut colors[block]);
+            background::background(simd, rays, block, &mut colors[block]);
         }
         if hit != 0 {
             let behind = Vec3x16::load(simd, &colors[block]);
