@@ -7,11 +7,13 @@ use crate::farm::ViewRequest;
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.
-const NAMES: [&str; 47] = [
+const NAMES: [&str; 49] = [
     PLAIN,
     "fast-exponent",
     "diffuse",
     "nearest",
+    "bilinear",
+    "trilinear",
     "no-shadows",
     "shadow-samples-9",
     "shadow-samples-4",
@@ -197,7 +199,9 @@ mod tests {
             settings.iter().map(|setting| setting.name).collect::<Vec<_>>()
         };
         let bare = names(NOTHING);
-        for word in ["diffuse", "exponent", "shadow", "nearest", "depth", "contribution", "terminator"] {
+        for word in
+            ["diffuse", "exponent", "shadow", "linear", "nearest", "depth", "contribution", "terminator"]
+        {
             assert!(!bare.iter().any(|name| name.contains(word)), "{bare:?}");
         }
         for name in [PLAIN, "scale-1-2", "samples-16", "reduced-colors"] {
@@ -257,7 +261,9 @@ mod tests {
         let settings = MeasuredSetting::applicable(&EVERYTHING, &view);
         assert!(settings.iter().all(|one| one.applied_to(&view).view.quality.shading == Shading::Normals));
         let names: Vec<_> = settings.iter().map(|setting| setting.name).collect();
-        for word in ["diffuse", "exponent", "shadow", "nearest", "depth", "contribution", "terminator"] {
+        for word in
+            ["diffuse", "exponent", "shadow", "linear", "nearest", "depth", "contribution", "terminator"]
+        {
             assert!(!names.iter().any(|name| name.contains(word)), "{names:?}");
         }
         assert!(names.contains(&"scale-1-2") && names.contains(&"samples-4+adaptive"));

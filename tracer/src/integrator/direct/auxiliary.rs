@@ -65,7 +65,9 @@ fn shade_with<S: Simd, R: SurfaceSource>(
 /// (n + 1) / 2 of the normals of a block. Eye space has the axes of the world.
 #[inline(always)]
 fn normals<S: Simd>(simd: S, frame: &PreparedFrame, surface: &SurfaceBlock) -> Vec3x16<S> {
-    let normals = Vec3x16::load(simd, if frame.features.smooth { &surface.ns } else { &surface.ng });
+    let features = &frame.features;
+    let is_tilted = features.smooth || features.normal_mapped;
+    let normals = Vec3x16::load(simd, if is_tilted { &surface.ns } else { &surface.ng });
     let (one, half) = (splat(simd, 1.0), splat(simd, 0.5));
     Vec3x16(three!(axis => (normals.0[axis] + one) * half))
 }
@@ -301,7 +303,7 @@ mod tests {
             // Neighbours in the list are far apart in at least one channel.
             let next = item_color(item.wrapping_add(1));
             let distance = color.iter().zip(next).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            assert!(distance > 0.1, "{item}: {color:?} and {next:?}");
+            assert!(distance > 0.25, "{item}: {color:?} and {next:?}");
         }
     }
 }

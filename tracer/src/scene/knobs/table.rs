@@ -104,7 +104,7 @@ pub static KNOBS: &[Knob] = &[
         name: "terminator",
         key: "smooth_terminator",
         option: "smooth-terminator",
-        summary: "Whether shadows of smooth surfaces on themselves end smoothly, or at the edges of triangles.",
+        summary: "Whether shadow rays of smooth meshes start on the smooth surface, or on its triangles.",
         form: KnobForm::Switch,
         values: &[
             reduced("off", "hard terminator", "hard-terminator", |s| s.quality.smooth_terminator = false),
@@ -200,6 +200,9 @@ pub static KNOBS: &[Knob] = &[
         values: &[
             reduced("nearest", "nearest texels", "nearest", |s| s.quality.filter = Some(Filter::Nearest)),
             reduced("bilinear", "bilinear texels", "bilinear", |s| s.quality.filter = Some(Filter::Bilinear)),
+            reduced("trilinear", "trilinear texels", "trilinear", |s| {
+                s.quality.filter = Some(Filter::Trilinear);
+            }),
             KnobValue {
                 word: None,
                 aliases: &[],

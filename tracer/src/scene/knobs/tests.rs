@@ -47,7 +47,7 @@ fn words_of_values_are_the_best_first() {
     assert_eq!(words("shading"), ["full", "diffuse", "normals", "depth", "item", "albedo"]);
     assert_eq!(words("depth"), ["64", "16", "8", "5", "3", "2", "1", "0"]);
     assert_eq!(words("min_contribution"), ["0", "0.001", "0.004", "0.01", "0.03", "0.1"]);
-    assert_eq!(words("filter"), ["bilinear", "nearest"]);
+    assert_eq!(words("filter"), ["trilinear", "bilinear", "nearest"]);
     assert_eq!(words("exponent"), ["exact", "fast"]);
     assert_eq!(words("colors"), ["exact", "reduced"]);
     assert_eq!(words("dither"), ["off", "on"]);

@@ -149,7 +149,8 @@ fn smooth(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
 fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
     let maps = &source.scene.textures;
     let filter = |own: Filter| view.quality.filter.unwrap_or(own);
-    let nearest = maps.iter().filter(|map| filter(map.filter) == Filter::Nearest).count();
+    let count = |counted: Filter| maps.iter().filter(|map| filter(map.filter) == counted).count();
+    let nearest = count(Filter::Nearest);
     let asked_for = compiled.features().textured;
     let pictures: usize = source.textures.iter().map(|texture| texture.bytes().len()).sum();
     let uvs = taken_or_saved(source, asked_for, |memory| memory.uv_bytes, MeshMemory::full_uv_bytes);
@@ -159,7 +160,9 @@ fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
         why: if maps.is_empty() {
             "none".to_owned()
         } else {
-            format!("{nearest} of {} nearest, the others bilinear", counted(maps.len() as u64, "texture"))
+            let trilinear = count(Filter::Trilinear);
+            let textures = counted(maps.len() as u64, "texture");
+            format!("{nearest} nearest and {trilinear} trilinear of {textures}, the others bilinear")
         },
         // The more expensive filter, unless all textures have the other one.
         measured_percent: Some(if asked_for && nearest == maps.len() { NEAREST } else { BILINEAR }),

@@ -19,9 +19,7 @@ use super::super::stage::{Stage, Watch};
 use super::{TileContext, shade};
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
-use crate::rays::{
-    BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, RayCounts, RaySource, TileColors,
-};
+use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, RaySource, TileColors};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::SurfaceBlock;
 use media::Media;
@@ -29,7 +27,7 @@ use secondary::{Arrival, Secondary};
 
 /// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
 /// 0.004 of the light, the default of `min_contribution`, end before.
-const MOST_OF_SAMPLE: u16 = RayCounts::MAX_SECONDARY;
+const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
 
 /// Queues and memory of the secondary rays of a tile, kept from tile to tile.
 pub(super) struct Bounces<'a> {
