@@ -1,5 +1,6 @@
 //! Overlay of the picture: figures, panels, the list of keys, and messages.
 
+use std::borrow::Cow;
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -96,7 +97,7 @@ pub(super) struct Figures {
     /// Lines of the quality controller.
     pub(super) quality: Vec<String>,
     /// Labels of all knobs that are not at full quality.
-    pub(super) reductions: Vec<&'static str>,
+    pub(super) reductions: Vec<Cow<'static, str>>,
     /// Connected workers.
     pub(super) workers: usize,
     /// Render threads of all workers.
@@ -114,7 +115,7 @@ impl Figures {
         let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
         lines.extend(self.quality.iter().cloned());
-        lines.extend(self.reductions.iter().copied().map(str::to_owned));
+        lines.extend(self.reductions.iter().map(ToString::to_string));
         lines.push(format!(
             "{}, {}",
             counted(self.workers as u64, "worker"),

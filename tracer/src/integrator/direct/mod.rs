@@ -9,12 +9,14 @@
 //!
 //! ```text
 //!   context      a tile of rays, from its hits to its colours
+//!   auxiliary    pictures without light: normals, depth, items, diffuse colours
 //!   background   rays without a hit
 //!   bounce       reflected and transmitted rays
 //!   emission     unlit materials, and light that surfaces emit
 //!   shadow       S_j
 //! ```
 
+mod auxiliary;
 mod background;
 mod bounce;
 mod context;
@@ -62,6 +64,9 @@ pub(super) fn shade<S: Simd, R: SurfaceSource, W: Watch>(
     context: &mut TileContext<'_, W>,
 ) {
     let frame = context.frame;
+    if !frame.view().quality.shading.is_light() {
+        return auxiliary::shade(rays, &context.hits, &context.surfaces, &mut context.direct.colors);
+    }
     let (surfaces, colors) = (&mut context.surfaces, &mut context.direct.colors);
     for block in 0..BLOCKS {
         let hit = surfaces.blocks[block].hit;

@@ -72,14 +72,33 @@ impl SceneFeatures {
     #[must_use]
     pub fn at(self, quality: &Quality) -> Self {
         let full = quality.shading == Shading::Full;
+        let shown = self.shown_by(quality.shading);
         Self {
-            specular: self.specular && full,
-            powers: self.powers && full,
-            filtered: self.filtered && quality.filter != Some(Filter::Nearest),
-            shadows: self.shadows && quality.shadows,
-            soft_shadows: self.soft_shadows && quality.shadows,
-            bounces: self.bounces && quality.max_depth > 0,
-            ..self
+            specular: shown.specular && full,
+            powers: shown.powers && full,
+            filtered: shown.filtered && quality.filter != Some(Filter::Nearest),
+            shadows: shown.shadows && quality.shadows,
+            soft_shadows: shown.soft_shadows && quality.shadows,
+            bounces: shown.bounces && quality.max_depth > 0,
+            ..shown
+        }
+    }
+
+    /// Features that pictures of a kind show. Those of light show all.
+    #[must_use]
+    pub fn shown_by(self, shading: Shading) -> Self {
+        let holes = Self { cut_out: self.cut_out, ..Self::default() };
+        match shading {
+            Shading::Full | Shading::Diffuse => self,
+            Shading::Normals => Self { smooth: self.smooth, normal_mapped: self.normal_mapped, ..holes },
+            Shading::Depth | Shading::Item => holes,
+            Shading::Albedo => Self {
+                textured: self.textured,
+                filtered: self.filtered,
+                vertex_colors: self.vertex_colors,
+                checkered: self.checkered,
+                ..holes
+            },
         }
     }
 }
@@ -163,5 +182,38 @@ mod tests {
         assert!(!left.specular && !left.powers && !left.shadows);
         let fast = Quality { exponent: ExponentPrecision::Fast, ..Quality::default() };
         assert_eq!(features.at(&fast), features);
+    }
+
+    #[test]
+    fn pictures_without_light_use_no_feature_of_light() {
+        let everything = SceneFeatures {
+            specular: true,
+            powers: true,
+            textured: true,
+            filtered: true,
+            vertex_colors: true,
+            emissive: true,
+            unlit: true,
+            cut_out: true,
+            smooth: true,
+            shadows: true,
+            bounces: true,
+            transparent: true,
+            sided: true,
+            shadowless: true,
+            soft_shadows: true,
+            checkered: true,
+            normal_mapped: true,
+        };
+        let at = |shading| everything.at(&Quality { shading, ..Quality::default() });
+        assert_eq!(at(Shading::Full), everything);
+        let holes = SceneFeatures { cut_out: true, ..SceneFeatures::default() };
+        assert_eq!((at(Shading::Depth), at(Shading::Item)), (holes, holes));
+        assert_eq!(at(Shading::Normals), SceneFeatures { smooth: true, normal_mapped: true, ..holes });
+        let colored = SceneFeatures { textured: true, filtered: true, vertex_colors: true, ..holes };
+        assert_eq!(at(Shading::Albedo), SceneFeatures { checkered: true, ..colored });
+        let nearest =
+            Quality { shading: Shading::Albedo, filter: Some(Filter::Nearest), ..Quality::default() };
+        assert!(!everything.at(&nearest).filtered);
     }
 }

@@ -32,7 +32,7 @@ use secondary::{Arrival, Secondary};
 
 /// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
 /// 0.004 of the light, the default of `min_contribution`, end before.
-const MOST_OF_SAMPLE: u16 = 1024;
+const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
 
 /// Queues and memory of the secondary rays of a tile, kept from tile to tile.
 pub(super) struct Bounces<'a> {
