@@ -77,7 +77,7 @@ fn alpha(texture: &Texture, filter: Filter, wrap: Wrap, place: DVec2) -> f64 {
     match filter {
         // The conversion rounds down, and maps NaN to 0.
         Filter::Nearest => f64::from(texture.alpha((x as u32).min(width - 1), (y as u32).min(height - 1))),
-        Filter::Bilinear => {
+        Filter::Bilinear | Filter::Trilinear => {
             let (columns, right) = pair(x, width, wrap);
             let (rows, up) = pair(y, height, wrap);
             let row = |y: u32| {

@@ -23,7 +23,7 @@ impl Oracle {
         let (x, y) = (uv.x * width, uv.y * height);
         match self.view.quality.filter.unwrap_or(map.filter) {
             Filter::Nearest => color_of(x.floor(), y.floor()),
-            Filter::Bilinear => {
+            Filter::Bilinear | Filter::Trilinear => {
                 let (left, bottom) = ((x - 0.5).floor(), (y - 0.5).floor());
                 let mut sum = DVec4::ZERO;
                 for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {

@@ -185,7 +185,7 @@ fn look_up<S: Simd>(
     let uv = uv.laid(simd, &map.tiling);
     let color = match frame.view().quality.filter.unwrap_or(map.filter) {
         Filter::Nearest => nearest(simd, texture, map.tiling.wrap, uv, lanes),
-        Filter::Bilinear => bilinear(simd, texture, map.tiling.wrap, uv, lanes),
+        Filter::Bilinear | Filter::Trilinear => bilinear(simd, texture, map.tiling.wrap, uv, lanes),
     };
     let (mask, before) = (mask_of(simd, lanes), Vec3x16::load(simd, colors));
     Vec3x16(three!(i => select(mask, color.0[i], before.0[i]))).store(colors);
