@@ -7,6 +7,7 @@
 //!   exact          spheres, planes, and triangles too thin for f32, ray by ray in f64
 //!   space          the rays in the space of a mesh
 //!   group          the lanes of a block that hit one item
+//!   terminator     origins of shadow rays on smooth surfaces
 //!   texel          textures
 //!   vertex_color   vertex colours
 //!   material       colours and exponents of the materials
@@ -17,6 +18,7 @@ mod facet;
 mod group;
 mod material;
 mod space;
+mod terminator;
 mod texel;
 mod triangles;
 mod vertex_color;
@@ -31,6 +33,7 @@ use facet::Facets;
 use group::Group;
 pub(crate) use material::Materials;
 use space::Space;
+use terminator::Lifts;
 use texel::Texels;
 
 /// Distance of the origin of a shadow ray from its surface, relative to the largest coordinates that went into the point: four
@@ -107,6 +110,8 @@ pub(crate) struct Surfaces {
     pub blocks: [SurfaceBlock; BLOCKS],
     /// Factors of colours by textures and vertex colours; only in scenes with either.
     texels: Option<Box<Texels>>,
+    /// Only in frames with shadows on interpolated normals.
+    lifts: Option<Box<Lifts>>,
     facets: Facets,
 }
 
@@ -114,7 +119,8 @@ impl Surfaces {
     /// Surfaces for [`Surfaces::find`] to set.
     pub(crate) fn empty(frame: &PreparedFrame) -> Self {
         let blocks = std::array::from_fn(|_| SurfaceBlock::EMPTY);
-        Self { blocks, texels: Texels::for_scene(frame), facets: Facets::new() }
+        let (texels, lifts) = (Texels::for_scene(frame), Lifts::for_frame(frame));
+        Self { blocks, texels, lifts, facets: Facets::new() }
     }
 
     /// Finds the surface points of the hits of a source's blocks.
@@ -131,6 +137,9 @@ impl Surfaces {
             self.facets.begin_block(block);
             if let Some(texels) = &mut self.texels {
                 texels.clear(block);
+            }
+            if let Some(lifts) = &mut self.lifts {
+                lifts.clear(block);
             }
             while rest != 0 {
                 let item = hits[block].item.0[rest.trailing_zeros() as usize];

@@ -2,6 +2,7 @@
 
 use super::group::{Group, ThreeVectors, barycentric, put};
 use super::space::{Space, space_of};
+use super::terminator::SmoothPoints;
 use super::texel::CornerUvs;
 use super::vertex_color::CornerColors;
 use super::{Surfaces, material_of};
@@ -142,6 +143,11 @@ impl Surfaces {
                 select(usable, turned, ng.0[i])
             }));
             group.put(simd, ns, &mut surface.ns);
+            if let Some(lifts) = &mut self.lifts {
+                let normals = &[na, nb, nc];
+                let points = SmoothPoints { at, ab, ac, weights: [u, v], normals, against, ng };
+                lifts.put(simd, group, space, &points);
+            }
         } else if frame.features.smooth {
             group.put(simd, ng, &mut surface.ns);
         }

@@ -136,7 +136,7 @@ fn add_light<S: Simd, R: SurfaceSource, W: Watch>(
 }
 
 /// Computes the unoccluded contribution of a light to the points of a block, and the origins of their shadow rays: the points,
-/// moved off their surfaces to the side of the light. Returns the bits of the points with a contribution.
+/// moved off their surfaces to the side of the light, or onto the smooth ones. Returns the bits of the points with a contribution.
 #[inline(always)]
 fn unoccluded<S: Simd>(
     simd: S,
@@ -166,8 +166,8 @@ fn unoccluded<S: Simd>(
     let [r, g, b] = contribution.0;
     let enough = r.max(g).max(b).simd_ge(splat(simd, LEAST_CONTRIBUTION));
     if light.shadows {
-        let bias = surface.bias.load(simd);
-        let side = select(geometric.dot(incidence.direction).simd_lt(zero), -bias, bias);
+        let along = geometric.dot(incidence.direction);
+        let side = surfaces.to_shadow_origins(simd, block, along);
         points.add(geometric.scale(side)).store(&mut scratch.shadow_origins[block]);
     }
     facing & bits(enough)
