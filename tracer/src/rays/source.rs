@@ -46,6 +46,11 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     /// The rays in the space of an instance's mesh, or in eye space.
     fn local(&self, instance: Option<&Instance>) -> Self::Local;
 
+    /// Length of the way of the light before a ray, in eye units: that of the rays between it and the camera.
+    fn way_before(&self, _block: usize, _lane: usize) -> f64 {
+        0.0
+    }
+
     /// Points at `t` along the rays of a block. `direction` is that of [`SurfaceSource::directions`].
     #[inline(always)]
     fn points<S: Simd>(&self, simd: S, block: usize, direction: Vec3x16<S>, t: f32x16<S>) -> Vec3x16<S> {

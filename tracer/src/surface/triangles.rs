@@ -3,7 +3,7 @@
 use super::group::{Group, ThreeVectors, barycentric, put};
 use super::space::{Space, space_of};
 use super::terminator::SmoothPoints;
-use super::texel::CornerUvs;
+use super::uv::CornerUvs;
 use super::vertex_color::CornerColors;
 use super::{Surfaces, material_of};
 use crate::bvh::WIDTH;
@@ -115,6 +115,7 @@ impl Surfaces {
     ) {
         let &Group { rays, block, lanes, direction, .. } = group;
         let frame = rays.frame();
+        let footprint = if corners.uvs.is_some() { self.footprint(group, hits) } else { None };
         let surface = &mut self.blocks[block];
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let [a, b, c] = corners.places;
@@ -148,7 +149,7 @@ impl Surfaces {
                 let points = SmoothPoints { at, ab, ac, weights: [u, v], normals, against, ng };
                 lifts.put(simd, group, space, &points);
             }
-        } else if frame.features.smooth {
+        } else if frame.features.shaded_normals() {
             group.put(simd, ng, &mut surface.ns);
         }
         if frame.features.sided {
@@ -159,7 +160,8 @@ impl Surfaces {
             let weights = barycentric(simd, at, ab, ac);
             let materials = &surface.material;
             if let Some(uvs) = &corners.uvs {
-                texels.fill(frame, block, lanes, materials, &uvs.at(simd, weights));
+                let uv = uvs.at(simd, weights).with(footprint);
+                texels.fill(frame, block, lanes, materials, &uv);
             }
             if let Some(colors) = &corners.colors {
                 texels.tint(simd, frame, block, lanes, materials, colors.at(simd, weights));

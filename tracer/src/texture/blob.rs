@@ -4,9 +4,11 @@
 //! top, which is the direction of v. Version 2 appends a byte of alpha a texel; only pictures with transparent texels have it.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::pyramid::Pyramid;
 use super::{MAX_TEXELS, TextureError, TextureId};
 use crate::image::{MAX_SIDE, RgbImage};
 
@@ -82,6 +84,8 @@ pub struct Texture {
     /// Offset of the alpha in `bytes`, if there is any.
     alpha: Option<usize>,
     id: TextureId,
+    /// Smaller pictures, made when they are first needed.
+    pyramid: OnceLock<Pyramid>,
 }
 
 impl fmt::Debug for Texture {
@@ -140,7 +144,8 @@ impl Texture {
         let Header { width, height, version, .. } = Header::read(&bytes)?;
         let id = TextureId(*blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes());
         let alpha = HEADER_BYTES + 3 * width as usize * height as usize;
-        Ok(Self { bytes, width, height, alpha: (version == WITH_ALPHA).then_some(alpha), id })
+        let alpha = (version == WITH_ALPHA).then_some(alpha);
+        Ok(Self { bytes, width, height, alpha, id, pyramid: OnceLock::new() })
     }
 
     /// The bytes as they are sent.
@@ -172,6 +177,16 @@ impl Texture {
             Some(&[_, r, g, b]) => [r, g, b],
             _ => [0; 3],
         }
+    }
+
+    /// The picture in smaller sizes, made at the first call.
+    pub(crate) fn pyramid(&self) -> &Pyramid {
+        if let Some(pyramid) = self.pyramid.get() {
+            return pyramid;
+        }
+        // Not inside of the lock: the threads that make it may take other work meanwhile, and come here again.
+        let made = Pyramid::of(self);
+        self.pyramid.get_or_init(|| made)
     }
 
     /// Whether its alpha cuts something out.

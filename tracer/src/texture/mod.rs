@@ -4,7 +4,9 @@
 //! and every worker receives it as it is.
 
 mod blob;
+mod lookup;
 mod map;
+mod pyramid;
 mod uv;
 
 use std::fmt;

@@ -149,11 +149,12 @@ fn unoccluded<S: Simd>(
     let surface = &surfaces.blocks[block];
     let points = Vec3x16::load(simd, &surface.point);
     let geometric = Vec3x16::load(simd, &surface.ng);
-    let normals = if frame.features.smooth { Vec3x16::load(simd, &surface.ns) } else { geometric };
+    let normals = if frame.features.shaded_normals() { Vec3x16::load(simd, &surface.ns) } else { geometric };
     let zero = splat(simd, 0.0);
     let incidence = light.incidence(simd, points);
     let n_dot_l = normals.dot(incidence.direction);
     let facing = incidence.reached & bits(n_dot_l.simd_gt(zero));
+    let facing = surfaces.before_untilted(simd, block, incidence.direction, facing);
     if facing & surface.lit == 0 {
         return 0;
     }

@@ -278,7 +278,7 @@ impl Hit<'_> {
                 .normalize()
         };
         let ng = vector(&surface.ng);
-        let ns = if frame.features.smooth { vector(&surface.ns) } else { ng };
+        let ns = if frame.features.shaded_normals() { vector(&surface.ns) } else { ng };
         let index = surface.material.0[lane];
         let materials = &frame.scene().materials;
         let front = surface.front >> lane & 1 == 1;
