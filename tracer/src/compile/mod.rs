@@ -21,7 +21,7 @@ use crate::mesh::{CompiledMesh, MeshId};
 use crate::scene::{Material, Model, NormalMode, Scene, SceneFeatures, TextureMap, ValidateError};
 use crate::texture::{Texture, TextureId};
 pub(crate) use attributes::AttributeUse;
-use attributes::{attribute_uses, has_texture};
+use attributes::{attribute_uses, uses_uvs};
 pub(crate) use bounds::{disk_reach, orientation, transformed_bounds};
 use bounds::{relative_boxes, world_bounds};
 pub(crate) use items::{Item, Items};
@@ -212,9 +212,9 @@ fn fitting_mesh(
                 .into(),
         );
     }
-    if has_texture(scene, description) && !mesh.has_uvs() {
+    if uses_uvs(scene, description) && !mesh.has_uvs() {
         return mismatch(
-            "one of its materials has a texture, the mesh was compiled without texture coordinates; compile the mesh with them".into(),
+            "one of its materials has a texture or a pattern in texture coordinates, the mesh was compiled without texture coordinates; compile the mesh with them".into(),
         );
     }
     Ok(Arc::clone(mesh))

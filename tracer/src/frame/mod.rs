@@ -25,7 +25,7 @@ use crate::cancel::{IsCancelled, go_on, never};
 use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, transformed_bounds};
 use crate::light::EyeLight;
 use crate::rotation::sin_cos_degrees;
-use crate::scene::{Background, Camera, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
+use crate::scene::{Background, Camera, Filter, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
 use crate::shape::{EyeDisk, EyePlane, EyeSphere};
 use crate::simd::{self, Level};
 use crate::texture::Texture;
@@ -144,6 +144,8 @@ impl PreparedFrame {
             scene,
         };
         go_on(cancelled)?;
+        frame.make_pyramids();
+        go_on(cancelled)?;
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
@@ -176,6 +178,19 @@ impl PreparedFrame {
     /// The scene's textures with their maps.
     pub(crate) fn textures(&self) -> &[(Arc<Texture>, TextureMap)] {
         self.scene.textures()
+    }
+
+    /// The filter of a texture in this frame.
+    pub(crate) fn filter_of(&self, map: &TextureMap) -> Filter {
+        self.view.quality.filter.unwrap_or(map.filter)
+    }
+
+    /// Makes the smaller pictures of the textures that need them; those of earlier frames are kept.
+    fn make_pyramids(&self) {
+        let needed = |(_, map): &&(Arc<Texture>, TextureMap)| self.filter_of(map) == Filter::Trilinear;
+        if self.features.textured {
+            self.textures().iter().filter(needed).for_each(|(texture, _)| _ = texture.pyramid());
+        }
     }
 
     /// The items in a leaf of the scene's tree.

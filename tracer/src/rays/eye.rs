@@ -85,7 +85,6 @@ impl RaySource for EyeTile<'_> {
 impl SurfaceSource for EyeTile<'_> {
     const BLOCKS: usize = BLOCKS;
     const COMMON_ORIGIN: bool = true;
-    const CAMERA: bool = true;
     type Local = LocalTile;
 
     #[inline(always)]
@@ -96,6 +95,11 @@ impl SurfaceSource for EyeTile<'_> {
     #[inline(always)]
     fn origins<S: Simd>(&self, simd: S, _: usize) -> Vec3x16<S> {
         Vec3x16::splat(simd, [0.0; 3])
+    }
+
+    #[inline(always)]
+    fn are_of_camera(&self) -> bool {
+        true
     }
 
     #[inline(always)]

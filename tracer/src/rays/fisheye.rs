@@ -13,6 +13,7 @@ impl RayBatch<'_> {
     /// Replaces the rays by those of some samples of a fisheye camera. A ray is a function of its place in the picture alone.
     pub(crate) fn put_fisheye(&mut self, camera: &FisheyeRays, samples: &TileSamples<'_>) {
         self.clear();
+        self.of_camera = true;
         self.places.x = samples.rays.x;
         self.places.y = samples.rays.y;
         for block in 0..BLOCKS {

@@ -82,6 +82,11 @@ impl SurfaceSource for ParallelTile<'_> {
     }
 
     #[inline(always)]
+    fn are_of_camera(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
     fn places(&self) -> &TileRays {
         self.samples.rays
     }

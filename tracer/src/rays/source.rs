@@ -32,7 +32,7 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     const COMMON_ORIGIN: bool;
 
     /// Whether the rays are those of the camera, which do not see a background that is not visible.
-    const CAMERA: bool;
+    fn are_of_camera(&self) -> bool;
 
     /// The rays in the space of a mesh.
     type Local: LocalRays<Self>;
@@ -53,6 +53,11 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
 
     /// The rays in the space of an instance's mesh, or in eye space.
     fn local(&self, instance: Option<&Instance>) -> Self::Local;
+
+    /// Length of the way of the light before a ray, in eye units: that of the rays between it and the camera.
+    fn way_before(&self, _block: usize, _lane: usize) -> f64 {
+        0.0
+    }
 
     /// Points at `t` along the rays of a block. `direction` is that of [`SurfaceSource::directions`].
     #[inline(always)]

@@ -181,7 +181,7 @@ impl Surfaces {
         let point = direction.scale(distance / along);
         let ng = normal.scale(splat(simd, 1.0).copysign(-along));
         let bias = surface.put_plane(simd, &group, point, ng, reach);
-        if frame.features.smooth {
+        if frame.features.shaded_normals() {
             group.put(simd, ng, &mut surface.ns);
         }
         if frame.features.emissive {

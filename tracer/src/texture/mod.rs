@@ -13,7 +13,9 @@
 
 mod alpha;
 mod blob;
+mod lookup;
 mod map;
+mod pyramid;
 mod shared_exponent;
 mod uv;
 

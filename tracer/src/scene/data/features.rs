@@ -23,7 +23,7 @@ pub struct SceneFeatures {
     pub unlit: bool,
     /// A material is cut out by alpha.
     pub cut_out: bool,
-    /// A model has interpolated normals, which differ from the geometric ones.
+    /// A model has interpolated normals.
     pub smooth: bool,
     /// A light casts shadows.
     pub shadows: bool,
@@ -66,6 +66,12 @@ impl SceneFeatures {
             checkered: any(|material| material.checker.is_some()),
             normal_mapped: any(|material| material.normal_map.is_some()),
         }
+    }
+
+    /// Whether shading normals differ from geometric ones: they are interpolated, or tilted by a normal map.
+    #[inline(always)]
+    pub fn shaded_normals(&self) -> bool {
+        self.smooth || self.normal_mapped
     }
 
     /// Features that remain after applying a quality setting.
@@ -199,7 +205,6 @@ mod tests {
             shadows: true,
             bounces: true,
             transparent: true,
-            sided: true,
             shadowless: true,
             soft_shadows: true,
             checkered: true,

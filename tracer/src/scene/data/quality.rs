@@ -29,8 +29,8 @@ pub struct Quality {
     pub min_contribution: f32,
     /// Points of a light with a radius that shadow rays go to, where the light itself has no number.
     pub shadow_samples: u16,
-    /// Whether points with interpolated normals are lit as if the surface were smooth, so that the shadow's edge does not show the
-    /// triangles.
+    /// Whether shadow rays of points with interpolated normals start on the smooth surface that the normals describe, so that the
+    /// edge of a mesh's own shadow does not show its triangles.
     pub smooth_terminator: bool,
 }
 

@@ -10,10 +10,12 @@
 //! ```
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use bytemuck::{Pod, Zeroable};
 
 use super::alpha::{LEAST_ALPHA, bleed};
+use super::pyramid::Pyramid;
 use super::shared_exponent::{MAX_CHANNEL, pack, unpack};
 use super::{MAX_TEXELS, TextureError, TextureId};
 use crate::image::{LinearImage, MAX_SIDE, RgbImage};
@@ -92,6 +94,8 @@ pub struct Texture {
     alpha: Option<usize>,
     linear: bool,
     id: TextureId,
+    /// Smaller pictures, made when they are first needed.
+    pyramid: OnceLock<Pyramid>,
 }
 
 /// Numbers of texels that a linear texture cannot hold as they are.
@@ -196,7 +200,7 @@ impl Texture {
         let id = TextureId(*blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes());
         let alpha = HEADER_BYTES + 3 * width as usize * height as usize;
         let (alpha, linear) = ((version == WITH_ALPHA).then_some(alpha), version == LINEAR);
-        Ok(Self { bytes, width, height, alpha, linear, id })
+        Ok(Self { bytes, width, height, alpha, linear, id, pyramid: OnceLock::new() })
     }
 
     /// The bytes as they are sent.
@@ -248,6 +252,16 @@ impl Texture {
             Some(&[_, r, g, b]) => [r, g, b],
             _ => [0; 3],
         }
+    }
+
+    /// The picture in smaller sizes, made at the first call.
+    pub(crate) fn pyramid(&self) -> &Pyramid {
+        if let Some(pyramid) = self.pyramid.get() {
+            return pyramid;
+        }
+        // Not inside of the lock: the threads that make it may take other work meanwhile, and come here again.
+        let made = Pyramid::of(self);
+        self.pyramid.get_or_init(|| made)
     }
 
     /// Whether its alpha cuts something out.

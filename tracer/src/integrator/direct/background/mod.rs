@@ -29,7 +29,7 @@ pub(super) fn background<S: Simd, R: SurfaceSource>(
     colors: &mut [Lanes; 3],
 ) {
     let frame = rays.frame();
-    let background = if R::CAMERA { &frame.seen_background } else { &frame.scene().background };
+    let background = if rays.are_of_camera() { &frame.seen_background } else { &frame.scene().background };
     match background {
         Background::Color(color) => Vec3x16::splat(simd, color.to_array()).store(colors),
         Background::Gradient { bottom, top } => {
