@@ -15,13 +15,15 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Places of the rays' samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    pub patterns: [[u8; LANES]; BLOCKS],
 }
 
 impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        Self { frame, blocks, places: TileRays::empty() }
+        Self { frame, blocks, places: TileRays::empty(), patterns: [[0; LANES]; BLOCKS] }
     }
 
     /// Removes all rays.
@@ -75,6 +77,10 @@ impl SurfaceSource for RayBatch<'_> {
 
     fn places(&self) -> &TileRays {
         &self.places
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.patterns[block]
     }
 }
 

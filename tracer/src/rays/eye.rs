@@ -4,8 +4,9 @@ use glam::DVec3;
 
 use super::{BLOCKS, LocalRays, PrimitiveId, Projection, Ray, RaySource, SurfaceSource, TileRays};
 use crate::frame::{Instance, PreparedFrame};
+use crate::light::extent::place_in_pattern;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, three};
+use crate::simd::{LANES, Simd, three};
 
 /// The rays of one tile of a frame.
 pub(crate) struct EyeTile<'a> {
@@ -56,6 +57,12 @@ impl<'a> EyeTile<'a> {
         Projection::new(instance.to_picture.enlarged(self.enlarged).centered(x, y), 1.0, false)
             .drifting(self.drift, f64::from(instance.drift))
     }
+
+    /// The place of a ray's sample in the pattern of soft shadows.
+    pub(crate) fn place_in_pattern(&self, block: usize, lane: usize) -> u8 {
+        let along = |axis: usize, place: f32| self.center[axis] + f64::from(place);
+        place_in_pattern(along(0, self.rays.x[block].0[lane]), along(1, self.rays.y[block].0[lane]))
+    }
 }
 
 impl RaySource for EyeTile<'_> {
@@ -99,6 +106,10 @@ impl SurfaceSource for EyeTile<'_> {
     #[inline(always)]
     fn places(&self) -> &TileRays {
         self.rays
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        std::array::from_fn(|lane| self.place_in_pattern(block, lane))
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalTile {

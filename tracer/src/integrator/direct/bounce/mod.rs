@@ -166,6 +166,9 @@ impl<'a> Bounces<'a> {
             let (to_block, to_lane) = place_of(index);
             batch.places.x[to_block].0[to_lane] = tile.rays.x[block].0[lane];
             batch.places.y[to_block].0[to_lane] = tile.rays.y[block].0[lane];
+            if context.frame.features.soft_shadows {
+                batch.patterns[to_block][to_lane] = tile.place_in_pattern(block, lane);
+            }
         }
         for (block, hits) in context.hits.iter_mut().enumerate() {
             *hits = if batch.live(block) == 0 {
