@@ -177,7 +177,7 @@ impl PreparedFrame {
     }
 
     /// Bounds of an item in eye space, padded.
-    fn item_bounds(&self, item: Item) -> (Vec3, Vec3) {
+    pub(crate) fn item_bounds(&self, item: Item) -> (Vec3, Vec3) {
         let (lo, hi) = match item {
             Item::Model(i) => {
                 let instance = &self.instances[i];

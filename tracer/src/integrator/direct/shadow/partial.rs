@@ -16,14 +16,18 @@ use super::super::super::stage::{Stage, Watch};
 use super::super::{TileContext, blend};
 use super::{by_item, target_of};
 use crate::frame::PreparedFrame;
-use crate::intersect::{Crossings, tile};
+use crate::intersect::Crossings;
+use crate::intersect::tile::{self, Shaft};
 use crate::light::extent::Extent;
 use crate::light::{EyeLight, SHADOW_T_MAX};
 use crate::rays::{
     BLOCKS, HitBlock, RaySource, ShadowTarget, ShadowTile, SurfaceSource, TileColors, TileRays,
 };
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, each_bit, select, splat, three};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, each_bit, mask_of, select, splat, three};
+
+/// Error of the height of a point above a plane, relative to the largest coordinates: a dozen roundings of an `f32`.
+const ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 
 /// Adds a light to the colours of a tile, where its shadows are not all or nothing: S_j times its unoccluded contribution, for the
 /// points in `lit`.
@@ -41,36 +45,37 @@ pub(in super::super) fn add<S: Simd, R: SurfaceSource, W: Watch>(
         grid: rays.places(),
         hits: &context.hits,
         origins: &context.direct.shadow_origins,
-        arrived: [[Lanes::ZERO; 3]; BLOCKS],
+        free: [Lanes::ZERO; BLOCKS],
+        passed: [[Lanes::ZERO; 3]; BLOCKS],
         traced: 0,
         crossings: Crossings::default(),
         scratch: &mut context.tile,
     };
-    let samples = match &light.extent {
-        None => {
-            let (target, t_max) = target_of(light);
-            points.trace(simd, target, t_max, lit);
-            1
+    let mut samples = 1;
+    for group in by_item(simd, points.hits, lit) {
+        if group == [0; BLOCKS] {
+            continue;
         }
-        Some(extent) => {
+        if let Some(extent) = &light.extent {
             let normals = simd.vectorize(
                 #[inline(always)]
-                || normals_towards(simd, extent.center(), &context.surfaces, &lit),
+                || normals_towards(simd, extent.center(), &context.surfaces, &group),
             );
-            for (set, lanes) in by_set(rays, extent, lit).into_iter().enumerate() {
-                points.trace_set(simd, extent.points(set), &normals, lanes);
-            }
-            extent.sets().points(0).len()
+            points.trace_extent(simd, extent, &normals, &by_set(rays, extent, group), &group);
+            samples = extent.sets().points(0).len();
+        } else {
+            let (target, t_max) = target_of(light);
+            points.trace(simd, target, t_max, &group);
         }
-    };
-    let Points { arrived, traced, .. } = points;
+    }
+    let Points { free, passed, traced, .. } = points;
     context.counts.shadow += traced;
     context.watch.enter(Stage::Shading);
     simd.vectorize(
         #[inline(always)]
         || {
             let colors = &mut context.direct.colors;
-            add_shares(simd, &arrived, samples, &context.direct.contributions, lit, colors);
+            add_shares(simd, (&free, &passed), samples, &context.direct.contributions, lit, colors);
         },
     );
 }
@@ -83,78 +88,107 @@ struct Points<'a> {
     hits: &'a [HitBlock; BLOCKS],
     /// Origins of shadow rays, indexed `[block][axis]`.
     origins: &'a [[Lanes; 3]; BLOCKS],
-    /// Light that arrives, summed over the points of the light so far.
-    arrived: TileColors,
-    /// Rays so far.
+    /// Numbers of rays that nothing occludes so far.
+    free: [Lanes; BLOCKS],
+    /// Sums of the light that passes surfaces along the other rays so far.
+    passed: TileColors,
+    /// Rays so far, with those that are known to be free without a search of their own.
     traced: u64,
     crossings: Crossings,
     scratch: &'a mut tile::Scratch,
 }
 
 impl Points<'_> {
-    /// Traces the rays from some lanes to the points of a set, one after another.
-    fn trace_set<S: Simd>(
+    /// Traces the rays from some lanes, divided by the sets of a light, to its points one after another.
+    fn trace_extent<S: Simd>(
         &mut self,
         simd: S,
-        targets: impl Iterator<Item = glam::DVec3>,
+        extent: &Extent,
         normals: &[[Lanes; 3]; BLOCKS],
-        lanes: [u32; BLOCKS],
+        sets: &[[u32; BLOCKS]],
+        lanes: &[u32; BLOCKS],
     ) {
-        if lanes == [0; BLOCKS] {
-            return;
-        }
-        for target in targets {
-            let above = simd.vectorize(
+        let (center, radius) = (extent.center(), extent.radius());
+        let shaft = Shaft::new(self.frame, self.origins, lanes, center, radius);
+        let empty = shaft.is_some_and(|shaft| shaft.is_empty(simd));
+        let mut whole = [0; BLOCKS];
+        if empty {
+            let ball = (center.as_vec3().to_array(), radius as f32);
+            whole = simd.vectorize(
                 #[inline(always)]
-                || above_horizon(simd, target.as_vec3().to_array(), normals, self.origins, &lanes),
+                || above_horizon(simd, ball, normals, self.origins, lanes),
             );
-            if above != [0; BLOCKS] {
-                self.trace(simd, ShadowTarget::Point(target), SHADOW_T_MAX, above);
+            self.arrive(simd, &whole, extent.sets().points(0).len() as f32);
+        }
+        for (set, lanes) in sets.iter().enumerate() {
+            let lanes = std::array::from_fn(|block| lanes[block] & !whole[block]);
+            if lanes == [0; BLOCKS] {
+                continue;
+            }
+            for target in extent.points(set) {
+                let above = simd.vectorize(
+                    #[inline(always)]
+                    || above_horizon(simd, (target.as_vec3().to_array(), 0.0), normals, self.origins, &lanes),
+                );
+                if empty {
+                    self.arrive(simd, &above, 1.0);
+                } else if above != [0; BLOCKS] {
+                    self.trace(simd, ShadowTarget::Point(target), SHADOW_T_MAX, &above);
+                }
             }
         }
     }
 
     /// Traces the rays from some lanes to one target, and adds the light that arrives.
-    fn trace<S: Simd>(&mut self, simd: S, light: ShadowTarget, t_max: f64, lanes: [u32; BLOCKS]) {
-        self.traced += lanes.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
-        let mut shadow = ShadowTile {
+    fn trace<S: Simd>(&mut self, simd: S, light: ShadowTarget, t_max: f64, lanes: &[u32; BLOCKS]) {
+        let shadow = ShadowTile {
             frame: self.frame,
             light,
             t_max,
             grid: self.grid,
             points: self.origins,
             hits: self.hits,
-            live: [0; BLOCKS],
+            live: *lanes,
         };
-        let mut occluded = [0; BLOCKS];
-        for live in by_item(simd, self.hits, lanes) {
-            if live != [0; BLOCKS] {
-                shadow.live = live;
-                let found = occluded_in(simd, &shadow, self.scratch);
-                (0..BLOCKS).for_each(|block| occluded[block] |= found[block]);
-            }
-        }
-        for block in 0..BLOCKS {
-            for lane in each_bit(lanes[block] & !occluded[block]) {
-                self.arrived[block].iter_mut().for_each(|channel| channel.0[lane] += 1.0);
-            }
-        }
+        let occluded = occluded_in(simd, &shadow, self.scratch);
+        self.traced += count(&occluded);
+        self.arrive(simd, &std::array::from_fn(|block| lanes[block] & !occluded[block]), 1.0);
         if self.frame.features.transparent || self.frame.features.shadowless {
-            self.follow(&shadow, occluded);
+            self.follow(&shadow, &occluded);
         }
     }
 
+    /// Adds a number of rays that nothing occludes in each of the lanes.
+    fn arrive<S: Simd>(&mut self, simd: S, lanes: &[u32; BLOCKS], rays: f32) {
+        self.traced += count(lanes) * rays as u64;
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for block in 0..BLOCKS {
+                    let more = select(mask_of(simd, lanes[block]), splat(simd, rays), splat(simd, 0.0));
+                    let sum = self.free[block].load(simd) + more;
+                    self.free[block].store(sum);
+                }
+            },
+        );
+    }
+
     /// Adds the light that passes the surfaces in the way of the occluded lanes.
-    fn follow(&mut self, shadow: &ShadowTile<'_>, occluded: [u32; BLOCKS]) {
-        for (block, lanes) in occluded.into_iter().enumerate() {
+    fn follow(&mut self, shadow: &ShadowTile<'_>, occluded: &[u32; BLOCKS]) {
+        for (block, &lanes) in occluded.iter().enumerate() {
             for lane in each_bit(lanes) {
                 let (ray, starts_on) = (shadow.ray(block, lane), shadow.starts_on(block, lane));
                 let share = self.frame.transmittance(&ray, shadow.t_max, starts_on, &mut self.crossings);
-                let arrived = &mut self.arrived[block];
-                (0..3).for_each(|channel| arrived[channel].0[lane] += share[channel] as f32);
+                let passed = &mut self.passed[block];
+                (0..3).for_each(|channel| passed[channel].0[lane] += share[channel] as f32);
             }
         }
     }
+}
+
+/// Number of lanes.
+fn count(lanes: &[u32; BLOCKS]) -> u64 {
+    lanes.iter().map(|lanes| u64::from(lanes.count_ones())).sum()
 }
 
 /// [`ShadowTile::occluded`] as a function of its own on each level.
@@ -202,32 +236,39 @@ fn normals_towards<S: Simd>(
     normals
 }
 
-/// Those of the lanes that have a place above the tangent plane of their surface.
+/// Those of the lanes that have a ball above the tangent plane of their surface; a ball of radius 0 is a point. A ball counts
+/// only if all points in it do, within the rounding of this function.
 #[inline(always)]
 fn above_horizon<S: Simd>(
     simd: S,
-    place: [f32; 3],
+    (center, radius): ([f32; 3], f32),
     normals: &[[Lanes; 3]; BLOCKS],
     origins: &[[Lanes; 3]; BLOCKS],
     lanes: &[u32; BLOCKS],
 ) -> [u32; BLOCKS] {
-    let place = Vec3x16::splat(simd, place);
+    let center = Vec3x16::splat(simd, center);
     let mut above = [0; BLOCKS];
     for block in 0..BLOCKS {
-        if lanes[block] != 0 {
-            let to_place = place.sub(Vec3x16::load(simd, &origins[block]));
-            let height = Vec3x16::load(simd, &normals[block]).dot(to_place);
-            above[block] = lanes[block] & bits(height.simd_gt(splat(simd, 0.0)));
+        if lanes[block] == 0 {
+            continue;
         }
+        let origin = Vec3x16::load(simd, &origins[block]);
+        let height = Vec3x16::load(simd, &normals[block]).dot(center.sub(origin));
+        let mut least = splat(simd, 0.0);
+        if radius > 0.0 {
+            let error = (origin.size() + center.size() + splat(simd, radius)) * splat(simd, ROUNDING);
+            least = splat(simd, radius) + error;
+        }
+        above[block] = lanes[block] & bits(height.simd_gt(least));
     }
     above
 }
 
-/// Adds the contributions of a light times the mean of what arrives from its points.
+/// Adds the contributions of a light times the mean of what arrives from its points: by free rays, and through surfaces.
 #[inline(always)]
 fn add_shares<S: Simd>(
     simd: S,
-    arrived: &TileColors,
+    (free, passed): (&[Lanes; BLOCKS], &TileColors),
     samples: usize,
     contributions: &TileColors,
     lit: [u32; BLOCKS],
@@ -238,9 +279,9 @@ fn add_shares<S: Simd>(
     let samples = splat(simd, samples as f32);
     for block in 0..BLOCKS {
         if lit[block] != 0 {
-            let (sum, full) = (&arrived[block], &contributions[block]);
+            let (free, full) = (free[block].load(simd), &contributions[block]);
             let before = Vec3x16::load(simd, &colors[block]);
-            let share = Vec3x16(three!(i => sum[i].load(simd) / samples));
+            let share = Vec3x16(three!(i => (free + passed[block][i].load(simd)) / samples));
             let part = share.mul(Vec3x16(three!(i => full[i].load(simd).min(brightest))));
             blend(simd, lit[block], before.add(part), before).store(&mut colors[block]);
         }
