@@ -5,6 +5,8 @@
 //! ```
 
 mod partial;
+#[cfg(test)]
+mod tests;
 
 use crate::frame::PreparedFrame;
 use crate::intersect::tile;
