@@ -15,6 +15,8 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Places of the rays' samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    pub patterns: [[u8; LANES]; BLOCKS],
     /// Whether the rays are those of a camera.
     pub(super) of_camera: bool,
 }
@@ -23,7 +25,8 @@ impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        Self { frame, blocks, places: TileRays::empty(), of_camera: false }
+        let patterns = [[0; LANES]; BLOCKS];
+        Self { frame, blocks, places: TileRays::empty(), patterns, of_camera: false }
     }
 
     /// Removes all rays.
@@ -81,6 +84,10 @@ impl SurfaceSource for RayBatch<'_> {
 
     fn places(&self) -> &TileRays {
         &self.places
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.patterns[block]
     }
 }
 

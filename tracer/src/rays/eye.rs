@@ -8,7 +8,7 @@ use super::{
 };
 use crate::frame::{Affine, Instance, PinholeRays, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, three};
+use crate::simd::{LANES, Simd, three};
 
 /// The rays of one tile of a frame with a pinhole camera.
 pub(crate) struct EyeTile<'a> {
@@ -109,6 +109,10 @@ impl SurfaceSource for EyeTile<'_> {
 
     fn eye(&self) -> Option<&EyeTile<'_>> {
         Some(self)
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.samples.pattern(block)
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalTile {

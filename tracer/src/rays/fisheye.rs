@@ -17,6 +17,7 @@ impl RayBatch<'_> {
         self.places.x = samples.rays.x;
         self.places.y = samples.rays.y;
         for block in 0..BLOCKS {
+            self.patterns[block] = samples.pattern(block);
             for lane in each_bit(samples.live[block]) {
                 let [across, along] = samples.place(block, lane);
                 let FisheyeRay { direction, in_circle } = camera.through(across, along);

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::frame::{Instance, ParallelRays, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, three};
+use crate::simd::{LANES, Simd, three};
 
 /// The rays of one tile of a frame with an orthographic camera.
 pub(crate) struct ParallelTile<'a> {
@@ -89,6 +89,10 @@ impl SurfaceSource for ParallelTile<'_> {
     #[inline(always)]
     fn places(&self) -> &TileRays {
         self.samples.rays
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.samples.pattern(block)
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalParallel {

@@ -6,7 +6,7 @@
 use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, f32x16};
+use crate::simd::{LANES, Simd, f32x16};
 
 /// Blocks of sixteen rays of one frame.
 pub(crate) trait RaySource {
@@ -50,6 +50,9 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     fn eye(&self) -> Option<&EyeTile<'_>> {
         None
     }
+
+    /// Places of the samples of a block's rays in the pattern of soft shadows: see [`crate::light::extent::place_in_pattern`].
+    fn pattern(&self, block: usize) -> [u8; LANES];
 
     /// The rays in the space of an instance's mesh, or in eye space.
     fn local(&self, instance: Option<&Instance>) -> Self::Local;

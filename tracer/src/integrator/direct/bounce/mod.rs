@@ -42,6 +42,8 @@ pub(super) struct Bounces<'a> {
     queue: Vec<Secondary>,
     reflected: Vec<Secondary>,
     transmitted: Vec<Secondary>,
+    /// Places of the tile's samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    patterns: [[u8; LANES]; BLOCKS],
     /// Rays of each sample so far.
     counts: [u16; BATCH],
     batch: RayBatch<'a>,
@@ -57,6 +59,7 @@ impl<'a> Bounces<'a> {
                 queue: Vec::new(),
                 reflected: Vec::new(),
                 transmitted: Vec::new(),
+                patterns: [[0; LANES]; BLOCKS],
                 counts: [0; BATCH],
                 batch: RayBatch::new(frame),
                 mirrors: Mirrors::new(),
@@ -119,6 +122,9 @@ impl<'a> Bounces<'a> {
         self.reflected.clear();
         self.transmitted.clear();
         self.counts = [0; BATCH];
+        if context.frame.features.soft_shadows {
+            self.patterns = std::array::from_fn(|block| tile.pattern(block));
+        }
         let materials = &context.frame.scene().materials;
         for block in 0..BLOCKS {
             let surface = &context.surfaces.blocks[block];
@@ -181,6 +187,9 @@ impl<'a> Bounces<'a> {
             let (to_block, to_lane) = place_of(index);
             batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
             batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
+            if context.frame.features.soft_shadows {
+                batch.patterns[to_block][to_lane] = self.patterns[block][lane];
+            }
         }
         for (block, hits) in context.hits.iter_mut().enumerate() {
             let start = (block * LANES).min(rays.len());
