@@ -94,7 +94,8 @@ impl Oracle {
         let least = f64::from(self.view.quality.min_contribution);
         let leave = |direction: DVec3, share: DVec3, bodies: Bodies| {
             let weight = traveller.weight * share;
-            let ray = Ray { origin: surface.clear_origin(), direction: direction.normalize() };
+            let origin = surface.clear_origin();
+            let ray = Ray { origin, direction: direction.normalize(), place: surface.place };
             let contributes = weight.max_element() >= least && weight.max_element() > 0.0;
             contributes.then_some(Traveller { ray, starts_on: Some(surface.primitive), weight, bodies })
         };

@@ -18,17 +18,22 @@ const STRATA: u32 = 32;
 impl Oracle {
     /// S_j of a light; `to_light` leads to its centre, or to a directional light.
     pub(super) fn light_share(&self, light: usize, surface: &SurfacePoint, to_light: DVec3) -> DVec3 {
-        let to = |target: DVec3, reach| self.unoccluded(surface.position, target, reach, surface.primitive);
+        let start = self.shadow_start(surface, to_light.normalize_or_zero());
+        let lifted = start.position - surface.position;
         let radius = self.scene.lights[light].radius;
         if let LightKind::Directional { .. } = self.scene.lights[light].kind {
-            return to(to_light, f64::INFINITY);
+            return self.unoccluded(&start, to_light, f64::INFINITY);
         }
         if !(radius > 0.0) {
-            return to(to_light, SHADOW_T_MAX);
+            return self.unoccluded(&start, to_light - lifted, SHADOW_T_MAX);
         }
-        let given = self.light_points.get(light).filter(|points| !points.is_empty());
-        let offsets = given.cloned().unwrap_or_else(|| disc(to_light.normalize_or_zero()));
-        let sum: DVec3 = offsets.iter().map(|offset| to(to_light + offset * radius, SHADOW_T_MAX)).sum();
+        let sets = self.light_points.get(light).filter(|sets| !sets.is_empty());
+        let offsets = match sets {
+            Some(sets) => sets[surface.place % sets.len()].clone(),
+            None => disc(to_light.normalize_or_zero()),
+        };
+        let to = |offset: &DVec3| to_light - lifted + *offset * radius;
+        let sum: DVec3 = offsets.iter().map(|offset| self.unoccluded(&start, to(offset), SHADOW_T_MAX)).sum();
         sum / offsets.len() as f64
     }
 }

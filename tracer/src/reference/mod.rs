@@ -13,7 +13,8 @@
 //!   surface      the point that a ray hits
 //!   texture      texture lookups
 //!   material     colours and tilted normals of a surface point
-//!   extent       the share of a light with a radius
+//!   terminator   where shadow rays start
+//!   extent       the share of a light that arrives, also of one with a radius
 //!   shading      the shading equation without bounces
 //!   sky          the background
 //!   optics       reflection, refraction, Fresnel's equations
@@ -33,6 +34,7 @@ mod shading;
 mod shape;
 mod sky;
 mod surface;
+mod terminator;
 #[cfg(test)]
 mod tests;
 mod texture;
@@ -61,7 +63,7 @@ pub struct Oracle {
     textures: Vec<Arc<Texture>>,
     primitives: Vec<Primitive>,
     /// Points on each light: see [`Oracle::with_light_points`].
-    light_points: Vec<Vec<DVec3>>,
+    light_points: Vec<Vec<Vec<DVec3>>>,
     size: f64,
 }
 
@@ -80,10 +82,11 @@ impl Oracle {
         Self { scene, view: *view, textures, primitives, light_points: Vec::new(), size }
     }
 
-    /// Replaces the dense sampling of lights with a radius. For each light of the scene, the points that shadow rays go to, from its
-    /// centre in units of its radius; a light without points keeps the dense sampling.
+    /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,
+    /// from its centre in units of its radius. Of n sets, a sample at the place (column % 2) + 2 (row % 2) of the picture's samples
+    /// uses that with the index place % n. A light without sets keeps the dense sampling.
     #[must_use]
-    pub fn with_light_points(self, light_points: Vec<Vec<DVec3>>) -> Self {
+    pub fn with_light_points(self, light_points: Vec<Vec<Vec<DVec3>>>) -> Self {
         Self { light_points, ..self }
     }
 

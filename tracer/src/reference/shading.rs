@@ -33,7 +33,7 @@ impl Oracle {
         if !(n.dot(l) > 0.0) {
             return DVec3::ZERO;
         }
-        let strength = attenuation(light, r) * beam(&light.kind, l) * self.terminator(surface, l);
+        let strength = attenuation(light, r) * beam(&light.kind, l);
         if strength == 0.0 {
             return DVec3::ZERO;
         }
@@ -46,20 +46,6 @@ impl Oracle {
             reflected += material.specular.as_dvec3() * highlight;
         }
         arriving * light.color.as_dvec3() * reflected * strength
-    }
-
-    /// Share of a light that points with interpolated normals receive, from 1 to 0 where the light sinks below the triangle
-    /// (Chiang, Li and Burley, "Taming the Shadow Terminator", SIGGRAPH Talks 2019).
-    fn terminator(&self, surface: &SurfacePoint, l: DVec3) -> f64 {
-        if !surface.interpolated || !self.view.quality.smooth_terminator {
-            return 1.0;
-        }
-        let (geometric, shading) = (surface.ng.dot(l), surface.ns.dot(l) * surface.ng.dot(surface.ns));
-        if geometric <= 0.0 {
-            return 0.0;
-        }
-        let g = (geometric / shading).min(1.0);
-        if g < 1.0 { g + g * g - g * g * g } else { 1.0 }
     }
 }
 

@@ -48,8 +48,6 @@ pub(super) struct Crossing {
     pub t: f64,
     pub normal: DVec3,
     pub shading_normal: DVec3,
-    /// Whether the shading normal is interpolated.
-    pub interpolated: bool,
     /// Texture coordinates; zero if there are none.
     pub uv: DVec2,
     /// Derivatives of the point by u and by v; zero without texture coordinates.
@@ -67,7 +65,6 @@ impl Crossing {
             t,
             normal,
             shading_normal: normal,
-            interpolated: false,
             uv: DVec2::ZERO,
             tangents: [DVec3::ZERO; 2],
             color: DVec3::ONE,
@@ -156,7 +153,6 @@ impl Shape {
             t,
             normal,
             shading_normal: interpolated.unwrap_or(normal),
-            interpolated: interpolated.is_some(),
             uv: skin.uv_at(u, v),
             tangents: skin.tangents(ab, ac),
             color: skin.color_at(u, v),

@@ -14,12 +14,12 @@ pub(super) struct SurfacePoint {
     pub direction: DVec3,
     /// Length of the ray.
     pub way: f64,
+    /// Place of the ray's sample: see [`Ray::place`].
+    pub place: usize,
     /// Geometric unit normal on the side of the ray.
     pub ng: DVec3,
     /// Shading unit normal on the same side.
     pub ns: DVec3,
-    /// Whether the shading normal is interpolated.
-    pub interpolated: bool,
     /// Whether the ray hits the front side.
     pub front: bool,
     /// Index of its material in the scene.
@@ -35,7 +35,7 @@ pub(super) struct SurfacePoint {
 impl Oracle {
     /// The point that a ray hits.
     pub(super) fn surface(&self, ray: Ray, starts_on: Option<usize>) -> Option<SurfacePoint> {
-        let Ray { origin, direction } = ray;
+        let Ray { origin, direction, place } = ray;
         let found = self.closest(origin, direction, f64::INFINITY, starts_on)?;
         let primitive = &self.primitives[found.primitive];
         let hit = &found.crossing;
@@ -49,9 +49,9 @@ impl Oracle {
             position,
             direction,
             way: hit.t,
+            place,
             ng,
             ns,
-            interpolated: hit.interpolated,
             front: behind == hit.mirrored,
             material_index: primitive.material,
             uv: hit.uv,

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::shape::{Crossing, Primitive, Shape};
+use super::terminator::ShadowStart;
 use super::{F64_ERROR, Oracle};
 
 /// Start of a shadow ray, relative to the scene's size: nothing nearer occludes a point.
@@ -66,7 +67,7 @@ impl Oracle {
     }
 
     /// Whether a point of the primitive `starts_on` is on another flat primitive, too, within rounding: it is not occluded by it.
-    fn lies_on(&self, point: DVec3, primitive: &Primitive, starts_on: usize) -> bool {
+    fn is_on(&self, point: DVec3, primitive: &Primitive, starts_on: usize) -> bool {
         let (on, normal) = match primitive.shape {
             Shape::Triangle { corners: [a, b, c], .. } => (a, (b - a).cross(c - a).normalize_or_zero()),
             Shape::Plane { point, normal, .. } => (point, normal),
@@ -78,12 +79,14 @@ impl Oracle {
     }
 
     /// Share of light per channel that passes all surfaces between a point and a light: the product of their transmitted shares.
-    pub(super) fn unoccluded(&self, point: DVec3, to_light: DVec3, reach: f64, starts_on: usize) -> DVec3 {
+    pub(super) fn unoccluded(&self, start: &ShadowStart, to_light: DVec3, reach: f64) -> DVec3 {
+        let point = start.position;
         let near = NEAR * (self.size + point.length()) / to_light.length();
         let mut share = DVec3::ONE;
         for (index, primitive) in self.primitives.iter().enumerate() {
             let flat = !matches!(primitive.shape, Shape::Sphere { .. });
-            if flat && (index == starts_on || self.lies_on(point, primitive, starts_on)) {
+            let ignored = |own: usize| index == own || self.is_on(point, primitive, own);
+            if flat && start.ignored.is_some_and(ignored) {
                 continue;
             }
             let mut from = near;
