@@ -32,8 +32,10 @@ impl Oracle {
             Some(sets) => sets[surface.place % sets.len()].clone(),
             None => disc(to_light.normalize_or_zero()),
         };
-        let to = |offset: &DVec3| to_light - lifted + *offset * radius;
-        let sum: DVec3 = offsets.iter().map(|offset| self.unoccluded(&start, to(offset), SHADOW_T_MAX)).sum();
+        let targets = offsets.iter().map(|offset| to_light - lifted + *offset * radius);
+        // Points below the horizon are occluded by the surface itself.
+        let visible = targets.filter(|target| target.dot(start.normal) > 0.0);
+        let sum: DVec3 = visible.map(|target| self.unoccluded(&start, target, SHADOW_T_MAX)).sum();
         sum / offsets.len() as f64
     }
 }

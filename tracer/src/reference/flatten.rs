@@ -99,6 +99,18 @@ impl Oracle {
             Name::Plane(index) => in_world - self.scene.planes[index].point,
         }
     }
+
+    /// The unit normal of a primitive's winding in the space of its object, from that in world space.
+    pub(super) fn normal_in_object(&self, primitive: usize, in_world: DVec3) -> DVec3 {
+        let Primitive { shape, name, .. } = &self.primitives[primitive];
+        match (shape, name) {
+            (Shape::Triangle { corners, .. }, Name::Model { .. }) => {
+                let [a, b, c] = corners.map(|corner| self.in_object(*name, corner));
+                (b - a).cross(c - a).normalize_or_zero()
+            }
+            _ => in_world,
+        }
+    }
 }
 
 /// Linear part of a model's transform to the world.

@@ -20,9 +20,11 @@
 //!   optics       reflection, refraction, Fresnel's equations
 //!   bodies       the transparent bodies around a ray
 //!   bounce       reflected and transmitted rays
+//!   auxiliary    pictures without light: normals, depth, items, diffuse colours
 //! ```
 
 mod attributes;
+mod auxiliary;
 mod bodies;
 mod bounce;
 mod camera;
@@ -98,7 +100,7 @@ impl Oracle {
             for i in 0..n {
                 let sx = f64::from(x) + (f64::from(i) + 0.5) / f64::from(n);
                 let sy = f64::from(y) + (f64::from(j) + 0.5) / f64::from(n);
-                sum += self.radiance(&self.camera_ray(sx, sy));
+                sum += self.shown(&self.camera_ray(sx, sy));
             }
         }
         sum / f64::from(n * n)
@@ -111,7 +113,7 @@ impl Oracle {
 
     /// Colour of one ray in 8-bit sRGB, through a point of the picture in pixels from its top left corner.
     pub fn encoded_at(&self, x: f64, y: f64) -> [u8; 3] {
-        srgb::encode(self.radiance(&self.camera_ray(x, y)).as_vec3())
+        srgb::encode(self.shown(&self.camera_ray(x, y)).as_vec3())
     }
 
     /// The whole picture. The time is proportional to pixels times primitives.

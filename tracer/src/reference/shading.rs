@@ -30,7 +30,7 @@ impl Oracle {
         };
         let (n, v, r) = (surface.ns, -surface.direction, to_light.length());
         let l = to_light / r;
-        if !(n.dot(l) > 0.0) {
+        if !(n.dot(l) > 0.0 && surface.untilted.dot(l) > 0.0) {
             return DVec3::ZERO;
         }
         let strength = attenuation(light, r) * beam(&light.kind, l);

@@ -20,6 +20,10 @@ pub(super) struct SurfacePoint {
     pub ng: DVec3,
     /// Shading unit normal on the same side.
     pub ns: DVec3,
+    /// The shading normal without a normal map.
+    pub untilted: DVec3,
+    /// Geometric unit normal by the winding of a triangle, outwards of a sphere, or that of a plane or disk.
+    pub winding_normal: DVec3,
     /// Whether the ray hits the front side.
     pub front: bool,
     /// Index of its material in the scene.
@@ -41,9 +45,8 @@ impl Oracle {
         let hit = &found.crossing;
         let position = origin + direction * hit.t;
         let behind = hit.normal.dot(direction) > 0.0;
-        let turned = |normal: DVec3, to: DVec3| if normal.dot(to) < 0.0 { -normal } else { normal };
         let ng = if behind { -hit.normal } else { hit.normal };
-        let ns = turned(hit.shading_normal, ng);
+        let ns = if hit.shading_normal.dot(ng) < 0.0 { -hit.shading_normal } else { hit.shading_normal };
         let surface = SurfacePoint {
             primitive: found.primitive,
             position,
@@ -52,6 +55,8 @@ impl Oracle {
             place,
             ng,
             ns,
+            untilted: ns,
+            winding_normal: hit.normal,
             front: behind == hit.mirrored,
             material_index: primitive.material,
             uv: hit.uv,

@@ -14,8 +14,10 @@ const LIFTED: f64 = 0.25;
 /// The start of shadow rays from a surface point to a light.
 pub(super) struct ShadowStart {
     pub position: DVec3,
-    /// The primitive of the point, if neither it nor the surfaces that coincide with it at the point occlude.
-    pub ignored: Option<usize>,
+    /// The primitive of the point: it does not occlude, unless it is a sphere.
+    pub on: usize,
+    /// Geometric normal on the side of the light.
+    pub normal: DVec3,
 }
 
 impl Oracle {
@@ -24,8 +26,9 @@ impl Oracle {
         let along = surface.ng.dot(l);
         let lift = if self.view.quality.smooth_terminator { self.lift(surface) } else { 0.0 };
         let share = ((UNLIFTED - along) / (UNLIFTED - LIFTED)).clamp(0.0, 1.0);
-        let ignored = (lift == 0.0 || along >= 0.0).then_some(surface.primitive);
-        ShadowStart { position: surface.position + surface.ng * (lift * share), ignored }
+        let position = surface.position + surface.ng * (lift * share);
+        let normal = if along < 0.0 { -surface.ng } else { surface.ng };
+        ShadowStart { position, on: surface.primitive, normal }
     }
 
     /// Height over a triangle, along its normal, of the mean of the planes through its corners across their normals, weighted by

@@ -85,8 +85,7 @@ impl Oracle {
         let mut share = DVec3::ONE;
         for (index, primitive) in self.primitives.iter().enumerate() {
             let flat = !matches!(primitive.shape, Shape::Sphere { .. });
-            let ignored = |own: usize| index == own || self.is_on(point, primitive, own);
-            if flat && start.ignored.is_some_and(ignored) {
+            if flat && (index == start.on || self.is_on(point, primitive, start.on)) {
                 continue;
             }
             let mut from = near;
