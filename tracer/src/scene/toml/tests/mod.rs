@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::{Attenuation, Filter, LightKind, NormalMode, Tiling, Wrap};
+use crate::scene::{Attenuation, Background, Filter, LightKind, NormalMode, Tiling, Wrap};
 
 /// A scene with one object of every kind, as on the format's page.
 const WHOLE: &str = r#"
@@ -98,7 +98,8 @@ fn a_whole_scene_is_read() {
     let camera = scene.camera.unwrap();
     assert_eq!(camera.aim, Aim::Point(DVec3::Y));
     assert_eq!((camera.fov, camera.zoom), (35.0, 2.0));
-    assert_eq!(scene.background, Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::ONE });
+    let gradient = Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::ONE };
+    assert_eq!(scene.background.radiance, RadianceText::Plain(gradient));
     let spot = &scene.lights[0];
     assert_eq!(spot.color, Vec3::new(4.0, 2.0, 1.0));
     assert!(!spot.shadows);
@@ -125,7 +126,8 @@ fn absent_keys_have_defaults() {
         read("[[light]]\nposition = [1, 2, 3]\n[camera]\nposition = [0,0,0]\ndirection = [0,0,-2]").unwrap();
     assert_eq!(scene.render, RenderSettings::default());
     assert_eq!(scene.ambient, Vec3::ZERO);
-    assert_eq!(scene.background, Background::Color(Vec3::ZERO));
+    let black = RadianceText::Plain(Background::Color(Vec3::ZERO));
+    assert_eq!(scene.background, BackgroundText { radiance: black, visible: true });
     let camera = scene.camera.unwrap();
     assert_eq!((camera.aim, camera.up), (Aim::Direction(DVec3::NEG_Z), DVec3::Y));
     assert_eq!((camera.fov, camera.zoom), (40.0, 1.0));
@@ -203,7 +205,7 @@ fn piece() -> impl Strategy<Value = String> {
         prop::sample::select(KEYS).prop_map(|key| format!("[{key}]\n")),
         prop::sample::select(KEYS).prop_map(|key| format!("[[{key}]]\n")),
         prop::sample::select(light::LIGHT_KEYS).prop_map(str::to_owned),
-        prop::sample::select(view::CAMERA_KEYS).prop_map(str::to_owned),
+        prop::sample::select(camera::CAMERA_KEYS).prop_map(str::to_owned),
         prop::sample::select(objects::MODEL_KEYS).prop_map(str::to_owned),
         prop::sample::select(vec![
             "=",
