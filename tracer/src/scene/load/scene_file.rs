@@ -91,7 +91,8 @@ fn assemble(
         scene.models.push(instance);
     }
     load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(locate)?;
-    scene.background = background(&models.folder, &text.background.radiance, &mut models.textures).map_err(locate)?;
+    scene.background =
+        background(&models.folder, &text.background.radiance, &mut models.textures).map_err(locate)?;
     let (maps, textures, notes) = models.textures.take_parts();
     scene.textures = maps;
     models.warnings.extend(notes);

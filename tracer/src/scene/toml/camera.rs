@@ -10,18 +10,8 @@ use crate::rotation;
 use crate::scene::data::{CameraKind, FovAxis};
 use crate::scene::validate::view_fault;
 
-pub(super) const CAMERA_KEYS: &[&str] = &[
-    "kind",
-    "position",
-    "look_at",
-    "direction",
-    "rotation",
-    "up",
-    "fov",
-    "fov_axis",
-    "view_height",
-    "zoom",
-];
+pub(super) const CAMERA_KEYS: &[&str] =
+    &["kind", "position", "look_at", "direction", "rotation", "up", "fov", "fov_axis", "view_height", "zoom"];
 
 /// Default field of view of a pinhole camera in degrees.
 const PINHOLE_FOV: f64 = 40.0;

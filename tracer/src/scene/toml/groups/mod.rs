@@ -44,9 +44,9 @@ pub(super) fn group(table: Table<'_>, reading: &mut Reading) -> Read<GroupText> 
         for key in ["translate", "rotate", "scale"] {
             if let Some(value) = table.get(key) {
                 let second = if value.start() > matrix.start() { value } else { matrix };
-                return Err(second.fault(format!(
-                    "`matrix` contradicts `{key}` in [[group]]; keep one of them"
-                )));
+                return Err(
+                    second.fault(format!("`matrix` contradicts `{key}` in [[group]]; keep one of them"))
+                );
             }
         }
     }

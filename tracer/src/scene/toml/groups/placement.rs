@@ -82,9 +82,10 @@ impl Objects {
                 (model.group, model.translate) = (placement.linear, placement.point(model.translate));
                 if in_range(model.translate) { Ok(()) } else { Err(TOO_FAR.into()) }
             }
-            Target::Sphere(index) => {
-                self.spheres.get_mut(index).map_or(Ok(()), |sphere| place_sphere(sphere, placement, materials))
-            }
+            Target::Sphere(index) => self
+                .spheres
+                .get_mut(index)
+                .map_or(Ok(()), |sphere| place_sphere(sphere, placement, materials)),
             Target::Disk(index) => {
                 self.disks.get_mut(index).map_or(Ok(()), |disk| place_disk(disk, placement))
             }
@@ -110,7 +111,8 @@ fn place_sphere(sphere: &mut Sphere, placement: &Placement, materials: &Material
     sphere.center = placement.point(sphere.center);
     sphere.radius *= scale;
     if !mirrored && placement.linear != DMat3::IDENTITY {
-        sphere.uv_rotate = degrees_of(placement.linear * (1.0 / scale) * rotation::of_model(sphere.uv_rotate));
+        sphere.uv_rotate =
+            degrees_of(placement.linear * (1.0 / scale) * rotation::of_model(sphere.uv_rotate));
     }
     let fits = in_range(sphere.center) && sphere.radius > 0.0 && sphere.radius <= MAX_COORDINATE;
     if fits { Ok(()) } else { Err(TOO_FAR.into()) }

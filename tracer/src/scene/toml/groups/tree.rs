@@ -103,7 +103,10 @@ impl Tree {
                 break;
             }
         }
-        Fault::at(at, "the groups are in a circle: this child contains, directly or through others, its own group")
+        Fault::at(
+            at,
+            "the groups are in a circle: this child contains, directly or through others, its own group",
+        )
     }
 
     fn parent(&self, index: usize) -> Option<(usize, usize)> {
@@ -124,7 +127,9 @@ fn known_names(names: &[(Name, Target)]) -> Read<BTreeMap<&str, &Target>> {
     for (name, target) in in_text {
         if known.insert(name.text.as_str(), target).is_some() {
             let shown = name.shown();
-            return Err(name.fault(format!("the name `{shown}` is given twice; names of objects and groups differ")));
+            return Err(
+                name.fault(format!("the name `{shown}` is given twice; names of objects and groups differ"))
+            );
         }
     }
     Ok(known)

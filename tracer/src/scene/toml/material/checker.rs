@@ -41,8 +41,7 @@ pub(super) fn checker(value: Value<'_>) -> Read<CheckerText> {
     let fits = |n: f64| n as f32 > 0.0 && n <= MAX_COORDINATE;
     let size = table.read("size", |value| value.number("above 0", fits))?.unwrap_or(1.0) as f32;
     let space = table.read("space", |value| value.word(&CheckerSpace::WORDS))?;
-    let [even, odd] =
-        table.required("checker")?.array("an array of two colours or names of materials")?;
+    let [even, odd] = table.required("checker")?.array("an array of two colours or names of materials")?;
     Ok(CheckerText {
         colors: [color(even)?, color(odd)?],
         pattern: Checker { colors: [Vec3::ONE; 2], size, space: space.unwrap_or(CheckerSpace::Object) },

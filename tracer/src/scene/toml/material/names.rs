@@ -54,7 +54,8 @@ impl Materials {
 
     /// Whether a material needs texture coordinates.
     pub(in crate::scene::toml) fn needs_uvs(&self, index: u32) -> bool {
-        self.has_texture(index) || self.checker(index).is_some_and(|checker| checker.space == CheckerSpace::Uv)
+        self.has_texture(index)
+            || self.checker(index).is_some_and(|checker| checker.space == CheckerSpace::Uv)
     }
 
     /// Whether the look of a material depends on the axes of its object.
@@ -76,7 +77,8 @@ impl Materials {
         let textured = self.textures.get(&index).is_some_and(|textures| textures.diffuse.is_some());
         if textured || material.checker.is_some() {
             let name = shortened(name);
-            let message = format!("the material `{name}` of {place} has a texture or a pattern, not one colour");
+            let message =
+                format!("the material `{name}` of {place} has a texture or a pattern, not one colour");
             return Err(message);
         }
         Ok(material.diffuse)

@@ -1,7 +1,12 @@
 //! Complete scenes, defaults, warnings, and arbitrary texts.
 
+mod bounces;
+mod checkers;
 mod faults;
+mod groups;
+mod shapes;
 mod textures;
+mod views;
 
 use glam::{DVec3, Vec2};
 use proptest::prelude::*;
@@ -47,7 +52,6 @@ specular = [0.3, 0.3, 0.3]
 exponent = 20
 reflect = 0.0
 transmit = 0
-ior = 1.5
 [[model]]
 file = "bust.obj"
 material = "marble"
@@ -142,6 +146,16 @@ fn fault(text: &str) -> String {
     let fault = read(text).expect_err(text);
     let (line, column) = place(text, fault.at);
     format!("{line}:{column}: {}", fault.message)
+}
+
+/// The warnings of a text: "line:column message" each.
+fn warnings(text: &str) -> Vec<String> {
+    let scene = read(text).unwrap_or_else(|fault| panic!("{text}: {}", fault.message));
+    let shown = |warning: &Fault| {
+        let (line, column) = place(text, warning.at);
+        format!("{line}:{column} {}", warning.message)
+    };
+    scene.warnings.iter().map(shown).collect()
 }
 
 /// Asserts the position of the fault and that its message contains all words.
