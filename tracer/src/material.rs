@@ -116,6 +116,12 @@ impl Material {
         [self.texture, self.cutout, self.emission_texture, normals].into_iter().flatten()
     }
 
+    /// Whether it needs texture coordinates: it has a texture, or a checker pattern that is laid in them.
+    pub fn needs_uvs(&self) -> bool {
+        let in_uvs = |checker: Checker| checker.space == CheckerSpace::Uv;
+        self.checker.is_some_and(in_uvs) || self.textures().next().is_some()
+    }
+
     /// Whether it reflects or transmits light.
     pub fn bounces(&self) -> bool {
         self.reflect != Vec3::ZERO || self.transmit != Vec3::ZERO

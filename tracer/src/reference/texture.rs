@@ -84,5 +84,9 @@ impl Oracle {
 
 /// Linear RGB of the texel in column `i`, from the left, of row `j`, from the bottom.
 pub(super) fn linear_texel(texture: &Texture, i: u32, j: u32) -> DVec3 {
-    DVec3::from_array(texture.texel(i, j).map(srgb::decode))
+    if texture.is_linear() {
+        DVec3::from_array(texture.linear_texel(i, j).map(f64::from))
+    } else {
+        DVec3::from_array(texture.texel(i, j).map(srgb::decode))
+    }
 }
