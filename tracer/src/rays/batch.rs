@@ -17,6 +17,8 @@ pub(crate) struct RayBatch<'a> {
     pub places: TileRays,
     /// Places of the rays' samples in the pattern of soft shadows. Only set in scenes with such shadows.
     pub patterns: [[u8; LANES]; BLOCKS],
+    /// Whether most rays hit points near those of their neighbours.
+    pub neighbours: bool,
     /// Whether the rays are those of a camera.
     pub(super) of_camera: bool,
 }
@@ -26,7 +28,7 @@ impl<'a> RayBatch<'a> {
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
         let patterns = [[0; LANES]; BLOCKS];
-        Self { frame, blocks, places: TileRays::empty(), patterns, of_camera: false }
+        Self { frame, blocks, places: TileRays::empty(), patterns, neighbours: true, of_camera: false }
     }
 
     /// Removes all rays.
@@ -80,6 +82,10 @@ impl SurfaceSource for RayBatch<'_> {
 
     fn are_of_camera(&self) -> bool {
         self.of_camera
+    }
+
+    fn are_neighbours(&self) -> bool {
+        self.neighbours
     }
 
     fn places(&self) -> &TileRays {

@@ -43,6 +43,11 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     /// Origins of the rays of a block in eye space, rounded.
     fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
 
+    /// Whether most rays hit points near those of their neighbours, so that their shadow rays are worth a tile.
+    fn are_neighbours(&self) -> bool {
+        true
+    }
+
     /// Places of the rays in the camera's picture.
     fn places(&self) -> &TileRays;
 

@@ -1,13 +1,14 @@
 //! The tiles of a band: what they share, and the way of each from rays to colours.
 
 use super::super::stage::{Stage, Watch};
-use super::bounce::{self, Bounces};
+use super::bounce::{BatchShader, Bounces, Shaded};
 use super::{Scratch, shade};
 use crate::cancel::Cancelled;
 use crate::frame::{CameraRays, FisheyeRays, ParallelRays, PreparedFrame};
 use crate::intersect::tile;
 use crate::rays::{
-    BLOCKS, CameraTile, EyeTile, HitBlock, ParallelTile, RayBatch, RayCounts, RaySource, TileSamples,
+    BLOCKS, CameraTile, EyeTile, HitBlock, ParallelTile, RayBatch, RayCounts, RaySource, SurfaceSource,
+    TileSamples,
 };
 use crate::simd::Simd;
 use crate::surface::Surfaces;
@@ -50,11 +51,6 @@ impl<'a, W: Watch> TileContext<'a, W> {
         }
     }
 
-    /// Whether the work is cancelled.
-    pub(super) fn is_cancelled(&self) -> bool {
-        (self.cancelled)()
-    }
-
     /// Traces and shades the samples of a tile. The result is `direct.colors`.
     ///
     /// # Errors
@@ -95,7 +91,7 @@ impl<'a, W: Watch> TileContext<'a, W> {
                 shade(simd, tile, self);
             },
         );
-        if self.bounces.is_some() { bounce::add(simd, tile, self) } else { Ok(()) }
+        self.add_bounces(simd, tile)
     }
 
     /// Traces and shades samples of a fisheye camera, ray by ray.
@@ -111,8 +107,17 @@ impl<'a, W: Watch> TileContext<'a, W> {
         batch.put_fisheye(camera, samples);
         self.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
         self.trace_batch(simd, &batch, [0; BLOCKS]);
-        let result = if self.bounces.is_some() { bounce::add(simd, &*batch, self) } else { Ok(()) };
+        let result = self.add_bounces(simd, &*batch);
         self.fisheye = Some(batch);
+        result
+    }
+
+    /// Adds what the surfaces of a shaded tile reflect and transmit.
+    #[inline(always)]
+    fn add_bounces<S: Simd, R: SurfaceSource>(&mut self, simd: S, tile: &R) -> Result<(), Cancelled> {
+        let Some(mut bounces) = self.bounces.take() else { return Ok(()) };
+        let result = bounces.add(simd, tile, self);
+        self.bounces = Some(bounces);
         result
     }
 
@@ -132,7 +137,7 @@ impl<'a, W: Watch> TileContext<'a, W> {
     /// Traces and shades a batch of rays. The result is `direct.colors`. `hits` already has the hits of the rays in `known`, and none
     /// of the others. A function of its own on each level, as [`TileContext::trace_tile`].
     #[inline(never)]
-    pub(super) fn trace_batch<S: Simd>(&mut self, simd: S, batch: &RayBatch<'_>, known: [u32; BLOCKS]) {
+    fn trace_batch<S: Simd>(&mut self, simd: S, batch: &RayBatch<'_>, known: [u32; BLOCKS]) {
         for (block, hits) in self.hits.iter_mut().enumerate() {
             let lanes = batch.live(block) & !known[block];
             if lanes != 0 {
@@ -148,5 +153,35 @@ impl<'a, W: Watch> TileContext<'a, W> {
                 shade(simd, batch, self);
             },
         );
+    }
+}
+
+impl<'a, W: Watch> BatchShader<'a> for TileContext<'a, W> {
+    fn frame(&self) -> &'a PreparedFrame {
+        self.frame
+    }
+
+    fn shaded(&mut self) -> Shaded<'_> {
+        Shaded { hits: &mut self.hits, surfaces: &self.surfaces, colors: &mut self.direct.colors }
+    }
+
+    fn scratch(&mut self) -> &mut tile::Scratch {
+        &mut self.tile
+    }
+
+    fn shade<S: Simd>(
+        &mut self,
+        simd: S,
+        batch: &RayBatch<'_>,
+        known: [u32; BLOCKS],
+    ) -> Result<(), Cancelled> {
+        if (self.cancelled)() {
+            return Err(Cancelled);
+        }
+        self.watch.enter(Stage::Secondary);
+        let live: u32 = (0..BLOCKS).map(|block| batch.live(block).count_ones()).sum();
+        self.counts.secondary += u64::from(live);
+        self.trace_batch(simd, batch, known);
+        Ok(())
     }
 }

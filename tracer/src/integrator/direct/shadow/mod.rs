@@ -11,8 +11,8 @@ mod tests;
 use crate::frame::PreparedFrame;
 use crate::intersect::tile;
 use crate::light::{Emitter, EyeLight, SHADOW_T_MAX};
-use crate::rays::{BLOCKS, HitBlock, ShadowTarget, ShadowTile, SurfaceSource};
-use crate::simd::{Lanes, Simd};
+use crate::rays::{BLOCKS, HitBlock, RayBlock, RaySource, ShadowTarget, ShadowTile, SurfaceSource};
+use crate::simd::{Lanes, Simd, each_bit};
 pub(super) use partial::add as add_partly_occluded;
 
 /// Whether S_j of a light may be other than 0 and 1, or surfaces may be no occluders.
@@ -33,6 +33,9 @@ pub(super) fn occluded<S: Simd, R: SurfaceSource>(
     scratch: &mut tile::Scratch,
 ) -> [u32; BLOCKS] {
     let (light, t_max) = target_of(light);
+    if !R::COMMON_ORIGIN && !rays.are_neighbours() {
+        return occluded_one_by_one(rays, hits, (light, t_max), points, lit);
+    }
     let groups = by_item(simd, hits, lit);
     let mut occluded = [0; BLOCKS];
     let mut shadow = ShadowTile {
@@ -54,6 +57,30 @@ pub(super) fn occluded<S: Simd, R: SurfaceSource>(
         }
     }
     occluded
+}
+
+/// The same, ray by ray: faster for points that are far apart.
+#[inline(never)]
+fn occluded_one_by_one<R: SurfaceSource>(
+    rays: &R,
+    hits: &[HitBlock; BLOCKS],
+    (light, t_max): (ShadowTarget, f64),
+    points: &[[Lanes; 3]; BLOCKS],
+    lit: [u32; BLOCKS],
+) -> [u32; BLOCKS] {
+    let frame = rays.frame();
+    let tile = ShadowTile { frame, light, t_max, grid: rays.places(), points, hits, live: lit };
+    let mut block_rays = RayBlock::new(frame);
+    std::array::from_fn(|block| {
+        if lit[block] == 0 {
+            return 0;
+        }
+        block_rays.clear();
+        for lane in each_bit(lit[block]) {
+            block_rays.set(lane, tile.ray(block, lane), t_max, tile.starts_on(block, lane));
+        }
+        frame.any_hits_of(&block_rays)
+    })
 }
 
 /// The target of the shadow rays to a light's centre, and their upper end.
