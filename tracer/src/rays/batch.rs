@@ -1,10 +1,10 @@
 //! Batches: up to 256 rays of any origins and directions, as sixteen blocks, so that they are shaded as a tile is.
 
 use super::block::LocalBlock;
-use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays};
+use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Simd, each_bit};
 
 /// Most rays of a batch.
 pub(crate) const BATCH: usize = BLOCKS * LANES;
@@ -34,6 +34,23 @@ impl<'a> RayBatch<'a> {
     /// Removes all rays.
     pub(crate) fn clear(&mut self) {
         self.blocks.iter_mut().for_each(RayBlock::clear);
+    }
+
+    /// Replaces the rays by those of some samples of a camera; `ray` is that of a place of the picture, in pixels from its top left
+    /// corner, with its upper end.
+    pub(super) fn put_samples(&mut self, samples: &TileSamples<'_>, ray: impl Fn(f64, f64) -> (Ray, f64)) {
+        self.clear();
+        self.of_camera = true;
+        self.places.x = samples.rays.x;
+        self.places.y = samples.rays.y;
+        for block in 0..BLOCKS {
+            self.patterns[block] = samples.pattern(block);
+            for lane in each_bit(samples.live[block]) {
+                let [across, along] = samples.place(block, lane);
+                let (ray, t_max) = ray(across, along);
+                self.set(block * LANES + lane, ray, t_max, None);
+            }
+        }
     }
 
     /// Sets ray `index`, below [`BATCH`]: hits within 0 < t < `t_max` count, except on the primitive that it starts on.

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::{
-    BLOCKS, CameraTile, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource,
-    TileRays, TileSamples,
+    BLOCKS, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource, TileRays,
+    TileSamples,
 };
 use crate::frame::{Affine, Instance, PinholeRays, PreparedFrame};
 use crate::simd::vector::Vec3x16;
@@ -124,13 +124,6 @@ impl SurfaceSource for EyeTile<'_> {
                 steps: three!(i => single(instance.inverse * self.steps[i])),
             },
         }
-    }
-}
-
-impl CameraTile for EyeTile<'_> {
-    #[inline(always)]
-    fn samples(&self) -> &TileSamples<'_> {
-        &self.samples
     }
 }
 

@@ -3,7 +3,7 @@
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.
 
-use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays, TileSamples};
+use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Simd, f32x16};
@@ -73,12 +73,6 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
         let along = direction.scale(t);
         if Self::COMMON_ORIGIN { along } else { self.origins(simd, block).add(along) }
     }
-}
-
-/// Tiles of a camera with a projection.
-pub(crate) trait CameraTile: SurfaceSource + PictureTile {
-    /// The samples of the tile.
-    fn samples(&self) -> &TileSamples<'_>;
 }
 
 /// Tiles that are a picture of the scene: their closest hits are found together, see `intersect::tile`.
