@@ -15,13 +15,15 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Lengths of the ways of light between the rays and the camera, in eye units.
+    pub ways: [[f64; LANES]; BLOCKS],
 }
 
 impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        Self { frame, blocks, places: TileRays::empty() }
+        Self { frame, blocks, places: TileRays::empty(), ways: [[0.0; LANES]; BLOCKS] }
     }
 
     /// Removes all rays.
@@ -75,6 +77,10 @@ impl SurfaceSource for RayBatch<'_> {
 
     fn places(&self) -> &TileRays {
         &self.places
+    }
+
+    fn way_before(&self, block: usize, lane: usize) -> f64 {
+        self.ways[block][lane]
     }
 }
 

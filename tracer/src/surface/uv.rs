@@ -21,6 +21,7 @@ pub(super) struct PointUvs {
     footprint: Option<Box<Footprint>>,
 }
 
+#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack; nearly all are interpolated")]
 enum Places {
     /// On triangles.
     Interpolated {
