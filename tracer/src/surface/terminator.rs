@@ -62,8 +62,8 @@ impl Lifts {
         self.0[block] = Lanes::ZERO;
     }
 
-    /// Sets the lifts of some lanes.
-    #[inline(always)]
+    /// Sets the lifts of some lanes. Not inlined: the code of scenes without it stays dense.
+    #[inline(never)]
     pub(super) fn put<S: Simd, R: SurfaceSource>(
         &mut self,
         simd: S,
@@ -71,23 +71,37 @@ impl Lifts {
         space: &Space<R>,
         points: &SmoothPoints<'_, S>,
     ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let lift = points.lift(simd, &space.normals, space.normals_scale);
+                group.put_one(simd, lift, &mut self.0[group.block]);
+            },
+        );
+    }
+}
+
+impl<S: Simd> SmoothPoints<'_, S> {
+    /// The lifts; `normals` are the columns of the map of normals to eye space, divided by `scale`.
+    #[inline(always)]
+    fn lift(&self, simd: S, normals: &[[f32; 3]; 3], scale: f32) -> f32x16<S> {
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let [u, v] = points.weights;
-        let corners =
-            [(one - u - v, points.at), (u, points.at.sub(points.ab)), (v, points.at.sub(points.ac))];
+        let [u, v] = self.weights;
+        let weights = [one - u - v, u, v];
+        let from_corners = [self.at, self.at.sub(self.ab), self.at.sub(self.ac)];
         let mut lift = zero;
-        for (&normal, (weight, from_corner)) in points.normals.iter().zip(corners) {
+        for k in 0..3 {
             // n.d is the same in eye space and in mesh space, up to the scale of the normal.
-            let height = normal.dot(from_corner) * splat(simd, space.normals_scale);
-            let below = select(points.against, height, -height).max(zero);
-            let normal = normal.transform(simd, &space.normals);
-            let along = normal.dot(points.ng);
-            let along = select(points.against, -along, along);
-            lift += weight * below * along / normal.dot(normal);
+            let height = self.normals[k].dot(from_corners[k]) * splat(simd, scale);
+            let below = select(self.against, height, -height).max(zero);
+            let normal = self.normals[k].transform(simd, normals);
+            let along = normal.dot(self.ng);
+            let along = select(self.against, -along, along);
+            lift += weights[k] * below * along / normal.dot(normal);
         }
         // Not for NaN: a corner without a normal.
         let usable = lift.simd_gt(zero) & lift.simd_le(splat(simd, f32::MAX));
-        group.put_one(simd, select(usable, lift, zero), &mut self.0[group.block]);
+        select(usable, lift, zero)
     }
 }
 
