@@ -29,7 +29,7 @@ pub struct Material {
     pub unlit: bool,
     /// Whether vertex colours of the mesh, if it has any, are a factor of c_d.
     pub vertex_colors: bool,
-    /// A pattern of two colours, in place of c_d and its texture.
+    /// A pattern of two colours: a factor of c_d, which loaders make white, in place of its texture.
     pub checker: Option<Checker>,
     /// Texture that tilts shading normals. Valid only on geometry with texture coordinates.
     pub normal_map: Option<NormalMap>,

@@ -15,6 +15,8 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Lengths of the ways of light between the rays and the camera, in eye units.
+    pub ways: [[f64; LANES]; BLOCKS],
     /// Places of the rays' samples in the pattern of soft shadows. Only set in scenes with such shadows.
     pub patterns: [[u8; LANES]; BLOCKS],
     /// Whether most rays hit points near those of their neighbours.
@@ -27,8 +29,15 @@ impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        let patterns = [[0; LANES]; BLOCKS];
-        Self { frame, blocks, places: TileRays::empty(), patterns, neighbours: true, of_camera: false }
+        Self {
+            frame,
+            blocks,
+            places: TileRays::empty(),
+            ways: [[0.0; LANES]; BLOCKS],
+            patterns: [[0; LANES]; BLOCKS],
+            neighbours: true,
+            of_camera: false,
+        }
     }
 
     /// Removes all rays.
@@ -111,6 +120,10 @@ impl SurfaceSource for RayBatch<'_> {
 
     fn pattern(&self, block: usize) -> [u8; LANES] {
         self.patterns[block]
+    }
+
+    fn way_before(&self, block: usize, lane: usize) -> f64 {
+        self.ways[block][lane]
     }
 }
 

@@ -163,6 +163,7 @@ impl<'a> Bounces<'a> {
                 let incoming = Incoming {
                     starts_on: tile.starts_on(block, lane),
                     weight: DVec3::ONE,
+                    way: 0.0,
                     media: Media::default(),
                     sample: (block * LANES + lane) as u16,
                 };
@@ -206,6 +207,7 @@ impl<'a> Bounces<'a> {
             batch.set(index, secondary.ray, f64::INFINITY, Some(secondary.starts_on));
             let (block, lane) = place_of(usize::from(secondary.sample));
             let (to_block, to_lane) = place_of(index);
+            batch.ways[to_block][to_lane] = secondary.way;
             batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
             batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
             if soft_shadows {
@@ -236,6 +238,7 @@ impl<'a> Bounces<'a> {
                 let incoming = Incoming {
                     starts_on: Some(secondary.starts_on),
                     weight,
+                    way: secondary.way,
                     media: secondary.media,
                     sample: secondary.sample,
                 };
@@ -285,6 +288,8 @@ struct Incoming {
     starts_on: Option<PrimitiveId>,
     /// Its weight where it starts.
     weight: DVec3,
+    /// Length of the way between it and the camera, in eye units.
+    way: f64,
     media: Media,
     sample: u16,
 }
@@ -344,6 +349,7 @@ impl Hit<'_> {
             material,
             coincidence: if coincides { 4.0 * frame.coarsest } else { 0.0 },
             weight: left.map_or(incoming.weight, |left| incoming.weight * left),
+            way: incoming.way + t * length,
             media: incoming.media,
             sample: incoming.sample,
         };
