@@ -182,7 +182,7 @@ mod tests {
             for radius in [0.5, 0.7, 0.85] {
                 let within = |point: &&DVec3| point.reject_from_normalized(direction).length() < radius;
                 let share = points.iter().filter(within).count() as f64 / points.len() as f64;
-                assert!((share - radius * radius).abs() < 0.1, "{share} within {radius} along {direction}");
+                assert!((share - radius * radius).abs() < 0.13, "{share} within {radius} along {direction}");
             }
         }
     }
