@@ -15,13 +15,20 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Places of the rays' samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    pub patterns: [[u8; LANES]; BLOCKS],
+    /// Whether most rays hit points near those of their neighbours.
+    pub neighbours: bool,
+    /// Whether the rays are those of a camera.
+    pub(super) of_camera: bool,
 }
 
 impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        Self { frame, blocks, places: TileRays::empty() }
+        let patterns = [[0; LANES]; BLOCKS];
+        Self { frame, blocks, places: TileRays::empty(), patterns, neighbours: true, of_camera: false }
     }
 
     /// Removes all rays.
@@ -73,8 +80,20 @@ impl SurfaceSource for RayBatch<'_> {
         LocalBatch(Box::new(std::array::from_fn(|block| self.blocks[block].local(instance))))
     }
 
+    fn are_of_camera(&self) -> bool {
+        self.of_camera
+    }
+
+    fn are_neighbours(&self) -> bool {
+        self.neighbours
+    }
+
     fn places(&self) -> &TileRays {
         &self.places
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.patterns[block]
     }
 }
 
@@ -83,7 +102,7 @@ pub(crate) struct LocalBatch(Box<[LocalBlock; BLOCKS]>);
 
 impl LocalRays<RayBatch<'_>> for LocalBatch {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
+    fn origins<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
         self.0[block].origins(simd)
     }
 

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::F64_ERROR;
-use super::shape::{Primitive, Shape, Skin};
+use super::attributes::{Chart, Skin};
+use super::shape::{Primitive, Shape};
+use super::{F64_ERROR, Oracle};
 use crate::intersect::Primitive as Name;
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{FrameView, NormalMode, Scene};
+use crate::scene::{FrameView, Model, NormalMode, Scene};
 use crate::srgb;
 
 /// Half a step of an `f32`, relative to the number: corners of meshes are rounded to it, and are within [-1, 1].
@@ -22,8 +23,7 @@ pub(super) fn flatten(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameV
     for (index, model) in scene.models.iter().enumerate() {
         let find = |id: MeshId| meshes.iter().find(|mesh| mesh.id() == id);
         let Some(mesh) = find(model.mesh) else { continue };
-        let own = rotation(model.rotate.to_array()) * DMat3::from_diagonal(model.scale);
-        let linear = rotation([0.0, view.spin, 0.0]) * model.group * own;
+        let linear = linear(model, view);
         let scale = libm::exp2(f64::from(mesh.exponent()));
         let place = |p: Vec3| linear * (p.as_dvec3() * scale + mesh.center()) + (model.translate - eye);
         let placed = digits(&[model.translate, linear * mesh.center(), linear * DVec3::splat(scale), eye]);
@@ -49,7 +49,12 @@ pub(super) fn flatten(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameV
         }
     }
     for (index, sphere) in scene.spheres.iter().enumerate() {
-        let shape = Shape::Sphere { center: sphere.center - eye, radius: sphere.radius };
+        let shape = Shape::Sphere {
+            center: sphere.center - eye,
+            radius: sphere.radius,
+            inside_out: sphere.inside_out,
+            chart: Chart::sphere(rotation(sphere.uv_rotate.to_array())),
+        };
         let name = Name::Sphere(index);
         primitives.push(Primitive { shape, material: sphere.material, name, error: 0.0, mirrored: false });
     }
@@ -68,12 +73,50 @@ pub(super) fn flatten(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameV
         primitives.push(Primitive { shape, material: disk.material, name, error, mirrored: false });
     }
     for (index, plane) in scene.planes.iter().enumerate() {
-        let shape = Shape::Plane { point: plane.point - eye, normal: plane.normal.normalize() };
+        let normal = plane.normal.normalize();
+        let chart = Chart::plane(normal, plane.size);
+        let shape = Shape::Plane { point: plane.point - eye, normal, chart };
         let error = digits(&[plane.point, plane.point - eye]);
         let name = Name::Plane(index);
         primitives.push(Primitive { shape, material: plane.material, name, error, mirrored: false });
     }
     primitives
+}
+
+impl Oracle {
+    /// A point of a surface, relative to the camera, in the space of its object: the coordinates of a model's file; else world
+    /// units from the centre of a sphere or a disk, from the point of a plane, from the first corner of a triangle.
+    pub(super) fn in_object(&self, name: Name, point: DVec3) -> DVec3 {
+        let in_world = self.view.camera.position + point;
+        match name {
+            Name::Model { model, .. } => {
+                let model = &self.scene.models[model];
+                linear(model, &self.view).inverse() * (in_world - model.translate)
+            }
+            Name::Sphere(index) => in_world - self.scene.spheres[index].center,
+            Name::Triangle(index) => in_world - self.scene.triangles[index].vertices[0],
+            Name::Disk(index) => in_world - self.scene.disks[index].center,
+            Name::Plane(index) => in_world - self.scene.planes[index].point,
+        }
+    }
+
+    /// The unit normal of a primitive's winding in the space of its object, from that in world space.
+    pub(super) fn normal_in_object(&self, primitive: usize, in_world: DVec3) -> DVec3 {
+        let Primitive { shape, name, .. } = &self.primitives[primitive];
+        match (shape, name) {
+            (Shape::Triangle { corners, .. }, Name::Model { .. }) => {
+                let [a, b, c] = corners.map(|corner| self.in_object(*name, corner));
+                (b - a).cross(c - a).normalize_or_zero()
+            }
+            _ => in_world,
+        }
+    }
+}
+
+/// Linear part of a model's transform to the world.
+fn linear(model: &Model, view: &FrameView) -> DMat3 {
+    let own = rotation(model.rotate.to_array()) * DMat3::from_diagonal(model.scale);
+    rotation([0.0, view.spin, 0.0]) * model.group * own
 }
 
 /// Rounding error of points.

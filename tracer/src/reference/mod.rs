@@ -7,14 +7,38 @@
 //! ```text
 //!   flatten      the scene as a list of primitives
 //!   shape        primitives, and their intersection
-//!   visibility   closest hits and occlusion
-//!   shading      the shading equation
+//!   attributes   texture coordinates and vertex colours of points on shapes
+//!   camera       rays of the camera
+//!   visibility   closest hits, and the light that passes between two points
+//!   surface      the point that a ray hits
 //!   texture      texture lookups
+//!   material     colours and tilted normals of a surface point
+//!   terminator   where shadow rays start
+//!   extent       the share of a light that arrives, also of one with a radius
+//!   shading      the shading equation without bounces
+//!   sky          the background
+//!   optics       reflection, refraction, Fresnel's equations
+//!   bodies       the transparent bodies around a ray
+//!   bounce       reflected and transmitted rays
+//!   auxiliary    pictures without light: normals, depth, items, diffuse colours
 //! ```
 
+mod attributes;
+mod auxiliary;
+mod bodies;
+mod bounce;
+mod camera;
+mod extent;
 mod flatten;
+mod material;
+mod optics;
 mod shading;
 mod shape;
+mod sky;
+mod surface;
+mod terminator;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod visibility;
 
@@ -29,6 +53,7 @@ use crate::scene::{FrameView, Scene};
 use crate::srgb;
 use crate::texture::Texture;
 use shape::Primitive;
+use visibility::Found;
 
 /// Relative error of an `f64` after a handful of operations.
 const F64_ERROR: f64 = 1.0 / (1_u64 << 50) as f64;
@@ -39,6 +64,8 @@ pub struct Oracle {
     view: FrameView,
     textures: Vec<Arc<Texture>>,
     primitives: Vec<Primitive>,
+    /// Points on each light: see [`Oracle::with_light_points`].
+    light_points: Vec<Vec<Vec<DVec3>>>,
     size: f64,
 }
 
@@ -53,7 +80,16 @@ impl Oracle {
     ) -> Self {
         let primitives = flatten::flatten(scene, meshes, view);
         let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
-        Self { scene: scene.clone(), view: *view, textures: textures.to_vec(), primitives, size }
+        let (scene, textures) = (scene.clone(), textures.to_vec());
+        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), size }
+    }
+
+    /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,
+    /// from its centre in units of its radius. Of n sets, a sample at the place (column % 2) + 2 (row % 2) of the picture's samples
+    /// uses that with the index place % n. A light without sets keeps the dense sampling.
+    #[must_use]
+    pub fn with_light_points(self, light_points: Vec<Vec<Vec<DVec3>>>) -> Self {
+        Self { light_points, ..self }
     }
 
     /// Linear RGB of a pixel: the mean over its samples.
@@ -64,7 +100,7 @@ impl Oracle {
             for i in 0..n {
                 let sx = f64::from(x) + (f64::from(i) + 0.5) / f64::from(n);
                 let sy = f64::from(y) + (f64::from(j) + 0.5) / f64::from(n);
-                sum += self.radiance(self.direction(sx, sy));
+                sum += self.shown(&self.camera_ray(sx, sy));
             }
         }
         sum / f64::from(n * n)
@@ -77,7 +113,7 @@ impl Oracle {
 
     /// Colour of one ray in 8-bit sRGB, through a point of the picture in pixels from its top left corner.
     pub fn encoded_at(&self, x: f64, y: f64) -> [u8; 3] {
-        srgb::encode(self.radiance(self.direction(x, y)).as_vec3())
+        srgb::encode(self.shown(&self.camera_ray(x, y)).as_vec3())
     }
 
     /// The whole picture. The time is proportional to pixels times primitives.
@@ -90,8 +126,8 @@ impl Oracle {
 
     /// The hit of a ray from the camera in any direction; the point is camera + t * direction.
     pub fn closest_hit(&self, direction: DVec3) -> Option<RayHit> {
-        let (index, hit) = self.closest(DVec3::ZERO, direction, f64::INFINITY, None)?;
-        Some(RayHit { t: hit.t, primitive: self.primitives[index].name })
+        let found = self.closest(DVec3::ZERO, direction, f64::INFINITY, None)?;
+        Some(self.named(&found))
     }
 
     /// The hit of any ray of world space.
@@ -100,20 +136,11 @@ impl Oracle {
         let starts_on = ray
             .starts_on
             .and_then(|name| self.primitives.iter().position(|primitive| primitive.name == name));
-        let (index, hit) = self.closest(origin, ray.direction, ray.t_max, starts_on)?;
-        Some(RayHit { t: hit.t, primitive: self.primitives[index].name })
+        let found = self.closest(origin, ray.direction, ray.t_max, starts_on)?;
+        Some(self.named(&found))
     }
 
-    /// Direction through a point of the picture, in pixels from its top left corner.
-    fn direction(&self, sx: f64, sy: f64) -> DVec3 {
-        let camera = &self.view.camera;
-        let (width, height) = (f64::from(self.view.width), f64::from(self.view.height));
-        let forward = (camera.look_at - camera.position).normalize();
-        let right = forward.cross(camera.up).normalize();
-        let up = right.cross(forward);
-        let half_height = libm::tan(camera.fov.to_radians() / 2.0) / camera.zoom;
-        let across = (2.0 * sx / width - 1.0) * half_height * width / height;
-        let along = (1.0 - 2.0 * sy / height) * half_height;
-        (forward + right * across + up * along).normalize()
+    fn named(&self, found: &Found) -> RayHit {
+        RayHit { t: found.crossing.t, primitive: self.primitives[found.primitive].name }
     }
 }

@@ -3,7 +3,9 @@
 #![allow(clippy::panic, clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod adaptive;
+mod auxiliary;
 mod build_quality;
+mod cameras;
 mod coincident;
 mod common;
 mod cuts;
@@ -13,6 +15,7 @@ mod knobs;
 mod mutated_models;
 mod numerics;
 mod oracle;
+mod partial_shadows;
 mod physics;
 mod project_scenes;
 mod shadows;

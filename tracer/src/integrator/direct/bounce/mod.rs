@@ -8,26 +8,60 @@
 //! ```text
 //!   secondary   rays that leave a surface
 //!   media       the transparent bodies around a ray
+//!   mirrors     rays that one plane reflects: traced as a tile
 //! ```
 
 mod media;
+mod mirrors;
 mod secondary;
+#[cfg(test)]
+mod tests;
 
 use glam::DVec3;
 
-use super::super::stage::{Stage, Watch};
-use super::{TileContext, shade};
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
-use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, RaySource, TileColors};
+use crate::intersect::tile::Scratch;
+use crate::rays::{BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, SurfaceSource, TileColors, TileRays};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
-use crate::surface::SurfaceBlock;
+use crate::surface::{SurfaceBlock, Surfaces};
 use media::Media;
+use mirrors::Mirrors;
 use secondary::{Arrival, Secondary};
 
 /// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
 /// 0.004 of the light, the default of `min_contribution`, end before.
-const MOST_OF_SAMPLE: u16 = 1024;
+const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
+
+/// Traces and shades batches of rays, in the memory of the current tile.
+pub(super) trait BatchShader<'a> {
+    /// The frame.
+    fn frame(&self) -> &'a PreparedFrame;
+
+    /// What the last tile or batch hits.
+    fn shaded(&mut self) -> Shaded<'_>;
+
+    /// Memory of intersections.
+    fn scratch(&mut self) -> &mut Scratch;
+
+    /// Traces and shades a batch of secondary rays. The hits already have those of the rays in `known`, and none of the others.
+    ///
+    /// # Errors
+    /// [`Cancelled`], polled before the batch is traced.
+    fn shade<S: Simd>(
+        &mut self,
+        simd: S,
+        batch: &RayBatch<'_>,
+        known: [u32; BLOCKS],
+    ) -> Result<(), Cancelled>;
+}
+
+/// Hits, surface points and colours of a tile or batch that is shaded.
+pub(super) struct Shaded<'b> {
+    pub hits: &'b mut [HitBlock; BLOCKS],
+    pub surfaces: &'b Surfaces,
+    pub colors: &'b mut TileColors,
+}
 
 /// Queues and memory of the secondary rays of a tile, kept from tile to tile.
 pub(super) struct Bounces<'a> {
@@ -37,9 +71,12 @@ pub(super) struct Bounces<'a> {
     queue: Vec<Secondary>,
     reflected: Vec<Secondary>,
     transmitted: Vec<Secondary>,
+    /// Places of the tile's samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    patterns: [[u8; LANES]; BLOCKS],
     /// Rays of each sample so far.
     counts: [u16; BATCH],
     batch: RayBatch<'a>,
+    mirrors: Mirrors,
 }
 
 impl<'a> Bounces<'a> {
@@ -51,82 +88,89 @@ impl<'a> Bounces<'a> {
                 queue: Vec::new(),
                 reflected: Vec::new(),
                 transmitted: Vec::new(),
+                patterns: [[0; LANES]; BLOCKS],
                 counts: [0; BATCH],
                 batch: RayBatch::new(frame),
+                mirrors: Mirrors::new(),
             })
         })
     }
 }
 
-/// Adds what the surfaces of a traced and shaded tile reflect and transmit to its colours.
-///
-/// # Errors
-/// [`Cancelled`], polled before each batch.
-#[inline(never)]
-pub(super) fn add<S: Simd, W: Watch>(
-    simd: S,
-    tile: &EyeTile<'_>,
-    context: &mut TileContext<'_, W>,
-) -> Result<(), Cancelled> {
-    let Some(mut bounces) = context.bounces.take() else { return Ok(()) };
-    let result = bounces.trace(simd, tile, context);
-    context.bounces = Some(bounces);
-    result
-}
-
 impl<'a> Bounces<'a> {
-    fn trace<S: Simd, W: Watch>(
+    /// Adds what the surfaces of a shaded tile reflect and transmit to its colours.
+    ///
+    /// # Errors
+    /// [`Cancelled`], polled before each batch.
+    #[inline(never)]
+    pub(super) fn add<S: Simd, R: SurfaceSource>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
-        context: &mut TileContext<'a, W>,
+        tile: &R,
+        shader: &mut impl BatchShader<'a>,
     ) -> Result<(), Cancelled> {
-        self.begin(tile, context);
+        self.begin(tile, shader);
         if self.reflected.is_empty() && self.transmitted.is_empty() {
             return Ok(());
         }
-        self.sums = context.direct.colors;
-        let max_depth = context.frame.view().quality.max_depth;
+        match tile.eye() {
+            Some(eye) => self.mirrors.find(simd, eye, &self.reflected, shader.scratch()),
+            None => self.mirrors.clear(),
+        }
+        self.trace(simd, tile.places(), shader)
+    }
+
+    fn trace<S: Simd>(
+        &mut self,
+        simd: S,
+        places: &TileRays,
+        shader: &mut impl BatchShader<'a>,
+    ) -> Result<(), Cancelled> {
+        self.sums = *shader.shaded().colors;
+        let max_depth = shader.frame().view().quality.max_depth;
         for depth in 1..=max_depth {
             self.queue.clear();
             self.queue.append(&mut self.reflected);
             self.queue.append(&mut self.transmitted);
             let queue = std::mem::take(&mut self.queue);
             for rays in queue.chunks(BATCH) {
-                self.trace_batch(simd, tile, rays, context)?;
-                self.collect(rays, depth < max_depth, context);
+                self.trace_batch(simd, places, rays, depth, shader)?;
+                self.collect(rays, depth < max_depth, shader.frame(), &shader.shaded());
             }
             self.queue = queue;
         }
-        context.direct.colors = self.sums;
+        *shader.shaded().colors = self.sums;
         Ok(())
     }
 
     /// Starts the first generation from the hits of a tile.
-    fn begin<W>(&mut self, tile: &EyeTile<'_>, context: &mut TileContext<'_, W>) {
+    fn begin<R: SurfaceSource>(&mut self, tile: &R, shader: &mut impl BatchShader<'a>) {
         self.reflected.clear();
         self.transmitted.clear();
         self.counts = [0; BATCH];
-        let materials = &context.frame.scene().materials;
+        let frame = shader.frame();
+        if frame.features.soft_shadows {
+            self.patterns = std::array::from_fn(|block| tile.pattern(block));
+        }
+        let materials = &frame.scene().materials;
+        let Shaded { hits, surfaces, colors } = shader.shaded();
         for block in 0..BLOCKS {
-            let surface = &context.surfaces.blocks[block];
+            let surface = &surfaces.blocks[block];
             for lane in each_bit(bouncing(surface, materials)) {
                 let ray = tile.ray(block, lane);
-                let primitive = context.hits[block].slot(lane);
-                let hit = Hit { ray: &ray, surface, hits: &context.hits[block], lane };
+                let primitive = hits[block].slot(lane);
+                let hit = Hit { ray: &ray, surface, hits: &hits[block], lane };
                 let incoming = Incoming {
                     starts_on: tile.starts_on(block, lane),
                     weight: DVec3::ONE,
                     media: Media::default(),
                     sample: (block * LANES + lane) as u16,
                 };
-                let Some((arrival, left)) = hit.arrival(context.frame, primitive, &incoming) else {
-                    continue;
-                };
+                let Some((arrival, left)) = hit.arrival(frame, primitive, &incoming) else { continue };
                 if let Some(left) = left {
-                    absorb(&mut context.direct.colors[block], lane, left);
+                    absorb(&mut colors[block], lane, left);
                 }
-                self.leave(&arrival, context.frame);
+                self.leave(&arrival, frame);
             }
         }
     }
@@ -145,67 +189,62 @@ impl<'a> Bounces<'a> {
         }
     }
 
-    /// Traces and shades a batch, into `context.direct.colors`.
-    fn trace_batch<S: Simd, W: Watch>(
+    /// Traces and shades a batch.
+    fn trace_batch<S: Simd>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         rays: &[Secondary],
-        context: &mut TileContext<'a, W>,
+        depth: u8,
+        shader: &mut impl BatchShader<'a>,
     ) -> Result<(), Cancelled> {
-        if context.is_cancelled() {
-            return Err(Cancelled);
-        }
-        context.watch.enter(Stage::Secondary);
-        context.counts.secondary += rays.len() as u64;
+        let soft_shadows = shader.frame().features.soft_shadows;
+        let mut known = [0; BLOCKS];
         let batch = &mut self.batch;
         batch.clear();
         for (index, secondary) in rays.iter().enumerate() {
             batch.set(index, secondary.ray, f64::INFINITY, Some(secondary.starts_on));
             let (block, lane) = place_of(usize::from(secondary.sample));
             let (to_block, to_lane) = place_of(index);
-            batch.places.x[to_block].0[to_lane] = tile.rays.x[block].0[lane];
-            batch.places.y[to_block].0[to_lane] = tile.rays.y[block].0[lane];
+            batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
+            batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
+            if soft_shadows {
+                batch.patterns[to_block][to_lane] = self.patterns[block][lane];
+            }
         }
-        for (block, hits) in context.hits.iter_mut().enumerate() {
-            *hits = if batch.live(block) == 0 {
-                HitBlock::NONE
-            } else {
-                context.frame.closest_hits_of(&batch.blocks[block])
-            };
+        for (block, hits) in shader.shaded().hits.iter_mut().enumerate() {
+            *hits = HitBlock::NONE;
+            let start = (block * LANES).min(rays.len());
+            let of_block = &rays[start..rays.len().min(start + LANES)];
+            // Only the first generation leaves a tile of the camera.
+            known[block] = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
         }
-        context.watch.enter(Stage::Surfaces);
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                context.surfaces.find(simd, batch, &context.hits);
-                context.watch.enter(Stage::Shading);
-                shade(simd, batch, context);
-            },
-        );
-        Ok(())
+        let together: u32 = known.iter().map(|lanes| lanes.count_ones()).sum();
+        batch.neighbours = 2 * together as usize >= rays.len();
+        shader.shade(simd, batch, known)
     }
 
     /// Adds the colours of a batch to the samples, and collects the rays that leave its surfaces.
-    fn collect<W>(&mut self, rays: &[Secondary], goes_on: bool, context: &TileContext<'_, W>) {
-        let frame = context.frame;
+    fn collect(&mut self, rays: &[Secondary], goes_on: bool, frame: &PreparedFrame, shaded: &Shaded<'_>) {
         let materials = &frame.scene().materials;
         for (index, secondary) in rays.iter().enumerate() {
             let (block, lane) = place_of(index);
-            let surface = &context.surfaces.blocks[block];
+            let surface = &shaded.surfaces.blocks[block];
             let mut weight = secondary.weight;
-            if let Some(primitive) = context.hits[block].primitive(lane) {
-                let hit = Hit { ray: &secondary.ray, surface, hits: &context.hits[block], lane };
+            if let Some(primitive) = shaded.hits[block].primitive(lane) {
+                let hit = Hit { ray: &secondary.ray, surface, hits: &shaded.hits[block], lane };
                 let incoming = Incoming {
                     starts_on: Some(secondary.starts_on),
                     weight,
                     media: secondary.media,
                     sample: secondary.sample,
                 };
-                if frame.features.transparent || (goes_on && hit.material(materials).bounces()) {
+                let material = hit.material(materials);
+                let goes_on = goes_on && material.bounces();
+                if goes_on || secondary.media.may_absorb(materials, material) {
                     let Some((arrival, _)) = hit.arrival(frame, primitive, &incoming) else { continue };
                     weight = arrival.weight;
-                    if goes_on && arrival.material.bounces() {
+                    if goes_on {
                         self.leave(&arrival, frame);
                     }
                 }
@@ -214,7 +253,7 @@ impl<'a> Bounces<'a> {
             }
             let (of_block, of_lane) = place_of(usize::from(secondary.sample));
             for channel in 0..3 {
-                let color = f64::from(context.direct.colors[block][channel].0[lane]);
+                let color = f64::from(shaded.colors[block][channel].0[lane]);
                 let sum = &mut self.sums[of_block][channel].0[of_lane];
                 *sum += (weight[channel] * color) as f32;
             }
@@ -273,15 +312,19 @@ impl Hit<'_> {
         let (surface, lane) = (self.surface, self.lane);
         let t = frame.t_of(self.ray, primitive, incoming.starts_on)?;
         let length = self.ray.direction.length();
-        let vector = |lanes: &[Lanes; 3]| {
-            DVec3::new(f64::from(lanes[0].0[lane]), f64::from(lanes[1].0[lane]), f64::from(lanes[2].0[lane]))
-                .normalize()
-        };
-        let ng = vector(&surface.ng);
-        let ns = if frame.features.smooth { vector(&surface.ns) } else { ng };
+        let point = self.ray.origin + self.ray.direction * t;
+        let outwards = frame.front_normal(primitive, point);
+        let front = outwards.dot(self.ray.direction) < 0.0;
+        let ng = if front { outwards } else { -outwards };
         let index = surface.material.0[lane];
         let materials = &frame.scene().materials;
-        let front = surface.front >> lane & 1 == 1;
+        let material = &materials[index as usize];
+        let flat = frame.is_flat(primitive) && material.normal_map.is_none();
+        let ns = if flat {
+            ng
+        } else {
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(surface.ns[axis].0[lane]))).normalize()
+        };
         let left = if frame.features.transparent {
             incoming.media.left_after(materials, (index, front), t * length / frame.per_unit)
         } else {
@@ -290,13 +333,15 @@ impl Hit<'_> {
         let coincides = self.hits.coincident >> lane & 1 == 1;
         let arrival = Arrival {
             direction: self.ray.direction / length,
-            point: self.ray.origin + self.ray.direction * t,
+            point,
+            t,
             primitive,
             ng,
             ns,
+            on_plane: flat && frame.is_planar(primitive),
             front,
             index,
-            material: &materials[index as usize],
+            material,
             coincidence: if coincides { 4.0 * frame.coarsest } else { 0.0 },
             weight: left.map_or(incoming.weight, |left| incoming.weight * left),
             media: incoming.media,

@@ -4,6 +4,7 @@ mod keys;
 mod models;
 mod pictures;
 mod scenes;
+mod skies;
 mod textures;
 
 use glam::{DVec3, Vec2, Vec3};

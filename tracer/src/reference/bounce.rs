@@ -1,0 +1,109 @@
+//! Reflection and transmission: c_r I(R) + c_t I(T) a^d of the model of light. All rays of a sample after one bounce are followed
+//! before those after two.
+
+use glam::DVec3;
+
+use super::Oracle;
+use super::bodies::Bodies;
+use super::camera::{CameraRay, Ray};
+use super::optics;
+use super::surface::SurfacePoint;
+
+/// Most reflected and transmitted rays of a sample.
+const MOST_RAYS: usize = 1024;
+
+/// A ray on its way.
+struct Traveller {
+    ray: Ray,
+    /// The primitive that it starts on.
+    starts_on: Option<usize>,
+    /// Factor of what it sees.
+    weight: DVec3,
+    bodies: Bodies,
+}
+
+impl Oracle {
+    /// Linear RGB of a ray from the camera.
+    pub(super) fn radiance(&self, camera_ray: &CameraRay) -> DVec3 {
+        let ray = camera_ray.ray;
+        if !camera_ray.in_picture {
+            return self.background_of_camera(ray.direction);
+        }
+        let max_depth = self.view.quality.max_depth;
+        let (mut sum, mut count) = (DVec3::ZERO, 0);
+        let mut generation =
+            vec![Traveller { ray, starts_on: None, weight: DVec3::ONE, bodies: Bodies::default() }];
+        for depth in 0..=max_depth {
+            let (mut reflected, mut transmitted) = (Vec::new(), Vec::new());
+            for mut traveller in generation {
+                let Some(surface) = self.surface(traveller.ray, traveller.starts_on) else {
+                    sum += self.from_infinity(&traveller, depth > 0);
+                    continue;
+                };
+                traveller.weight *= self.remaining(&traveller, &surface);
+                sum += traveller.weight * self.local_light(&surface);
+                if depth == max_depth {
+                    continue;
+                }
+                let [first, second] = self.leaving(&traveller, &surface);
+                for (leaving, list) in [(first, &mut reflected), (second, &mut transmitted)] {
+                    if let Some(leaving) = leaving.filter(|_| count < MOST_RAYS) {
+                        count += 1;
+                        list.push(leaving);
+                    }
+                }
+            }
+            reflected.append(&mut transmitted);
+            generation = reflected;
+        }
+        sum
+    }
+
+    /// What a ray sees of the background.
+    fn from_infinity(&self, traveller: &Traveller, bounced: bool) -> DVec3 {
+        let direction = traveller.ray.direction;
+        let seen = if bounced { self.background(direction) } else { self.background_of_camera(direction) };
+        traveller.weight * traveller.bodies.remaining_at_infinity(&self.scene.materials) * seen
+    }
+
+    /// Share of light that the body around a ray leaves on the way to a surface.
+    fn remaining(&self, traveller: &Traveller, surface: &SurfacePoint) -> DVec3 {
+        let ends_at = (surface.material_index, surface.front);
+        traveller.bodies.remaining(&self.scene.materials, ends_at, surface.way)
+    }
+
+    /// The reflected and the transmitted ray that leave a surface, as far as they contribute.
+    fn leaving(&self, traveller: &Traveller, surface: &SurfacePoint) -> [Option<Traveller>; 2] {
+        let material = &self.scene.materials[surface.material_index as usize];
+        let (direction, ns) = (surface.direction, surface.ns);
+        let (mut reflect, mut transmit) = (material.reflect.as_dvec3(), material.transmit.as_dvec3());
+        let sides = traveller.bodies.sides(&self.scene.materials, surface.material_index, surface.front);
+        let (indices, beyond) = if material.thin {
+            ([1.0, 1.0], traveller.bodies.clone())
+        } else {
+            (sides.indices, sides.beyond)
+        };
+        let bent = optics::bent(direction, ns, indices);
+        if material.fresnel {
+            let share = optics::reflected_share(direction, ns, indices);
+            reflect *= share;
+            transmit *= 1.0 - share;
+        } else if bent.is_none() {
+            reflect += transmit;
+        }
+        let least = f64::from(self.view.quality.min_contribution);
+        let leave = |direction: DVec3, share: DVec3, bodies: Bodies| {
+            let weight = traveller.weight * share;
+            let origin = surface.clear_origin();
+            let ray = Ray { origin, direction: direction.normalize(), place: surface.place };
+            let contributes = weight.max_element() >= least && weight.max_element() > 0.0;
+            contributes.then_some(Traveller { ray, starts_on: Some(surface.primitive), weight, bodies })
+        };
+        let mirrored = optics::leaving(optics::mirrored(direction, ns), surface.ng);
+        let through = bent.map(|direction| optics::leaving(direction, -surface.ng));
+        [
+            leave(mirrored, reflect, traveller.bodies.clone()),
+            through.and_then(|direction| leave(direction, transmit, beyond)),
+        ]
+    }
+}
