@@ -19,7 +19,7 @@ mod view;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 use toml::Spanned;
@@ -91,6 +91,8 @@ pub(super) struct SceneText {
 #[derive(Default)]
 struct Reading {
     warnings: Vec<Fault>,
+    /// Messages about keys without an effect, each reported once.
+    idle: BTreeSet<String>,
 }
 
 impl Reading {
@@ -98,10 +100,13 @@ impl Reading {
         self.warnings.push(Fault { at, message });
     }
 
-    /// Warns about a key, if the table has it: "`ior` in [material.a] has no effect" with a reason.
+    /// Warns about a key, if the table has it: "`ior` in [material.a] has no effect" with a reason. Further tables with
+    /// the same message are not reported.
     fn idle(&mut self, table: Table<'_>, key: &'static str, reason: &str) {
-        if let Some(value) = table.get(key) {
-            self.warn(value.start(), format!("{value} has no effect {reason}"));
+        let Some(value) = table.get(key) else { return };
+        let message = format!("{value} has no effect {reason}");
+        if self.idle.insert(message.clone()) {
+            self.warn(value.start(), message);
         }
     }
 }

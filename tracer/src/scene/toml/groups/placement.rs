@@ -105,8 +105,8 @@ fn place_sphere(sphere: &mut Sphere, placement: &Placement, materials: &Material
          write it as a model",
     )?;
     let mirrored = placement.is_mirrored();
-    if mirrored && materials.has_axes(sphere.material) {
-        return Err("its groups mirror this sphere, which has a texture or a pattern: turn it instead".into());
+    if mirrored && materials.needs_uvs(sphere.material) {
+        return Err("its groups mirror this sphere, which has a texture: turn it instead".into());
     }
     sphere.center = placement.point(sphere.center);
     sphere.radius *= scale;

@@ -58,12 +58,6 @@ impl Materials {
             || self.checker(index).is_some_and(|checker| checker.space == CheckerSpace::Uv)
     }
 
-    /// Whether the look of a material depends on the axes of its object.
-    pub(in crate::scene::toml) fn has_axes(&self, index: u32) -> bool {
-        self.has_texture(index)
-            || self.checker(index).is_some_and(|checker| checker.space != CheckerSpace::World)
-    }
-
     /// Whether a material needs whole repeats of texture coordinates.
     pub(in crate::scene::toml) fn distinguishes_repeats(&self, index: u32) -> bool {
         self.textures.get(&index).is_some_and(TexturesText::distinguish_repeats)

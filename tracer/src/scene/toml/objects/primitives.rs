@@ -26,8 +26,8 @@ pub(in crate::scene::toml) fn sphere(
         inside_out: table.read("inside_out", |value| value.boolean())?.unwrap_or(false),
         uv_rotate: table.read("uv_rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
     };
-    if !materials.has_axes(material) {
-        reading.idle(table, "uv_rotate", "without a texture or a pattern");
+    if !materials.needs_uvs(material) {
+        reading.idle(table, "uv_rotate", "without a texture");
     }
     Ok(sphere)
 }

@@ -157,7 +157,7 @@ fn spheres_planes_and_boxes_may_have_textures() {
     assert_eq!(
         warnings(plain),
         [
-            "4:11 `uv_rotate` in [[sphere]] has no effect without a texture or a pattern",
+            "4:11 `uv_rotate` in [[sphere]] has no effect without a texture",
             "8:6 `size` in [[plane]] has no effect without a texture",
         ]
     );

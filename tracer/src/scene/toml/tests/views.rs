@@ -112,3 +112,10 @@ fn faults_of_backgrounds_name_their_place() {
         ["3:10 `rotate` in [background] has no effect on a background without a picture"]
     );
 }
+
+#[test]
+fn a_key_without_effect_is_reported_once_for_all_tables() {
+    let sphere = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nuv_rotate = [0, 90, 0]\n";
+    let expected = "4:13 `uv_rotate` in [[sphere]] has no effect without a texture";
+    assert_eq!(warnings(&sphere.repeat(100)), [expected]);
+}
