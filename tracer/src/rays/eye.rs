@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    BLOCKS, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource, TileRays,
+    BLOCKS, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, Starts, SurfaceSource, TileRays,
     TileSamples,
 };
 use crate::frame::{Affine, Instance, PinholeRays, PreparedFrame};
@@ -128,8 +128,20 @@ impl SurfaceSource for EyeTile<'_> {
 }
 
 impl PictureTile for EyeTile<'_> {
-    const PARALLEL: bool = false;
-    const STARTS: bool = false;
+    #[inline(always)]
+    fn is_parallel(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn depth(&self, _: usize, _: usize, t: f64) -> f64 {
+        t
+    }
+
+    #[inline(always)]
+    fn starts(&self) -> Option<&Starts> {
+        None
+    }
 
     #[inline(always)]
     fn picture(&self) -> &TileRays {

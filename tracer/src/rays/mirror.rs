@@ -6,11 +6,11 @@
 use glam::{DMat3, DVec3};
 
 use super::{
-    BATCH, BLOCKS, EyeTile, PictureTile, PrimitiveId, Projection, ROUNDING, Ray, RaySource, SurfaceSource,
-    TileRays,
+    BATCH, BLOCKS, EyeTile, PictureTile, PrimitiveId, Projection, ROUNDING, Ray, RaySource, Starts,
+    SurfaceSource, TileRays,
 };
 use crate::frame::{Affine, Instance, PreparedFrame};
-use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, f32x16};
+use crate::simd::{LANES, Lanes, Simd};
 
 /// Error bound of the places of mirrored rays, in samples: they are computed from the mirror's points, not from the picture.
 const PLACE_ERROR: f32 = 1.0 / (1 << 18) as f32;
@@ -18,8 +18,6 @@ const PLACE_ERROR: f32 = 1.0 / (1 << 18) as f32;
 /// The rays of a tile that one plane reflects.
 pub(crate) struct MirrorTile<'a> {
     frame: &'a PreparedFrame,
-    /// The primitive that all rays start on.
-    mirror: PrimitiveId,
     rays: TileRays,
     live: [u32; BLOCKS],
     projection: Projection,
@@ -28,9 +26,7 @@ pub(crate) struct MirrorTile<'a> {
     /// See `EyeTile`.
     drift: [f32; 2],
     reflected: &'a [MirroredRay; BATCH],
-    /// Bounds of the closeness of the rays' starts.
-    low: [Lanes; BLOCKS],
-    high: [Lanes; BLOCKS],
+    starts: Starts,
 }
 
 /// A reflected ray, and where it starts.
@@ -70,13 +66,14 @@ impl<'a> MirrorTile<'a> {
         let mut rays = eye.places().clone();
         rays.bound(simd, &live);
         rays.widen(simd, PLACE_ERROR);
-        let (mut low, mut high) = ([Lanes::ZERO; BLOCKS], [Lanes::ZERO; BLOCKS]);
+        let mut starts =
+            Starts { primitive: mirror, low: [Lanes::ZERO; BLOCKS], high: [Lanes::ZERO; BLOCKS] };
         for (index, mirrored) in reflected.iter().enumerate() {
             let closeness = (1.0 / mirrored.start) as f32;
-            low[index / LANES].0[index % LANES] = closeness * (1.0 - ROUNDING);
-            high[index / LANES].0[index % LANES] = closeness * (1.0 + ROUNDING);
+            starts.low[index / LANES].0[index % LANES] = closeness * (1.0 - ROUNDING);
+            starts.high[index / LANES].0[index % LANES] = closeness * (1.0 + ROUNDING);
         }
-        Self { frame, mirror, rays, live, projection, picture, drift, reflected, low, high }
+        Self { frame, rays, live, projection, picture, drift, reflected, starts }
     }
 }
 
@@ -95,15 +92,15 @@ impl RaySource for MirrorTile<'_> {
     }
 
     fn starts_on(&self, _: usize, _: usize) -> Option<PrimitiveId> {
-        Some(self.mirror)
+        Some(self.starts.primitive)
     }
 }
 
 impl PictureTile for MirrorTile<'_> {
-    const PARALLEL: bool = false;
-    const STARTS: bool = true;
+    fn is_parallel(&self) -> bool {
+        false
+    }
 
-    #[inline(always)]
     fn picture(&self) -> &TileRays {
         &self.rays
     }
@@ -124,15 +121,7 @@ impl PictureTile for MirrorTile<'_> {
         start + speed * t
     }
 
-    #[inline(always)]
-    fn is_start(&self, primitive: PrimitiveId) -> bool {
-        self.mirror == primitive
-    }
-
-    #[inline(always)]
-    fn started<S: Simd>(&self, simd: S, block: usize, low: f32x16<S>, high: f32x16<S>) -> [u32; 2] {
-        let [least, most] = [self.low[block].load(simd), self.high[block].load(simd)];
-        // All that is not before the start for certain, even if a number is NaN.
-        [0xffff & !bits(low.simd_gt(most)), bits(high.simd_lt(least))]
+    fn starts(&self) -> Option<&Starts> {
+        Some(&self.starts)
     }
 }

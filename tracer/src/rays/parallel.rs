@@ -1,7 +1,7 @@
 //! Tiles of an orthographic camera: parallel rays that start on the plane through the origin of eye space. Their hits are found
 //! as a tile, and shaded as a batch.
 
-use super::{PictureTile, PrimitiveId, Projection, Ray, RayBatch, RaySource, TileRays, TileSamples};
+use super::{PictureTile, PrimitiveId, Projection, Ray, RayBatch, RaySource, Starts, TileRays, TileSamples};
 use crate::frame::{Instance, ParallelRays, PreparedFrame};
 
 /// The rays of one tile of a frame with an orthographic camera.
@@ -60,8 +60,20 @@ impl RayBatch<'_> {
 }
 
 impl PictureTile for ParallelTile<'_> {
-    const PARALLEL: bool = true;
-    const STARTS: bool = false;
+    #[inline(always)]
+    fn is_parallel(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn depth(&self, _: usize, _: usize, t: f64) -> f64 {
+        t
+    }
+
+    #[inline(always)]
+    fn starts(&self) -> Option<&Starts> {
+        None
+    }
 
     #[inline(always)]
     fn picture(&self) -> &TileRays {

@@ -3,10 +3,10 @@
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.
 
-use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays};
+use super::{BLOCKS, EyeTile, PrimitiveId, Projection, Ray, TileRays};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Simd, f32x16};
+use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, f32x16};
 
 /// Blocks of sixteen rays of one frame.
 pub(crate) trait RaySource {
@@ -75,13 +75,11 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     }
 }
 
-/// Tiles that are a picture of the scene: their closest hits are found together, see `intersect::tile`.
+/// Tiles that are a picture of the scene: their closest hits are found together, see `intersect::tile`. That is compiled for tiles of a
+/// pinhole camera, and once more for all others.
 pub(crate) trait PictureTile: RaySource {
     /// Whether rays are parallel and start at depth 0, and do not start at a point.
-    const PARALLEL: bool;
-
-    /// Whether the rays start at depths of their own, on one primitive.
-    const STARTS: bool;
+    fn is_parallel(&self) -> bool;
 
     /// Places of the rays in the picture.
     fn picture(&self) -> &TileRays;
@@ -93,21 +91,27 @@ pub(crate) trait PictureTile: RaySource {
     fn projection_of(&self, instance: &Instance) -> Projection;
 
     /// Depth of the point at `t` along a ray.
-    #[inline(always)]
-    fn depth(&self, _block: usize, _lane: usize, t: f64) -> f64 {
-        t
-    }
+    fn depth(&self, block: usize, lane: usize, t: f64) -> f64;
 
-    /// Whether the rays start on this primitive.
-    #[inline(always)]
-    fn is_start(&self, _primitive: PrimitiveId) -> bool {
-        false
-    }
+    /// The primitive and the depths that the rays start at, if these are not the same for all.
+    fn starts(&self) -> Option<&Starts>;
+}
 
+/// Where the rays of a tile start: on one primitive, at depths of their own.
+pub(crate) struct Starts {
+    pub primitive: PrimitiveId,
+    /// Bounds of the closeness of the starts.
+    pub low: [Lanes; BLOCKS],
+    pub high: [Lanes; BLOCKS],
+}
+
+impl Starts {
     /// Bits of the rays of a block that start before a closeness with these bounds: those that may, and those that do for certain.
     #[inline(always)]
-    fn started<S: Simd>(&self, _: S, _block: usize, _low: f32x16<S>, _high: f32x16<S>) -> [u32; 2] {
-        [0xffff; 2]
+    pub(crate) fn before<S: Simd>(&self, simd: S, block: usize, low: f32x16<S>, high: f32x16<S>) -> [u32; 2] {
+        let [least, most] = [self.low[block].load(simd), self.high[block].load(simd)];
+        // All that is not before the start for certain, even if a number is NaN.
+        [0xffff & !bits(low.simd_gt(most)), bits(high.simd_lt(least))]
     }
 }
 

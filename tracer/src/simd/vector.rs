@@ -5,9 +5,25 @@ use fearless_simd::{Simd, SimdBase, SimdFloat, f32x16};
 use super::math::to_unit;
 use super::{Lanes, splat, three};
 
+/// Whether fused operations are emulated by hundreds of instructions: on x86 processors without AVX2.
+const fn emulates_fused<S: Simd>() -> bool {
+    cfg!(target_arch = "x86_64") && size_of::<S::f32s>() == 16
+}
+
 /// a b - c d without cancellation (Kahan's algorithm).
 #[inline(always)]
 fn difference<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>, d: f32x16<S>) -> f32x16<S> {
+    // Inlined everywhere, the emulation would be two thirds of the tracer's code.
+    if const { emulates_fused::<S>() } { difference_called(a, b, c, d) } else { difference_here(a, b, c, d) }
+}
+
+#[inline(never)]
+fn difference_called<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>, d: f32x16<S>) -> f32x16<S> {
+    difference_here(a, b, c, d)
+}
+
+#[inline(always)]
+fn difference_here<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>, d: f32x16<S>) -> f32x16<S> {
     let cd = c * d;
     let error = (-c).mul_add_precise(d, cd);
     a.mul_add_precise(b, -cd) + error

@@ -32,10 +32,8 @@ pub(super) fn teapot() -> Shape {
         (1.0, 15.0),
         (0.0, 15.1),
     ];
-    let path = Path::in_xy(
-        &[(5.6, 3.6), (8.6, 4.6), (10.6, 7.2), (11.8, 10.4), (13.2, 12.4), (14.3, 13.1)],
-        4,
-    );
+    let path =
+        Path::in_xy(&[(5.6, 3.6), (8.6, 4.6), (10.6, 7.2), (11.8, 10.4), (13.2, 12.4), (14.3, 13.1)], 4);
     let spout = tube(&path, 24, |t| 2.1 - 1.75 * t + 0.45 * t * t);
     Shape::union([lathe_fine(&spline(&body, 6), 64), spout])
 }
@@ -47,7 +45,8 @@ pub(super) fn teapot_handle() -> Shape {
         5,
     );
     let handle = sweep(&path, 16, |_, corner| disc(corner, 16) * DVec2::new(0.55, 0.8));
-    let knob = [(0.0, 14.9), (0.55, 15.0), (0.5, 15.4), (0.95, 15.9), (1.15, 16.6), (0.75, 17.3), (0.0, 17.5)];
+    let knob =
+        [(0.0, 14.9), (0.55, 15.0), (0.5, 15.4), (0.95, 15.9), (1.15, 16.6), (0.75, 17.3), (0.0, 17.5)];
     Shape::union([handle, lathe_fine(&spline(&knob, 5), 32)])
 }
 

@@ -7,7 +7,8 @@ use crate::cancel::Cancelled;
 use crate::frame::{CameraRays, FisheyeRays, ParallelRays, PreparedFrame};
 use crate::intersect::tile;
 use crate::rays::{
-    BLOCKS, EyeTile, HitBlock, ParallelTile, RayBatch, RayCounts, RaySource, SurfaceSource, TileSamples,
+    BLOCKS, EyeTile, HitBlock, ParallelTile, PictureTile, RayBatch, RayCounts, RaySource, SurfaceSource,
+    TileSamples,
 };
 use crate::simd::Simd;
 use crate::surface::Surfaces;
@@ -94,7 +95,7 @@ impl<'a, W: Watch> TileContext<'a, W> {
         self.begin_tile(&tile)?;
         simd.vectorize(
             #[inline(always)]
-            || tile::find_closest(simd, &tile, &mut self.hits, &mut self.tile),
+            || tile::find_closest::<S, dyn PictureTile>(simd, &tile, &mut self.hits, &mut self.tile),
         );
         let mut batch = self.batch.take().unwrap_or_else(|| Box::new(RayBatch::new(self.frame)));
         batch.put_parallel(camera, &samples);

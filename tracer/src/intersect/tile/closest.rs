@@ -26,8 +26,9 @@ pub(super) struct Closeness {
 }
 
 /// Closeness of what is infinitely far away.
-const fn nowhere<T: PictureTile>() -> f32 {
-    if T::PARALLEL { f32::NEG_INFINITY } else { 0.0 }
+#[inline(always)]
+fn nowhere<T: PictureTile + ?Sized>(tile: &T) -> f32 {
+    if tile.is_parallel() { f32::NEG_INFINITY } else { 0.0 }
 }
 
 impl Closeness {
@@ -40,14 +41,14 @@ impl Closeness {
 
     /// Resets all rays to no hit.
     #[inline(always)]
-    fn clear<S: Simd, T: PictureTile>(&mut self, simd: S, tile: &T) {
+    fn clear<S: Simd, T: PictureTile + ?Sized>(&mut self, simd: S, tile: &T) {
         let infinite = splat(simd, f32::INFINITY);
         self.least_of_all = f32::INFINITY;
         for block in 0..BLOCKS {
-            let start = select(mask_of(simd, tile.live(block)), splat(simd, nowhere::<T>()), infinite);
+            let start = select(mask_of(simd, tile.live(block)), splat(simd, nowhere(tile)), infinite);
             self.low[block].store(start);
             self.high[block].store(start);
-            self.least.0[block] = if tile.live(block) == 0 { f32::INFINITY } else { nowhere::<T>() };
+            self.least.0[block] = if tile.live(block) == 0 { f32::INFINITY } else { nowhere(tile) };
             self.least_of_all = self.least_of_all.min(self.least.0[block]);
         }
     }
@@ -64,8 +65,8 @@ impl Closeness {
     }
 
     /// Records an exact hit at a depth. Hits that coincide with it are not behind `farthest`.
-    fn record<T: PictureTile>(&mut self, block: usize, lane: usize, depth: f64, farthest: f64) {
-        let (low, high) = if T::PARALLEL {
+    fn record(&mut self, is_parallel: bool, (block, lane): (usize, usize), depth: f64, farthest: f64) {
+        let (low, high) = if is_parallel {
             (-(farthest as f32) * (1.0 + ROUNDING), -(depth as f32) * (1.0 - ROUNDING))
         } else {
             let closeness = |depth: f64| (1.0 / depth) as f32;
@@ -78,7 +79,7 @@ impl Closeness {
 
 /// Finds the closest hit of each live ray of a tile.
 #[inline(always)]
-pub(crate) fn find_closest<S: Simd, T: PictureTile>(
+pub(crate) fn find_closest<S: Simd, T: PictureTile + ?Sized>(
     simd: S,
     tile: &T,
     hits: &mut [HitBlock; BLOCKS],
@@ -125,7 +126,7 @@ pub(crate) fn find_closest<S: Simd, T: PictureTile>(
 /// Rays whose nearest hit may coincide with others hit one of the same surface everywhere: see `intersect::coincide`.
 #[cold]
 #[inline(never)]
-fn resolve_coincident<T: PictureTile>(tile: &T, hits: &mut [HitBlock; BLOCKS]) {
+fn resolve_coincident<T: PictureTile + ?Sized>(tile: &T, hits: &mut [HitBlock; BLOCKS]) {
     for (block, hits) in hits.iter_mut().enumerate() {
         for lane in each_bit(hits.coincident) {
             let nearest = hits.slot(lane);
@@ -140,7 +141,7 @@ fn resolve_coincident<T: PictureTile>(tile: &T, hits: &mut [HitBlock; BLOCKS]) {
 
 /// Query for the closest triangle. While a tile is searched, [`HitBlock::coincident`] has the rays whose hit may coincide
 /// with others.
-struct ClosestQuery<'a, 'b, T> {
+struct ClosestQuery<'a, 'b, T: ?Sized> {
     tile: &'a T,
     /// The item whose triangles are tested.
     item: u32,
@@ -159,7 +160,7 @@ struct Nearest<S: Simd> {
     changed: u32,
 }
 
-impl<T: PictureTile> ClosestQuery<'_, '_, T> {
+impl<T: PictureTile + ?Sized> ClosestQuery<'_, '_, T> {
     /// Tests an item without lines in the picture, exactly, ray by ray.
     #[inline(always)]
     fn test_every_ray<S: Simd>(&mut self, simd: S) {
@@ -188,7 +189,8 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
         if best.is_none_or(|best| hit.wins_over(&best, frame)) {
             hits.set(lane, primitive);
             let depth = |t: f64| self.tile.depth(block, lane, t);
-            self.closeness.record::<T>(block, lane, depth(hit.t), depth(hit.t + slack));
+            let is_parallel = self.tile.is_parallel();
+            self.closeness.record(is_parallel, (block, lane), depth(hit.t), depth(hit.t + slack));
         }
     }
 
@@ -232,15 +234,15 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
             let maybe = maybe & !bits(z_high.simd_lt(nearest.low));
             let mut certain = maybe & certain & bits(z_low.simd_gt(nearest.high));
             let mut maybe = maybe;
-            if T::STARTS {
-                if self.tile.is_start(PrimitiveId { item: self.item, triangle: first + lane as u32 }) {
+            if let Some(starts) = self.tile.starts() {
+                if starts.primitive == (PrimitiveId { item: self.item, triangle: first + lane as u32 }) {
                     continue;
                 }
-                let [may_have, has] = self.tile.started(simd, block, z_low, z_high);
+                let [may_have, has] = starts.before(simd, block, z_low, z_high);
                 maybe &= may_have;
                 certain &= has;
             }
-            if T::PARALLEL {
+            if self.tile.is_parallel() {
                 // Only the exact test distinguishes a triangle on the plane of the origins from one behind it.
                 certain &= bits(z_high.simd_lt(splat(simd, 0.0)));
                 maybe &= !bits(z_low.simd_gt(splat(simd, 0.0)));
@@ -297,9 +299,13 @@ impl<T: PictureTile> ClosestQuery<'_, '_, T> {
     }
 }
 
-impl<S: Simd, T: PictureTile> NodeFilter<S> for ClosestQuery<'_, '_, T> {
+impl<S: Simd, T: PictureTile + ?Sized> NodeFilter<S> for ClosestQuery<'_, '_, T> {
     const ON_GRID: bool = true;
-    const FROM_PLANE: bool = T::PARALLEL;
+
+    #[inline(always)]
+    fn is_from_plane(&self) -> bool {
+        self.tile.is_parallel()
+    }
 
     fn least(&self) -> &Lanes {
         &self.closeness.least
@@ -315,7 +321,7 @@ impl<S: Simd, T: PictureTile> NodeFilter<S> for ClosestQuery<'_, '_, T> {
     }
 }
 
-impl<S: Simd, T: PictureTile> TileQuery<S> for ClosestQuery<'_, '_, T> {
+impl<S: Simd, T: PictureTile + ?Sized> TileQuery<S> for ClosestQuery<'_, '_, T> {
     /// Block by block, so that the hits of a block stay in registers.
     #[inline(always)]
     fn cover(&mut self, simd: S, projected: &ProjectedTriangles, first: u32, blocks: u32) {

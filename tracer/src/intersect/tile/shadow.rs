@@ -17,9 +17,18 @@ use crate::rays::{BLOCKS, ShadowTile};
 use crate::simd::Simd;
 
 impl ShadowTile<'_> {
-    /// Bits of the live points that are occluded.
-    #[inline(always)]
+    /// Bits of the live points that are occluded. A function of its own on each level: all kinds of shadows call the same one,
+    /// because it takes long to compile.
+    #[inline(never)]
     pub(crate) fn occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [u32; BLOCKS] {
+        simd.vectorize(
+            #[inline(always)]
+            || self.occluded_here(simd, scratch),
+        )
+    }
+
+    #[inline(always)]
+    fn occluded_here<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [u32; BLOCKS] {
         let Scratch { scene_frontier, mesh_frontier, projected, shadow_rays: rays, points, .. } = scratch;
         points.open = self.live;
         points.occluded = [0; BLOCKS];

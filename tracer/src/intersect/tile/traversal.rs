@@ -16,7 +16,10 @@ pub(super) trait NodeFilter<S: Simd> {
     const ON_GRID: bool;
 
     /// Whether rays are parallel and start at depth 0, so that boxes behind it can be dropped.
-    const FROM_PLANE: bool = false;
+    #[inline(always)]
+    fn is_from_plane(&self) -> bool {
+        false
+    }
 
     /// Least closeness that matters to each block of rays; infinity if none does.
     fn least(&self) -> &Lanes;
@@ -124,7 +127,7 @@ impl<'a> NodeTester<'a> {
             wanted &= !crossing | in_frustum(simd, node, &Frustum::new(projection, rays.union));
         }
         wanted &= crossing | boxes.overlapping::<S, F>(simd, rays.union);
-        if F::FROM_PLANE {
+        if filter.is_from_plane() {
             wanted &= in_front(simd, node, &self.rows[2], projection.error[1]);
         }
         let least = filter.least();

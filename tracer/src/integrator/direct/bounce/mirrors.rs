@@ -5,7 +5,9 @@
 use super::place_of;
 use super::secondary::Secondary;
 use crate::intersect::tile::{Scratch, find_closest};
-use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, MirrorTile, MirroredRay, PrimitiveId, RaySource};
+use crate::rays::{
+    BATCH, BLOCKS, EyeTile, HitBlock, MirrorTile, MirroredRay, PictureTile, PrimitiveId, RaySource,
+};
 use crate::simd::{Simd, each_bit};
 
 /// Least rays of one primitive that are traced as a tile: fewer are faster one by one.
@@ -96,7 +98,7 @@ impl Mirrors {
         let found = &mut self.found;
         simd.vectorize(
             #[inline(always)]
-            || find_closest(simd, &mirrored, found, scratch),
+            || find_closest::<S, dyn PictureTile>(simd, &mirrored, found, scratch),
         );
         for block in 0..BLOCKS {
             for lane in each_bit(live[block]) {

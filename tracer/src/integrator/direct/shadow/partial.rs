@@ -150,7 +150,7 @@ impl Points<'_> {
             hits: self.hits,
             live: *lanes,
         };
-        let occluded = occluded_in(simd, &shadow, self.scratch);
+        let occluded = shadow.occluded(simd, self.scratch);
         self.traced += count(&occluded);
         self.arrive(simd, &std::array::from_fn(|block| lanes[block] & !occluded[block]), 1.0);
         if self.frame.features.transparent || self.frame.features.shadowless {
@@ -189,15 +189,6 @@ impl Points<'_> {
 /// Number of lanes.
 fn count(lanes: &[u32; BLOCKS]) -> u64 {
     lanes.iter().map(|lanes| u64::from(lanes.count_ones())).sum()
-}
-
-/// [`ShadowTile::occluded`] as a function of its own on each level.
-#[inline(never)]
-fn occluded_in<S: Simd>(simd: S, shadow: &ShadowTile<'_>, scratch: &mut tile::Scratch) -> [u32; BLOCKS] {
-    simd.vectorize(
-        #[inline(always)]
-        || shadow.occluded(simd, scratch),
-    )
 }
 
 /// The lanes of each set of a light.

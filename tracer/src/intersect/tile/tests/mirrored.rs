@@ -30,7 +30,7 @@ fn find_mirrored<S: Simd>(
     let eye = EyeTile::new(frame, camera, TileSamples { rays, live, center, grid: frame.rays.grid() });
     let plane = frame.planes.last().unwrap();
     let tile = MirrorTile::new(simd, &eye, mirror, (plane.normal, plane.offset), live, reflected);
-    find_closest(simd, &tile, hits, &mut Scratch::new());
+    find_closest::<S, dyn PictureTile>(simd, &tile, hits, &mut Scratch::new());
 }
 
 /// Checks the hits of the mirrored rays of a tile; returns how many of them hit something.

@@ -14,8 +14,8 @@ use crate::frame::{CameraRays, PreparedFrame};
 use crate::light::SHADOW_T_MAX;
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::rays::{
-    BLOCKS, EyeTile, HitBlock, ParallelTile, PrimitiveId, Ray, SIDE, ShadowTarget, ShadowTile, TileRays,
-    TileSamples, place,
+    BLOCKS, EyeTile, HitBlock, ParallelTile, PictureTile, PrimitiveId, Ray, SIDE, ShadowTarget, ShadowTile,
+    TileRays, TileSamples, place,
 };
 use crate::scene::{
     Background, Camera, CameraKind, FrameView, Material, Model, NormalMode, Plane, Quality, RenderSettings,
@@ -270,7 +270,8 @@ fn find_in_tile<S: Simd>(
             find_closest(simd, &EyeTile::new(frame, camera, samples), hits, scratch);
         }
         CameraRays::Parallel(camera) => {
-            find_closest(simd, &ParallelTile::new(frame, camera, samples), hits, scratch);
+            let tile = ParallelTile::new(frame, camera, samples);
+            find_closest::<S, dyn PictureTile>(simd, &tile, hits, scratch);
         }
         CameraRays::Fisheye(_) => panic!("fisheye cameras have no tiles"),
     }
