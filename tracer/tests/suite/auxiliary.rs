@@ -1,17 +1,19 @@
-//! Pictures without light: the shading normals of meshes, and diffuse colours with textures.
+//! Pictures without light: all kinds against the oracle, the shading normals of meshes, and diffuse colours with textures.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use rayfarm_tracer::Basis;
+use rayfarm_tracer::image::compare;
 use rayfarm_tracer::mesh::CompiledMesh;
+use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{
     Attenuation, FrameView, LoadedScene, Material, Model, NormalMode, Quality, Scene, Shading, load,
 };
 use rayfarm_tracer::srgb::decode;
 
-use crate::common::{ball, empty, light, point, render, render_textured};
+use crate::common::{analytic, ball, empty, instanced, light, point, render, render_textured};
 
 const SIDE: u32 = 64;
 
@@ -93,4 +95,20 @@ fn diffuse_colours_are_those_of_white_ambient_light() {
     assert!(albedo == picture(Shading::Full), "the same bytes");
     let colors: std::collections::BTreeSet<&[u8]> = albedo.pixels.chunks_exact(3).collect();
     assert!(colors.len() > 100, "textures have more than {} colours", colors.len());
+}
+
+/// All pixels within a step, on spheres, planes, triangles and instances of meshes with flat and smooth normals.
+#[test]
+fn pictures_without_light_are_those_of_the_oracle() {
+    let (instances, mesh) = instanced(96, 72);
+    let mesh = std::slice::from_ref(&mesh);
+    for (scene, meshes) in [(analytic(96, 72), &[][..]), (instances, mesh)] {
+        for shading in [Shading::Normals, Shading::Depth, Shading::Item, Shading::Albedo] {
+            let view = shown(&scene, shading);
+            let (picture, _) = render(&scene, meshes, &view);
+            let expected = Oracle::new(&scene, meshes, &[], &view).render();
+            let difference = compare(&picture, &expected).unwrap();
+            assert!(difference.max <= 1, "{shading:?}: {difference:?}");
+        }
+    }
 }
