@@ -10,8 +10,8 @@
 //! samples a pixel each pixel has all of them. With [`MANY`] points or more the steps are invisible, and one set is all.
 //!
 //! For 16 points, pictures of the shadows of an edge and of a ball show: with one set five to eight bands; with two sets in a
-//! checkerboard the same bands, paler; with four sets a fine pattern and no bands; with sixteen sets in 4 x 4 samples a coarser
-//! pattern, which is more visible, for four times as many queries of a sixteenth of the rays each.
+//! checkerboard more and paler bands; with four sets a fine pattern, traces of bands at the edge and none around the ball; with
+//! sixteen sets in 4 x 4 samples a coarser pattern, which is more visible, for four times as many queries of a quarter of the rays.
 //!
 //! ```text
 //!   relax   the points of the sets
