@@ -79,7 +79,7 @@ pub(super) fn camera(table: Table<'_>, reading: &mut Reading) -> Read<CameraText
     let (kind, fov) = projection(table, word)?;
     let zoom = table.read("zoom", |value| value.positive())?.unwrap_or(1.0);
     let (name, idle) = word.idle_keys();
-    idle.iter().for_each(|key| reading.idle(table, *key, &format!("on {name}")));
+    idle.iter().for_each(|key| reading.idle(table, key, &format!("on {name}")));
     Ok(CameraText { kind, position, aim: looks, up, fov, zoom })
 }
 

@@ -136,7 +136,7 @@ fn warn_about_unused_keys(
             "beam_angle" | "penumbra" => value.number("of degrees", |_| true).map(drop)?,
             _ => value.vector().map(drop)?,
         }
-        reading.idle(table, *key, &format!("on a {name} light"));
+        reading.idle(table, key, &format!("on a {name} light"));
     }
     if kind == Kind::Directional && attenuation != Attenuation::None {
         reading.idle(table, "attenuation", &format!("on a {name} light"));
