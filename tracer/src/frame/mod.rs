@@ -67,6 +67,8 @@ pub struct PreparedFrame {
     /// The scene's tree, with the boxes of this frame.
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) features: SceneFeatures,
+    /// Whether light may pass each item and plane; empty in scenes where none lets it pass.
+    veils: Vec<bool>,
     /// The level of SIMD that renders the frame.
     pub(crate) level: Level,
 }
@@ -139,6 +141,7 @@ impl PreparedFrame {
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
+            veils: Vec::new(),
             features: scene.features().at(&view.quality),
             level: simd::best(),
             scene,
@@ -146,6 +149,7 @@ impl PreparedFrame {
         go_on(cancelled)?;
         frame.make_pyramids();
         go_on(cancelled)?;
+        frame.veils = frame.find_veils();
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
@@ -196,6 +200,35 @@ impl PreparedFrame {
     /// The items in a leaf of the scene's tree.
     pub(crate) fn items_of(&self, block: u32) -> &[u32] {
         &self.scene.tree().blocks[block as usize]
+    }
+
+    /// Whether light may pass an item or plane: one of its materials is transparent, or casts no shadow.
+    #[inline(always)]
+    pub(crate) fn is_veil(&self, item: u32) -> bool {
+        self.veils.get(item as usize).is_some_and(|&veil| veil)
+    }
+
+    /// Whether light may pass anything.
+    pub(crate) fn has_veils(&self) -> bool {
+        !self.veils.is_empty()
+    }
+
+    fn find_veils(&self) -> Vec<bool> {
+        let scene = self.scene();
+        let lets_pass = |index: &u32| {
+            let material = &scene.materials[*index as usize];
+            material.is_transparent() || !material.casts_shadow
+        };
+        if !(self.features.transparent || self.features.shadowless) {
+            return Vec::new();
+        }
+        let of_items = self.items.range().map(|index| match self.items.get(index) {
+            Item::Model(i) => scene.models[i].materials.iter().any(lets_pass),
+            Item::Sphere(i) => lets_pass(&scene.spheres[i].material),
+            Item::Triangle(i) => lets_pass(&scene.triangles[i].material),
+            Item::Disk(i) => lets_pass(&scene.disks[i].material),
+        });
+        of_items.chain(scene.planes.iter().map(|plane| lets_pass(&plane.material))).collect()
     }
 
     /// Bounds of an item in eye space, padded.

@@ -38,6 +38,7 @@ use closest::Closeness;
 pub(crate) use closest::find_closest;
 use points::Points;
 use projected_triangles::ProjectedTriangles;
+pub(crate) use shadow::Occlusion;
 pub(crate) use shaft::Shaft;
 use traversal::{Frontier, TraversalStack};
 

@@ -29,12 +29,14 @@ pub(super) struct OcclusionQuery<'a> {
     item: u32,
     /// Bits of its triangles that alpha cuts out.
     cutouts: &'a [u16],
+    /// Whether light may pass it.
+    is_veil: bool,
 }
 
 impl<'a> OcclusionQuery<'a> {
     /// A query without an item.
     pub(super) fn new(tile: &'a ShadowTile<'a>, rays: &'a TileRays, points: &'a mut Points) -> Self {
-        Self { tile, rays, points, item: NO_ITEM, cutouts: &[] }
+        Self { tile, rays, points, item: NO_ITEM, cutouts: &[], is_veil: false }
     }
 
     /// Selects the item that is tested next.
@@ -42,6 +44,7 @@ impl<'a> OcclusionQuery<'a> {
     pub(super) fn turn_to(&mut self, item: u32) {
         self.item = item;
         self.cutouts = self.tile.frame.cutouts_of(item);
+        self.is_veil = self.tile.frame.is_veil(item);
     }
 
     /// Tests the selected item against all open points.
@@ -84,7 +87,12 @@ impl<'a> OcclusionQuery<'a> {
             for lane in each_bit(self.points.open[block]) {
                 let (ray, starts_on) = (self.tile.ray(block, lane), self.tile.starts_on(block, lane));
                 if self.tile.frame.occluded(&ray, self.tile.t_max, starts_on) {
-                    self.points.occluded[block] |= 1 << lane;
+                    let found = if self.tile.frame.has_veils() {
+                        &mut self.points.veiled
+                    } else {
+                        &mut self.points.occluded
+                    };
+                    found[block] |= 1 << lane;
                 }
             }
         }
@@ -97,7 +105,17 @@ impl<'a> OcclusionQuery<'a> {
         let primitive = PrimitiveId { item: self.item, triangle };
         let t = self.tile.frame.t_of(&ray, primitive, starts_on);
         if t.is_some_and(|t| t < self.tile.t_max) {
-            self.points.mark_occluded(block, 1 << lane);
+            self.mark(block, 1 << lane);
+        }
+    }
+
+    /// Marks points that the selected item occludes. Behind an item that light may pass they stay open: another one may be opaque.
+    #[inline(always)]
+    fn mark(&mut self, block: usize, lanes: u32) {
+        if self.is_veil {
+            self.points.veiled[block] |= lanes;
+        } else {
+            self.points.mark_occluded(block, lanes);
         }
     }
 
@@ -125,7 +143,7 @@ impl<'a> OcclusionQuery<'a> {
             if maybe == 0 {
                 continue;
             }
-            self.points.mark_occluded(block, maybe & certain);
+            self.mark(block, maybe & certain);
             for ray in each_bit(maybe & !certain) {
                 self.test_exactly(block, ray, triangle);
             }
@@ -185,7 +203,7 @@ impl<'a> OcclusionQuery<'a> {
             maybe &= !1_u32.checked_shl(own).unwrap_or(0);
         }
         if maybe & certain != 0 {
-            return self.points.mark_occluded(block, 1 << lane);
+            return self.mark(block, 1 << lane);
         }
         for triangle in each_bit(maybe) {
             self.test_exactly(block, lane, first + triangle as u32);

@@ -16,11 +16,20 @@ use super::{Picture, Scratch};
 use crate::rays::{BLOCKS, ShadowTile};
 use crate::simd::Simd;
 
+/// What is between the points of a tile and a light.
+#[derive(Clone, Copy)]
+pub(crate) struct Occlusion {
+    /// Bits of the points that are occluded.
+    pub occluded: [u32; BLOCKS],
+    /// Bits of the points with a surface in their way that light may pass, and no other.
+    pub veiled: [u32; BLOCKS],
+}
+
 impl ShadowTile<'_> {
-    /// Bits of the live points that are occluded. A function of its own on each level: all kinds of shadows call the same one,
+    /// Bits of the live points that are occluded, and of others with a surface in their way that light may pass. A function of its own on each level: all kinds of shadows call the same one,
     /// because it takes long to compile.
     #[inline(never)]
-    pub(crate) fn occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [u32; BLOCKS] {
+    pub(crate) fn occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Occlusion {
         simd.vectorize(
             #[inline(always)]
             || self.occluded_here(simd, scratch),
@@ -28,14 +37,15 @@ impl ShadowTile<'_> {
     }
 
     #[inline(always)]
-    fn occluded_here<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> [u32; BLOCKS] {
+    fn occluded_here<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Occlusion {
         let Scratch { scene_frontier, mesh_frontier, projected, shadow_rays: rays, points, .. } = scratch;
         points.open = self.live;
         points.occluded = [0; BLOCKS];
+        points.veiled = [0; BLOCKS];
         let extent = Extent::of(simd, self.points, self.grid, &self.live);
         let Some(projection) = extent.projection(self.light) else {
             OcclusionQuery::new(self, rays, points).test_scene();
-            return points.occluded;
+            return Occlusion { occluded: points.occluded, veiled: points.veiled };
         };
         points.project(simd, self.points, &extent, &projection, rays);
         let picture = Picture { projection: &projection, rays };
@@ -54,6 +64,7 @@ impl ShadowTile<'_> {
             query.turn_to(self.frame.items.first_plane() + plane);
             query.test_item();
         }
-        points.occluded
+        let veiled = std::array::from_fn(|block| points.veiled[block] & !points.occluded[block]);
+        Occlusion { occluded: points.occluded, veiled }
     }
 }

@@ -34,7 +34,9 @@ pub(super) fn occluded<S: Simd, R: SurfaceSource>(
 ) -> [u32; BLOCKS] {
     let (light, t_max) = target_of(light);
     if !R::COMMON_ORIGIN && !rays.are_neighbours() {
-        return occluded_one_by_one(rays, hits, (light, t_max), points, lit);
+        let frame = rays.frame();
+        let tile = ShadowTile { frame, light, t_max, grid: rays.places(), points, hits, live: lit };
+        return occluded_one_by_one(&tile);
     }
     let groups = by_item(simd, hits, lit);
     let mut occluded = [0; BLOCKS];
@@ -50,7 +52,8 @@ pub(super) fn occluded<S: Simd, R: SurfaceSource>(
     for live in groups {
         if live != [0; BLOCKS] {
             shadow.live = live;
-            let found = shadow.occluded(simd, scratch);
+            // Without surfaces that light may pass: see `is_partial`.
+            let found = shadow.occluded(simd, scratch).occluded;
             for block in 0..BLOCKS {
                 occluded[block] |= found[block];
             }
@@ -59,17 +62,10 @@ pub(super) fn occluded<S: Simd, R: SurfaceSource>(
     occluded
 }
 
-/// The same, ray by ray: faster for points that are far apart.
+/// Bits of the live points of a tile with anything before the light, ray by ray: faster for points that are far apart.
 #[inline(never)]
-fn occluded_one_by_one<R: SurfaceSource>(
-    rays: &R,
-    hits: &[HitBlock; BLOCKS],
-    (light, t_max): (ShadowTarget, f64),
-    points: &[[Lanes; 3]; BLOCKS],
-    lit: [u32; BLOCKS],
-) -> [u32; BLOCKS] {
-    let frame = rays.frame();
-    let tile = ShadowTile { frame, light, t_max, grid: rays.places(), points, hits, live: lit };
+fn occluded_one_by_one(tile: &ShadowTile<'_>) -> [u32; BLOCKS] {
+    let (frame, t_max, lit) = (tile.frame, tile.t_max, tile.live);
     let mut block_rays = RayBlock::new(frame);
     std::array::from_fn(|block| {
         if lit[block] == 0 {

@@ -9,15 +9,15 @@
 //! the light's centre, because x would be occluded by its own surface. N.L, H, A_j and B_j are those of the centre. Where x is
 //! inside of the ball, or surfaces are, those of the points count that nothing occludes.
 //!
-//! c_t is 1 for a surface that casts no shadow, `transmit` for a transparent one and 0 for all others. First all surfaces count as
-//! opaque, in tiles; only the rays that are occluded then are followed one by one.
+//! c_t is 1 for a surface that casts no shadow, `transmit` for a transparent one and 0 for all others. Tiles tell the points that
+//! opaque items occlude from those with other items in their way; only rays of the latter are followed one by one.
 
 use super::super::super::stage::{Stage, Watch};
 use super::super::{TileContext, blend};
-use super::{by_item, target_of};
+use super::{by_item, occluded_one_by_one, target_of};
 use crate::frame::PreparedFrame;
 use crate::intersect::Crossings;
-use crate::intersect::tile::{self, Shaft};
+use crate::intersect::tile::{self, Occlusion, Shaft};
 use crate::light::extent::Extent;
 use crate::light::{EyeLight, SHADOW_T_MAX};
 use crate::rays::{
@@ -48,6 +48,7 @@ pub(in super::super) fn add<S: Simd, R: SurfaceSource, W: Watch>(
         free: [Lanes::ZERO; BLOCKS],
         passed: [[Lanes::ZERO; 3]; BLOCKS],
         traced: 0,
+        neighbours: rays.are_neighbours(),
         crossings: Crossings::default(),
         scratch: &mut context.tile,
     };
@@ -94,6 +95,8 @@ struct Points<'a> {
     passed: TileColors,
     /// Rays so far, with those that are known to be free without a search of their own.
     traced: u64,
+    /// Whether the points are near each other: see [`SurfaceSource::are_neighbours`].
+    neighbours: bool,
     crossings: Crossings,
     scratch: &'a mut tile::Scratch,
 }
@@ -150,12 +153,17 @@ impl Points<'_> {
             hits: self.hits,
             live: *lanes,
         };
-        let occluded = shadow.occluded(simd, self.scratch);
-        self.traced += count(&occluded);
-        self.arrive(simd, &std::array::from_fn(|block| lanes[block] & !occluded[block]), 1.0);
-        if self.frame.features.transparent || self.frame.features.shadowless {
-            self.follow(&shadow, &occluded);
-        }
+        let Occlusion { occluded, veiled } = if self.neighbours {
+            shadow.occluded(simd, self.scratch)
+        } else if self.frame.has_veils() {
+            Occlusion { occluded: [0; BLOCKS], veiled: occluded_one_by_one(&shadow) }
+        } else {
+            Occlusion { occluded: occluded_one_by_one(&shadow), veiled: [0; BLOCKS] }
+        };
+        self.traced += count(&occluded) + count(&veiled);
+        let free = std::array::from_fn(|block| lanes[block] & !(occluded[block] | veiled[block]));
+        self.arrive(simd, &free, 1.0);
+        self.follow(&shadow, &veiled);
     }
 
     /// Adds a number of rays that nothing occludes in each of the lanes.
@@ -173,9 +181,9 @@ impl Points<'_> {
         );
     }
 
-    /// Adds the light that passes the surfaces in the way of the occluded lanes.
-    fn follow(&mut self, shadow: &ShadowTile<'_>, occluded: &[u32; BLOCKS]) {
-        for (block, &lanes) in occluded.iter().enumerate() {
+    /// Adds the light that passes the surfaces in the way of the veiled lanes.
+    fn follow(&mut self, shadow: &ShadowTile<'_>, veiled: &[u32; BLOCKS]) {
+        for (block, &lanes) in veiled.iter().enumerate() {
             for lane in each_bit(lanes) {
                 let (ray, starts_on) = (shadow.ray(block, lane), shadow.starts_on(block, lane));
                 let share = self.frame.transmittance(&ray, shadow.t_max, starts_on, &mut self.crossings);

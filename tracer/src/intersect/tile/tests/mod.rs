@@ -385,7 +385,8 @@ fn occluded<S: Simd>(
 ) -> [u32; BLOCKS] {
     let grid = &TileRays::grid(simd);
     let t_max = if matches!(light, ShadowTarget::Parallel(_)) { f64::INFINITY } else { SHADOW_T_MAX };
-    ShadowTile { frame, light, t_max, grid, points, hits, live }.occluded(simd, &mut Scratch::new())
+    let tile = ShadowTile { frame, light, t_max, grid, points, hits, live };
+    tile.occluded(simd, &mut Scratch::new()).occluded
 }
 
 /// Checks, on each level, the occluded points among triangles that are hard to test against the rays to a light.
