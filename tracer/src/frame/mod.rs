@@ -189,11 +189,17 @@ impl PreparedFrame {
         self.view.quality.filter.unwrap_or(map.filter)
     }
 
-    /// Makes the smaller pictures of the textures that need them; those of earlier frames are kept.
+    /// Makes the smaller pictures of the textures of surfaces that need them; those of earlier frames are kept.
     fn make_pyramids(&self) {
-        let needed = |(_, map): &&(Arc<Texture>, TextureMap)| self.filter_of(map) == Filter::Trilinear;
-        if self.features.textured {
-            self.textures().iter().filter(needed).for_each(|(texture, _)| _ = texture.pyramid());
+        if !self.features.textured {
+            return;
+        }
+        let of_materials = self.scene().materials.iter().flat_map(|m| [m.texture, m.emission_texture]);
+        for index in of_materials.flatten() {
+            let (texture, map) = &self.textures()[index as usize];
+            if self.filter_of(map) == Filter::Trilinear {
+                texture.pyramid();
+            }
         }
     }
 
