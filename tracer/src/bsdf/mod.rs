@@ -11,4 +11,4 @@ mod blinn_phong;
 mod specular;
 
 pub(crate) use blinn_phong::eval;
-pub(crate) use specular::{fresnel, on_side_of, reflected, refracted};
+pub(crate) use specular::{fresnel, fresnel_of_sheet, on_side_of, reflected, refracted};

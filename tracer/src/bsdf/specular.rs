@@ -17,18 +17,24 @@ pub(crate) fn refracted(direction: DVec3, normal: DVec3, eta: f64) -> Option<DVe
     (square >= 0.0).then(|| direction * eta + normal * (eta * c - square.sqrt()))
 }
 
-/// Share of unpolarised light that a dielectric reflects, from 0 to 1; 1 for total internal reflection.
+/// Share of unpolarised light that a dielectric reflects, from 0 to 1; 1 for total internal reflection, and for rays along the
+/// surface or from behind N.
 pub(crate) fn fresnel(c: f64, eta: f64) -> f64 {
     let square = transmitted_square(c, eta);
-    if !(square >= 0.0) {
+    if !(square >= 0.0 && c > 0.0) {
         return 1.0;
     }
     let transmitted = square.sqrt();
     let parallel = (c - eta * transmitted) / (c + eta * transmitted);
     let across = (eta * c - transmitted) / (eta * c + transmitted);
-    let share = 0.5 * (parallel * parallel + across * across);
-    // 0 / 0 where light grazes a surface without a change of the index.
-    if share.is_nan() { 1.0 } else { share }
+    0.5 * (parallel * parallel + across * across)
+}
+
+/// Share that a sheet of a dielectric reflects, which has two surfaces of a share F each: F + (1 - F)^2 F (1 + F^2 + F^4 + ...) =
+/// 2 F / (1 + F). `ior` is its index of refraction.
+pub(crate) fn fresnel_of_sheet(c: f64, ior: f64) -> f64 {
+    let share = fresnel(c, 1.0 / ior);
+    2.0 * share / (1.0 + share)
 }
 
 /// Square of the cosine on the far side.
@@ -78,6 +84,9 @@ mod tests {
         assert!((fresnel(1.0, 1.0 / 1.5) - 0.04).abs() < 1e-15 && (fresnel(1.0, 1.5) - 0.04).abs() < 1e-15);
         assert_eq!(fresnel(0.5, 1.0), 0.0);
         assert!((fresnel(1e-9, 1.0 / 1.5) - 1.0).abs() < 1e-7, "grazing light is reflected");
+        assert_eq!(fresnel(-0.1, 1.0 / 1.5), 1.0);
+        // Two surfaces of 4 % each.
+        assert!((fresnel_of_sheet(1.0, 1.5) - 0.08 / 1.04).abs() < 1e-15);
         // At Brewster's angle only light across the plane of incidence is reflected: half of ((n^2 - 1) / (n^2 + 1))^2.
         let brewster = libm::cos(libm::atan(1.5));
         let across = (1.5 * 1.5 - 1.0) / (1.5 * 1.5 + 1.0);

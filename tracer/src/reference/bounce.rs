@@ -85,7 +85,13 @@ impl Oracle {
         };
         let bent = optics::bent(direction, ns, indices);
         if material.fresnel {
-            let share = optics::reflected_share(direction, ns, indices);
+            let share = if material.thin {
+                // Light between the two surfaces of a sheet: a geometric series.
+                let one = optics::reflected_share(direction, ns, [1.0, f64::from(material.ior)]);
+                2.0 * one / (1.0 + one)
+            } else {
+                optics::reflected_share(direction, ns, indices)
+            };
             reflect *= share;
             transmit *= 1.0 - share;
         } else if bent.is_none() {

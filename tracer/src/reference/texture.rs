@@ -11,7 +11,7 @@ use crate::texture::Texture;
 #[derive(Clone, Copy)]
 pub(super) enum Border {
     /// The picture repeated.
-    Around,
+    Repeated,
     /// The outermost texel.
     Clamped,
     /// The picture repeated, every second time reflected.
@@ -22,7 +22,7 @@ impl Border {
     /// The texel at an index inside or outside of a picture with `size` texels.
     pub(super) fn index(self, index: f64, size: f64) -> f64 {
         match self {
-            Border::Around => index.rem_euclid(size),
+            Border::Repeated => index.rem_euclid(size),
             Border::Clamped => index.clamp(0.0, size - 1.0),
             Border::Reflected => {
                 let pair = index.rem_euclid(2.0 * size);
@@ -60,7 +60,7 @@ impl Oracle {
         let texture = self.textures.iter().find(|texture| texture.id() == map.texture)?;
         let (width, height) = (f64::from(texture.width()), f64::from(texture.height()));
         let border = match map.tiling.wrap {
-            Wrap::Repeat => Border::Around,
+            Wrap::Repeat => Border::Repeated,
             Wrap::Clamp => Border::Clamped,
             Wrap::Mirror => Border::Reflected,
         };

@@ -29,7 +29,7 @@ pub struct SceneFeatures {
     pub shadows: bool,
     /// A material reflects or transmits: rays bounce.
     pub bounces: bool,
-    /// A material transmits: sides are told apart, and shadows are not all or nothing.
+    /// A material transmits: its sides differ, and shadows are not all or nothing.
     pub transparent: bool,
     /// A material of some geometry casts no shadow.
     pub shadowless: bool,

@@ -29,7 +29,7 @@ use media::Media;
 use mirrors::Mirrors;
 use secondary::{Arrival, Secondary};
 
-/// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
+/// Most secondary rays of one sample: what two mirrors of glass in each other would send on without end is cut here. Rays with less than
 /// 0.004 of the light, the default of `min_contribution`, end before.
 const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::media::Media;
-use crate::bsdf::{fresnel, on_side_of, reflected, refracted};
+use crate::bsdf::{fresnel, fresnel_of_sheet, on_side_of, reflected, refracted};
 use crate::frame::PreparedFrame;
 use crate::rays::{PrimitiveId, Ray};
 use crate::scene::Material;
@@ -74,7 +74,12 @@ impl Arrival<'_> {
             let eta = if self.material.thin { 1.0 } else { interface.eta };
             let refracted = refracted(self.direction, self.ns, eta);
             if self.material.fresnel {
-                let share = fresnel(-self.direction.dot(self.ns), eta);
+                let cosine = -self.direction.dot(self.ns);
+                let share = if self.material.thin {
+                    fresnel_of_sheet(cosine, f64::from(self.material.ior))
+                } else {
+                    fresnel(cosine, eta)
+                };
                 reflect *= share;
                 transmit *= 1.0 - share;
             } else if refracted.is_none() {

@@ -167,7 +167,7 @@ fn light_is_absorbed_along_its_way_inside() {
 #[test]
 fn total_reflection_ends_at_the_depth() {
     // From the middle of a ball of little index, no ray leaves at more than the critical angle: the camera next to the surface
-    // sees rings of it for ever.
+    // sees rings of it without end.
     let mut scene = under_white_sky();
     scene.materials =
         vec![Material { transmit: Vec3::ONE, ior: 2.0, emission: Vec3::splat(0.001), ..clear() }];

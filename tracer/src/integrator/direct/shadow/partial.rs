@@ -9,8 +9,8 @@
 //! the light's centre, because x would be occluded by its own surface. N.L, H, A_j and B_j are those of the centre. Where x is
 //! inside of the ball, or surfaces are, those of the points count that nothing occludes.
 //!
-//! c_t is 1 for a surface that casts no shadow, `transmit` for a transparent one and 0 for all others. Tiles tell the points that
-//! opaque items occlude from those with other items in their way; only rays of the latter are followed one by one.
+//! c_t is 1 for a surface that casts no shadow, `transmit` for a transparent one and 0 for all others. Tiles separate the points that
+//! opaque items occlude from points with other items in their way; only rays of the latter are followed one by one.
 
 use super::super::super::stage::{Stage, Watch};
 use super::super::{TileContext, blend};
