@@ -6,11 +6,8 @@ use glam::DVec3;
 pub(crate) fn srgb(linear: DVec3) -> [u8; 3] {
     linear.to_array().map(|value| {
         let value = value.clamp(0.0, 1.0);
-        let encoded = if value <= 0.003_130_8 {
-            12.92 * value
-        } else {
-            1.055 * libm::pow(value, 1.0 / 2.4) - 0.055
-        };
+        let encoded =
+            if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * libm::pow(value, 1.0 / 2.4) - 0.055 };
         (encoded * 255.0).round() as u8
     })
 }

@@ -42,14 +42,7 @@ pub(super) fn wine_glass() -> Shape {
 
 /// Wine up to the widest part of a glass.
 pub(super) fn wine() -> Shape {
-    let middle_of_wall = [
-        (0.0, 8.75),
-        (1.25, 8.95),
-        (2.65, 10.0),
-        (3.68, 11.65),
-        (4.18, 14.0),
-        (4.03, 17.2),
-    ];
+    let middle_of_wall = [(0.0, 8.75), (1.25, 8.95), (2.65, 10.0), (3.68, 11.65), (4.18, 14.0), (4.03, 17.2)];
     lathe_fine(&filled(&spline(&middle_of_wall, 7), 13.2), SEGMENTS)
 }
 
@@ -87,15 +80,8 @@ pub(super) fn carafe() -> Shape {
 
 /// Water in the carafe.
 pub(super) fn water() -> Shape {
-    let middle_of_wall = [
-        (0.0, 0.5),
-        (5.0, 0.55),
-        (6.03, 1.7),
-        (6.35, 4.2),
-        (5.85, 8.2),
-        (4.36, 12.15),
-        (2.71, 15.55),
-    ];
+    let middle_of_wall =
+        [(0.0, 0.5), (5.0, 0.55), (6.03, 1.7), (6.35, 4.2), (5.85, 8.2), (4.36, 12.15), (2.71, 15.55)];
     lathe_fine(&filled(&spline(&middle_of_wall, 7), 11.0), SEGMENTS)
 }
 
