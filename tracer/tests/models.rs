@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::image;
 use rayfarm_tracer::scene::{LightKind, LoadedScene, load};
@@ -14,8 +16,17 @@ mod generator;
 
 use generator::Content;
 
-const SCENES: [&str; 5] = ["room.toml", "product.toml", "instances.toml", "lights.toml", "textured.toml"];
-const MAX_FOLDER_BYTES: u64 = 10_000_000;
+const SCENES: [&str; 8] = [
+    "room.toml",
+    "room-soft.toml",
+    "table.toml",
+    "showroom.toml",
+    "product.toml",
+    "instances.toml",
+    "lights.toml",
+    "textured.toml",
+];
+const MAX_FOLDER_BYTES: u64 = 11_000_000;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../models")
@@ -67,6 +78,70 @@ fn the_default_scene_is_rich_enough() {
     }));
     let compiled = CompiledScene::new(room.scene, room.meshes, room.textures).unwrap();
     assert!(compiled.triangle_count() >= 50_000, "{} triangles", compiled.triangle_count());
+}
+
+#[test]
+fn the_soft_room_differs_from_the_room_in_its_lights_only() {
+    let (room, soft) = (loaded("room.toml"), loaded("room-soft.toml"));
+    let has_soft_shadows = |scene: &LoadedScene| {
+        scene.scene.lights.iter().filter(|light| light.shadows).all(|light| light.radius > 0.0)
+    };
+    assert!(has_soft_shadows(&soft) && !has_soft_shadows(&room));
+    for (soft, hard) in soft.scene.lights.iter().zip(&room.scene.lights) {
+        assert_eq!(
+            (soft.color, soft.attenuation, soft.shadows),
+            (hard.color, hard.attenuation, hard.shadows)
+        );
+    }
+    let mut alike = soft.scene;
+    alike.lights = room.scene.lights.clone();
+    assert!(alike == room.scene, "room-soft.toml is not room.toml with other lights");
+}
+
+/// Number of faces of a generated mesh at each directed edge, over positions.
+fn directed_edges(text: &str) -> BTreeMap<(&str, &str), usize> {
+    let positions: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("v ")).collect();
+    let mut edges = BTreeMap::new();
+    for face in text.lines().filter_map(|line| line.strip_prefix("f ")) {
+        let corners: Vec<&str> =
+            face.split(' ').map(|corner| positions[corner.parse::<usize>().unwrap() - 1]).collect();
+        for (i, from) in corners.iter().enumerate() {
+            *edges.entry((*from, corners[(i + 1) % corners.len()])).or_default() += 1;
+        }
+    }
+    edges
+}
+
+/// Six times the volume of a generated mesh, positive where its front is outside.
+fn sixfold_volume(text: &str) -> f64 {
+    let numbers = |line: &str| {
+        let numbers: Vec<f64> = line.split(' ').map(|number| number.parse().unwrap()).collect();
+        DVec3::from_slice(&numbers)
+    };
+    let positions: Vec<DVec3> =
+        text.lines().filter_map(|line| line.strip_prefix("v ")).map(numbers).collect();
+    let faces = text.lines().filter_map(|line| line.strip_prefix("f "));
+    faces
+        .map(|face| {
+            let corners: Vec<DVec3> =
+                face.split(' ').map(|corner| positions[corner.parse::<usize>().unwrap() - 1]).collect();
+            corners.windows(2).skip(1).map(|edge| corners[0].dot(edge[0].cross(edge[1]))).sum::<f64>()
+        })
+        .sum()
+}
+
+#[test]
+fn transparent_bodies_are_closed_with_their_front_outside() {
+    let bodies = ["wine_glass", "wine", "carafe", "water"].map(|name| format!("table/{name}.obj"));
+    let showroom = ["flacon", "perfume"].map(|name| format!("showroom/{name}.obj"));
+    for name in bodies.iter().chain(&showroom) {
+        let text = fs::read_to_string(folder().join(name)).unwrap();
+        let edges = directed_edges(&text);
+        for ((from, to), count) in &edges {
+            assert_eq!((*count, edges.get(&(*to, *from))), (1, Some(&1)), "{name}: the edge {from} to {to}");
+        }
+        assert!(sixfold_volume(&text) > 0.0, "{name} is inside out");
+    }
 }
 
 #[test]

@@ -69,7 +69,8 @@ pub(crate) fn files() -> Vec<GeneratedFile> {
         table::folder(),
         showroom::folder(),
     ];
-    folders.iter().flat_map(files_of).chain(globe::textured_files()).chain(table::pictures()).collect()
+    let others = [globe::textured_files(), table::pictures(), showroom::pictures()];
+    folders.iter().flat_map(files_of).chain(others.into_iter().flatten()).collect()
 }
 
 fn files_of(folder: &Folder) -> Vec<GeneratedFile> {

@@ -6,7 +6,15 @@ use std::sync::Arc;
 use rayfarm_tracer::scene::{CameraKind, FovAxis, FrameView, Quality, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
-const SCENES: [&str; 5] = ["room.toml", "lights.toml", "textured.toml", "instances.toml", "product.toml"];
+const SCENES: [&str; 7] = [
+    "room.toml",
+    "lights.toml",
+    "textured.toml",
+    "instances.toml",
+    "product.toml",
+    "table.toml",
+    "showroom.toml",
+];
 
 /// Widths: one column, less than a tile, a tile and some columns, tiles and some columns.
 const WIDTHS: [u32; 6] = [1, 3, 15, 17, 33, 150];
@@ -92,7 +100,7 @@ fn a_frame_cut_into_rows_is_the_same_frame_with_every_kind_of_camera() {
 
 #[test]
 fn pieces_rendered_by_several_threads_are_the_same_frame() {
-    for (name, grid) in SCENES.into_iter().zip([1, 3, 2, 4, 1]) {
+    for (name, grid) in SCENES.into_iter().zip([1, 3, 2, 4, 1, 1, 2]) {
         let scene = compiled(name);
         let (width, height) = (150, 61);
         let quality = Quality { adaptive: grid > 2, ..Quality::default() };

@@ -2,13 +2,14 @@
 //! origin. The files have no normals: the loader computes them. Their materials are those of the scene file.
 
 mod flacon;
+mod glow;
 mod lamp;
 mod stage;
 
 use super::obj::Digits::Coarse;
 use super::obj::Shading::Flat;
 use super::shape::{Material, Model, Shape};
-use super::{Folder, Part};
+use super::{Content, Folder, GeneratedFile, Part};
 
 /// The material of a file that is used without a scene.
 static PLAIN: Material = Material::glossy("plain", [0.6, 0.6, 0.6], 0.3, 60.0);
@@ -29,4 +30,10 @@ pub(crate) fn folder() -> Folder {
         part("vase", stage::vase()),
     ];
     Folder { name: "showroom", parts }
+}
+
+/// The picture of the light behind the perfume.
+pub(crate) fn pictures() -> Vec<GeneratedFile> {
+    let content = Content::Picture(glow::picture());
+    vec![GeneratedFile { path: "showroom/glow.png".to_owned(), content, triangles: 0 }]
 }

@@ -32,9 +32,21 @@ pub(super) fn teapot() -> Shape {
         (1.0, 15.0),
         (0.0, 15.1),
     ];
+<<<<<<< HEAD
     let path =
         Path::in_xy(&[(5.6, 3.6), (8.6, 4.6), (10.6, 7.2), (11.8, 10.4), (13.2, 12.4), (14.3, 13.1)], 4);
     let spout = tube(&path, 24, |t| 2.1 - 1.75 * t + 0.45 * t * t);
+||||||| c1d36ea
+    let path = Path::in_xy(
+        &[(5.6, 3.6), (8.6, 4.6), (10.6, 7.2), (11.8, 10.4), (13.2, 12.4), (14.3, 13.1)],
+        4,
+    );
+    let spout = tube(&path, 24, |t| 2.1 - 1.75 * t + 0.45 * t * t);
+=======
+    let path =
+        Path::in_xy(&[(5.6, 3.6), (8.6, 4.6), (10.6, 7.2), (11.8, 10.4), (13.2, 12.4), (14.3, 13.1)], 4);
+    let spout = tube(&path, 24, |t| 1.8 - 1.45 * t + 0.40 * t * t);
+>>>>>>> x-scenes
     Shape::union([lathe_fine(&spline(&body, 6), 64), spout])
 }
 
@@ -56,9 +68,9 @@ pub(super) fn spoon() -> Shape {
     let bowl = grid((columns, Ends::Open), (rows, Ends::Open), |column, row| {
         let along = |i: usize, count: usize| -1.0 + 2.0 * i as f64 / (count - 1) as f64;
         let (u, v) = (along(column, columns), along(row, rows));
-        let width = (1.0 - u * u).max(0.0).sqrt() * (1.95 + 0.35 * u);
-        let depth = 0.95 * (1.0 - u * u) * (1.0 - v * v);
-        DVec3::new(7.2 + 2.9 * u, 1.0 - depth, -width * v)
+        let width = (1.0 - u * u).max(0.0).sqrt() * (2.15 + 0.35 * u);
+        let depth = 1.0 * (1.0 - u * u) * (1.0 - v * v);
+        DVec3::new(7.2 + 3.1 * u, 1.05 - depth, -width * v)
     });
     let stem = Path::in_xy(&[(4.5, 0.98), (2.6, 1.45), (-2.5, 1.2), (-7.0, 0.75), (-10.5, 0.62)], 5);
     let stem = sweep(&stem, 16, |t, corner| {

@@ -12,21 +12,21 @@ const WIDTH: u32 = 1024;
 const HEIGHT: u32 = 512;
 
 /// Linear colours.
-const ZENITH: DVec3 = DVec3::new(0.13, 0.30, 0.64);
-const HORIZON: DVec3 = DVec3::new(0.86, 0.86, 0.84);
+const ZENITH: DVec3 = DVec3::new(0.12, 0.29, 0.62);
+const HORIZON: DVec3 = DVec3::new(0.98, 0.86, 0.70);
 const GLOW: DVec3 = DVec3::new(1.0, 0.72, 0.42);
 const CLOUD: DVec3 = DVec3::new(0.98, 0.93, 0.88);
-const SEA_FAR: DVec3 = DVec3::new(0.40, 0.54, 0.62);
-const SEA_NEAR: DVec3 = DVec3::new(0.035, 0.15, 0.21);
+const SEA_FAR: DVec3 = DVec3::new(0.30, 0.46, 0.55);
+const SEA_NEAR: DVec3 = DVec3::new(0.020, 0.13, 0.20);
 
 /// The direction to the sun, as the scene file has it, not of unit length.
 const SUN: DVec3 = DVec3::new(-0.52, 0.61, -0.60);
 
 /// Headlands: azimuth of the middle and half the width in degrees, height in degrees, colour.
 const LAND: [(f64, f64, f64, DVec3); 3] = [
-    (-14.0, 20.0, 2.2, DVec3::new(0.42, 0.52, 0.60)),
-    (25.0, 24.0, 3.6, DVec3::new(0.27, 0.37, 0.43)),
-    (42.0, 20.0, 5.2, DVec3::new(0.13, 0.21, 0.22)),
+    (-13.0, 17.0, 2.6, DVec3::new(0.36, 0.44, 0.54)),
+    (20.0, 19.0, 3.4, DVec3::new(0.20, 0.28, 0.36)),
+    (36.0, 18.0, 5.0, DVec3::new(0.08, 0.14, 0.15)),
 ];
 
 pub(super) fn picture() -> RgbImage {
@@ -64,7 +64,7 @@ fn color(azimuth: f64, elevation: f64) -> DVec3 {
 fn sky(azimuth: f64, elevation: f64, ahead: f64) -> DVec3 {
     let direction = towards(azimuth, elevation);
     let haze = 1.0 - direction.y;
-    let clear = ZENITH.lerp(HORIZON, haze * haze * haze);
+    let clear = ZENITH.lerp(HORIZON, haze * haze * haze * haze * haze);
     let from_sun = libm::acos(direction.dot(SUN.normalize()).clamp(-1.0, 1.0)).to_degrees();
     let lit = clear + GLOW * (0.55 * libm::exp(-from_sun / 16.0));
     let over = direction / (direction.y + 0.16);

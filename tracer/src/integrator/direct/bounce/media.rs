@@ -49,6 +49,7 @@ impl Media {
         if let Some(place) = self.place_of(material) {
             self.materials[place..].rotate_left(1);
             self.count -= 1;
+            self.materials[usize::from(self.count)..].fill(0);
         }
         self
     }

@@ -48,12 +48,12 @@ fn pictures_that_are_no_skies_are_refused_at_their_names() {
     picture(&cube, "b.png", 3, 3);
     assert_eq!(
         cube.refusal("s.toml"),
-        "s.toml:5:32: this face of the cube map has 3 x 3 pixels, but must be 2 x 2, as the first one"
+        "s.toml:5:30: this face of the cube map has 3 x 3 pixels, but must be 2 x 2, as the first one"
     );
     picture(&cube, "b.png", 2, 1);
     assert_eq!(
         cube.refusal("s.toml"),
-        "s.toml:5:32: this face of the cube map has 2 x 1 pixels, but must be square"
+        "s.toml:5:30: this face of the cube map has 2 x 1 pixels, but must be square"
     );
     picture(&cube, "a.png", 4, 2);
     assert!(cube.refusal("s.toml").starts_with("s.toml:5:12: this face of the cube map has 4 x 2 pixels"));
