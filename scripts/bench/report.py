@@ -11,7 +11,7 @@ import json
 import re
 from pathlib import Path
 
-STAGES = ["visible", "surfaces", "shading", "shadows", "encoding"]
+STAGES = ["visible", "surfaces", "shading", "shadows", "secondary", "encoding"]
 
 
 def criterion(folder, group):

@@ -63,7 +63,8 @@ pub struct Checker {
 /// The space in which a [`Checker`] is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum CheckerSpace {
-    /// World units along the axes of the object, from its own origin: the pattern moves with it.
+    /// The object's own coordinates, so that the pattern moves with it: those of a model's file, in its units; else world units along
+    /// the world's axes, from the centre of a sphere or a disk, the point of a plane or the first corner of a triangle.
     Object,
     /// World units along the axes of the world: objects move through the pattern.
     World,

@@ -13,6 +13,12 @@ use crate::viewer::InputAction;
 /// Keys that were pressed (`true`) or released, in order, since the last update.
 type Edges = Rc<RefCell<Vec<(Key, bool)>>>;
 
+/// Keys that magnify the picture: the plus sign is on the key of the equals sign, or on the keypad.
+const MAGNIFY: [Key; 3] = [Key::Equal, Key::NumPadPlus, Key::PageUp];
+
+/// Keys that do the reverse.
+const REDUCE: [Key; 3] = [Key::Minus, Key::NumPadMinus, Key::PageDown];
+
 /// Receiver of every key, also of one that is pressed and released between two updates; minifb's list of pressed keys misses
 /// those.
 struct Listener(Edges);
@@ -116,8 +122,9 @@ impl Controls {
     }
 }
 
-/// Actions on the camera: R resets it, W A S D E Q move it, arrows turn it, a drag orbits, the wheel zooms. `drag` is in
-/// heights of the window, to the right and downwards.
+/// Actions on the camera: R resets it, W A S D E Q move it, arrows turn it, comma and period roll it, plus and minus (or Page
+/// Up and Page Down, which are on every keyboard) magnify its picture, a drag orbits, the wheel zooms. `drag` is in heights of the
+/// window, to the right and downwards.
 fn camera_actions(strokes: &Strokes, drag: (f64, f64), wheel: f64, seconds: f64) -> Vec<InputAction> {
     let mut actions = Vec::new();
     if strokes.pressed.contains(&Key::R) {
@@ -134,6 +141,15 @@ fn camera_actions(strokes: &Strokes, drag: (f64, f64), wheel: f64, seconds: f64)
     let (right, up) = (axis(Key::Right, Key::Left), axis(Key::Up, Key::Down));
     if (right, up) != (0.0, 0.0) {
         actions.push(InputAction::Look { right, up, seconds });
+    }
+    let roll = axis(Key::Period, Key::Comma);
+    if roll != 0.0 {
+        actions.push(InputAction::Roll { right: roll, seconds });
+    }
+    let is_any_held = |keys: &[Key]| i8::from(keys.iter().any(|key| strokes.held.contains(key)));
+    let inwards = f64::from(is_any_held(&MAGNIFY) - is_any_held(&REDUCE));
+    if inwards != 0.0 {
+        actions.push(InputAction::Magnify { inwards, seconds });
     }
     if drag != (0.0, 0.0) {
         actions.push(InputAction::Orbit { right: drag.0, down: drag.1 });
@@ -278,7 +294,9 @@ mod tests {
 
     #[test]
     fn each_key_has_its_own_movement() {
-        let all = [Key::W, Key::S, Key::A, Key::D, Key::E, Key::Q, Key::Left, Key::Right, Key::Up, Key::Down];
+        let moves = [Key::W, Key::S, Key::A, Key::D, Key::E, Key::Q];
+        let turns = [Key::Left, Key::Right, Key::Up, Key::Down, Key::Comma, Key::Period];
+        let all = [&moves[..], &turns, &[Key::PageUp, Key::PageDown]].concat();
         let actions = |keys: &[Key]| {
             let strokes = Strokes { held: keys.to_vec(), pressed: Vec::new() };
             camera_actions(&strokes, (0.0, 0.0), 0.0, 0.01)
@@ -290,6 +308,10 @@ mod tests {
         }
         assert_eq!(actions(&[Key::X, Key::Space]), []);
         assert_eq!(actions(&[Key::W, Key::S]), [], "opposite keys cancel out");
+        assert_eq!(actions(&[Key::Equal, Key::NumPadMinus]), [], "opposite keys cancel out");
+        assert_eq!(actions(&MAGNIFY), actions(&[Key::NumPadPlus]), "keys of one action do not add up");
+        assert_eq!(actions(&[Key::Minus])[0], InputAction::Magnify { inwards: -1.0, seconds: 0.01 });
+        assert_eq!(actions(&[Key::Period])[0], InputAction::Roll { right: 1.0, seconds: 0.01 });
         assert_eq!(actions(&[Key::W])[0], InputAction::Move { direction: DVec3::Z, seconds: 0.01 });
     }
 

@@ -32,7 +32,21 @@ pub(crate) enum InputAction {
         /// Drag downwards, in heights of the display.
         down: f64,
     },
-    /// Moves the camera towards its look-at point.
+    /// Rolls the camera about its view direction.
+    Roll {
+        /// To the right, in -1..=1.
+        right: f64,
+        /// Time for which the roll was held, in seconds.
+        seconds: f64,
+    },
+    /// Magnifies the picture: the zoom of a camera, or the angle of a fisheye camera.
+    Magnify {
+        /// Inwards, in -1..=1.
+        inwards: f64,
+        /// Time for which the magnification was held, in seconds.
+        seconds: f64,
+    },
+    /// Moves the camera towards its look-at point; magnifies the picture of an orthographic camera.
     Zoom {
         /// Notches of a wheel; positive values move nearer.
         notches: f64,

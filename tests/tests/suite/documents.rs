@@ -131,6 +131,7 @@ fn documented_option(knob: &Knob) -> String {
         (KnobForm::Switch, Some("off")) => format!("`--{option}[=on|off]`"),
         (KnobForm::Switch, _) => format!("`--{option} on|off`"),
         (KnobForm::Count, _) => format!("`--{option} N`"),
+        (KnobForm::Number(range), _) => format!("`--{option} {}`", if range.whole { "N" } else { "X" }),
         (KnobForm::Word | KnobForm::Fraction, _) => format!("`--{option} {words}`"),
     }
 }
@@ -142,7 +143,9 @@ fn documented_key(knob: &Knob) -> String {
         (_, None) => format!("`{key}`"),
         (KnobForm::Switch, Some(word)) => format!("`{key} = {}`", word == "on"),
         (KnobForm::Word, Some(word)) => format!("`{key} = \"{word}\"`"),
-        (KnobForm::Count | KnobForm::Fraction, Some(word)) => format!("`{key} = {word}`"),
+        (KnobForm::Count | KnobForm::Fraction | KnobForm::Number(_), Some(word)) => {
+            format!("`{key} = {word}`")
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::bvh::WIDTH;
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Material, Model, Scene};
+use crate::scene::{Checker, CheckerSpace, Material, Model, Scene};
 
 /// Vertex attributes that the materials of a model use.
 #[derive(Clone, Debug, Default)]
@@ -19,8 +19,15 @@ pub(crate) struct AttributeUse {
 }
 
 /// Whether a material of the model has a texture.
-pub(super) fn has_texture(scene: &Scene, model: &Model) -> bool {
+fn has_texture(scene: &Scene, model: &Model) -> bool {
     model.materials.iter().any(|&index| scene.materials[index as usize].textures().next().is_some())
+}
+
+/// Whether a material of the model has a texture, or a pattern in texture coordinates.
+pub(super) fn uses_uvs(scene: &Scene, model: &Model) -> bool {
+    let in_uvs = |pattern: &Checker| pattern.space == CheckerSpace::Uv;
+    let has_pattern = |&index: &u32| scene.materials[index as usize].checker.as_ref().is_some_and(in_uvs);
+    has_texture(scene, model) || model.materials.iter().any(has_pattern)
 }
 
 /// The attributes of each model. Models with the same mesh and materials share their cut-outs.

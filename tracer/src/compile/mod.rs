@@ -18,10 +18,10 @@ use glam::DVec3;
 use crate::bvh::{self, BuildQuality};
 use crate::cancel::{Cancelled, IsCancelled, go_on, never};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Model, NormalMode, Scene, SceneFeatures, TextureMap, ValidateError};
+use crate::scene::{Material, Model, NormalMode, Scene, SceneFeatures, TextureMap, ValidateError};
 use crate::texture::{Texture, TextureId};
 pub(crate) use attributes::AttributeUse;
-use attributes::{attribute_uses, has_texture};
+use attributes::{attribute_uses, uses_uvs};
 pub(crate) use bounds::{disk_reach, orientation, transformed_bounds};
 use bounds::{relative_boxes, world_bounds};
 pub(crate) use items::{Item, Items};
@@ -40,6 +40,12 @@ pub enum CompileError {
     /// A texture that the scene names is missing.
     #[error("the scene names texture {id}, which is missing")]
     MissingTexture {
+        /// The texture.
+        id: TextureId,
+    },
+    /// A material names a texture of linear light.
+    #[error("a material has texture {id}, which is of linear light and for skies only")]
+    LinearTexture {
         /// The texture.
         id: TextureId,
     },
@@ -174,7 +180,14 @@ fn textures_of(
     let by_id: BTreeMap<TextureId, Arc<Texture>> =
         textures.into_iter().map(|texture| (texture.id(), texture)).collect();
     let find = |id: TextureId| by_id.get(&id).cloned().ok_or(CompileError::MissingTexture { id });
-    scene.textures.iter().map(|map| Ok((find(map.texture)?, *map))).collect()
+    let textures = scene.textures.iter().map(|map| Ok((find(map.texture)?, *map)));
+    let textures: Vec<(Arc<Texture>, TextureMap)> = textures.collect::<Result<_, CompileError>>()?;
+    let of_materials = scene.materials.iter().flat_map(Material::textures);
+    let mut linear = of_materials.filter_map(|index| textures.get(index as usize));
+    match linear.find(|(texture, _)| texture.is_linear()) {
+        Some((texture, _)) => Err(CompileError::LinearTexture { id: texture.id() }),
+        None => Ok(textures),
+    }
 }
 
 fn fitting_mesh(
@@ -199,9 +212,9 @@ fn fitting_mesh(
                 .into(),
         );
     }
-    if has_texture(scene, description) && !mesh.has_uvs() {
+    if uses_uvs(scene, description) && !mesh.has_uvs() {
         return mismatch(
-            "one of its materials has a texture, the mesh was compiled without texture coordinates; compile the mesh with them".into(),
+            "one of its materials has a texture or a pattern in texture coordinates, the mesh was compiled without texture coordinates; compile the mesh with them".into(),
         );
     }
     Ok(Arc::clone(mesh))

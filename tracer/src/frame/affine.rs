@@ -11,6 +11,10 @@ use crate::simd::three;
 pub(crate) struct Affine(pub [[f64; 4]; 3]);
 
 impl Affine {
+    /// The map of every point to itself.
+    pub(crate) const IDENTITY: Self =
+        Self([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+
     /// The map p -> `linear` p + `constant`.
     pub(crate) fn new(linear: DMat3, constant: DVec3) -> Self {
         Self([0, 1, 2].map(|i| linear.row(i).extend(constant[i]).to_array()))
@@ -43,7 +47,7 @@ impl Affine {
         Affine([a, b, g])
     }
 
-    /// A map to (a, b, g) with the origin of the picture moved to (x, y).
+    /// A map to (a, b, g) with the origin of the picture moved to (x, y), for rays from a point: the place is (a / g, b / g).
     #[inline(always)]
     pub(crate) fn centered(&self, x: f64, y: f64) -> Affine {
         let [mut a, mut b, g] = self.0;
@@ -51,6 +55,15 @@ impl Affine {
             a[column] -= x * g[column];
             b[column] -= y * g[column];
         }
+        Affine([a, b, g])
+    }
+
+    /// A map to (a, b, g) with the origin of the picture moved to (x, y), for parallel rays: the place is (a, b).
+    #[inline(always)]
+    pub(crate) fn shifted(&self, x: f64, y: f64) -> Affine {
+        let [mut a, mut b, g] = self.0;
+        a[3] -= x;
+        b[3] -= y;
         Affine([a, b, g])
     }
 

@@ -5,7 +5,7 @@
 //! numbers, bit for bit.
 //!
 //! ```text
-//!   camera     pixels to directions, and the camera's map from eye space to its picture
+//!   camera     pixels to rays, and the camera's map from eye space to its picture
 //!   affine     the maps
 //!   instance   placed meshes
 //!   rounding   error bounds of placed geometry
@@ -24,14 +24,15 @@ use crate::bvh::WideNode;
 use crate::cancel::{IsCancelled, go_on, never};
 use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, transformed_bounds};
 use crate::light::EyeLight;
-use crate::scene::{Camera, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
+use crate::rotation::sin_cos_degrees;
+use crate::scene::{Background, Camera, Filter, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
 use crate::shape::{EyeDisk, EyePlane, EyeSphere};
 use crate::simd::{self, Level};
 use crate::texture::Texture;
 
 pub(crate) use affine::Affine;
 pub use camera::Basis;
-pub(crate) use camera::PinholeRays;
+pub(crate) use camera::{CameraRays, FisheyeRay, FisheyeRays, ParallelRays, PinholeRays};
 pub(crate) use instance::Instance;
 use instance::ToEye;
 use rounding::placement_rounding;
@@ -47,8 +48,8 @@ pub struct PreparedFrame {
     view: FrameView,
     /// Eye units per world unit: a power of two.
     pub(crate) per_unit: f64,
-    pub(crate) rays: PinholeRays,
-    /// Map from eye space to the camera's picture: see [`PinholeRays::picture_map`].
+    pub(crate) rays: CameraRays,
+    /// Map from eye space to the camera's picture: see [`CameraRays::picture_map`].
     pub(crate) to_picture: Affine,
     pub(crate) items: Items,
     pub(crate) instances: Vec<Instance>,
@@ -59,6 +60,10 @@ pub struct PreparedFrame {
     /// Largest error bound of any surface, in eye units.
     pub(crate) coarsest: f64,
     pub(crate) lights: Vec<EyeLight>,
+    /// The background as rays of the camera see it.
+    pub(crate) seen_background: Background,
+    /// Sine and cosine of the rotation of a sky.
+    pub(crate) sky_rotation: [f32; 2],
     /// The scene's tree, with the boxes of this frame.
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) features: SceneFeatures,
@@ -101,7 +106,7 @@ impl PreparedFrame {
         go_on(cancelled)?;
         let source = scene.scene();
         let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
-        let rays = PinholeRays::new(view);
+        let rays = CameraRays::new(view, 1.0 / to_eye.unit);
         let to_picture = rays.picture_map();
         let mut instances: Vec<Instance> = source
             .models
@@ -131,11 +136,15 @@ impl PreparedFrame {
             planes,
             coarsest,
             lights: lights(source, &view.quality, &to_eye),
+            seen_background: seen_background(source),
+            sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
             features: scene.features().at(&view.quality),
             level: simd::best(),
             scene,
         };
+        go_on(cancelled)?;
+        frame.make_pyramids();
         go_on(cancelled)?;
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
@@ -169,6 +178,19 @@ impl PreparedFrame {
     /// The scene's textures with their maps.
     pub(crate) fn textures(&self) -> &[(Arc<Texture>, TextureMap)] {
         self.scene.textures()
+    }
+
+    /// The filter of a texture in this frame.
+    pub(crate) fn filter_of(&self, map: &TextureMap) -> Filter {
+        self.view.quality.filter.unwrap_or(map.filter)
+    }
+
+    /// Makes the smaller pictures of the textures that need them; those of earlier frames are kept.
+    fn make_pyramids(&self) {
+        let needed = |(_, map): &&(Arc<Texture>, TextureMap)| self.filter_of(map) == Filter::Trilinear;
+        if self.features.textured {
+            self.textures().iter().filter(needed).for_each(|(texture, _)| _ = texture.pyramid());
+        }
     }
 
     /// The items in a leaf of the scene's tree.
@@ -220,6 +242,16 @@ fn lights(scene: &Scene, quality: &Quality, to_eye: &ToEye) -> Vec<EyeLight> {
     let cast = |light: &Light| Light { shadows: light.shadows && quality.shadows, ..*light };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
     scene.lights.iter().map(place).collect()
+}
+
+fn seen_background(scene: &Scene) -> Background {
+    if scene.background_visible { scene.background } else { Background::Color(Vec3::ZERO) }
+}
+
+fn sky_rotation(scene: &Scene) -> [f32; 2] {
+    let Background::Sky(sky) = scene.background else { return [0.0, 1.0] };
+    let (sin, cos) = sin_cos_degrees(sky.rotate);
+    [sin as f32, cos as f32]
 }
 
 fn spheres(scene: &Scene, to_eye: &ToEye) -> Vec<EyeSphere> {

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 #[cfg(feature = "pictures")]
-use super::{KNOWN_EXTENSIONS, MAX_SIDE, READ_FORMATS};
+use super::{HIGH_RANGE_FORMATS, KNOWN_EXTENSIONS, MAX_SIDE};
 
 /// Fault of a picture or its file.
 #[derive(Debug, thiserror::Error)]
@@ -62,12 +62,24 @@ pub enum ImageError {
     },
     /// The file is no picture, a broken one, or one beyond the limits.
     #[cfg(feature = "pictures")]
-    #[error("cannot decode {} as {READ_FORMATS} of at most {MAX_SIDE} x {MAX_SIDE} pixels: {source}", path.display())]
+    #[error("cannot decode {} as {formats} of at most {MAX_SIDE} x {MAX_SIDE} pixels: {source}", path.display())]
     Decode {
         /// The file.
         path: PathBuf,
+        /// The formats that were tried.
+        formats: &'static str,
         /// Error of the decoder.
         source: ::image::ImageError,
+    },
+    /// The file has linear light beyond 1, where 8-bit sRGB is needed.
+    #[cfg(feature = "pictures")]
+    #[error(
+        "{} is a picture of high dynamic range ({HIGH_RANGE_FORMATS}), which is for skies only ([background]); convert it to PNG",
+        path.display()
+    )]
+    HighDynamicRange {
+        /// The file.
+        path: PathBuf,
     },
     /// The encoder refuses the picture; nothing is left behind.
     #[cfg(feature = "pictures")]

@@ -8,7 +8,7 @@ use std::path::Path;
 use ::image::error::{DecodingError, ImageFormatHint};
 use ::image::{DynamicImage, ImageFormat, ImageReader, Limits};
 
-use super::{ImageError, MAX_SIDE, RgbImage};
+use super::{HIGH_RANGE_FORMATS, ImageError, MAX_SIDE, READ_FORMATS, RgbImage};
 use crate::files::open_regular;
 
 /// Memory for everything but the pixels of a picture file: a colour profile of some kilobytes may unpack to
@@ -28,9 +28,10 @@ const MAX_FILE_BYTES: u64 = 1 << 30;
 /// frame.
 ///
 /// # Errors
-/// A file that cannot be read, is no picture, is broken, or is larger than [`MAX_SIDE`] in either direction.
+/// A file that cannot be read, is no picture, is broken, is larger than [`MAX_SIDE`] in either direction, or is in one of the
+/// [`super::HIGH_RANGE_FORMATS`].
 pub fn load(path: &Path) -> Result<RgbImage, ImageError> {
-    let picture = decoded(path)?.into_rgb8();
+    let picture = decoded_srgb(path)?.into_rgb8();
     let (width, height) = picture.dimensions();
     Ok(RgbImage { width, height, pixels: picture.into_raw() })
 }
@@ -40,19 +41,27 @@ pub fn load(path: &Path) -> Result<RgbImage, ImageError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with_alpha(path: &Path) -> Result<(RgbImage, Option<Vec<u8>>), ImageError> {
-    let picture = decoded(path)?;
+    decoded_srgb(path).map(split_alpha)
+}
+
+/// The pixels of a decoded picture in 8-bit sRGB, and its alpha if it has any.
+pub(super) fn split_alpha(picture: DynamicImage) -> (RgbImage, Option<Vec<u8>>) {
     let (width, height) = (picture.width(), picture.height());
     if !picture.color().has_alpha() {
-        return Ok((RgbImage { width, height, pixels: picture.into_rgb8().into_raw() }, None));
+        return (RgbImage { width, height, pixels: picture.into_rgb8().into_raw() }, None);
     }
     let mut pixels = picture.into_rgba8().into_raw();
     let alpha = pixels.iter().skip(3).step_by(4).copied().collect();
-    // In place: large pictures are not stored three times.
+    drop_fourth(&mut pixels);
+    (RgbImage { width, height, pixels }, Some(alpha))
+}
+
+/// Removes every fourth number, in place: large pictures are not stored three times.
+pub(super) fn drop_fourth<T: Copy>(pixels: &mut Vec<T>) {
     for pixel in 0..pixels.len() / 4 {
         pixels.copy_within(4 * pixel..4 * pixel + 3, 3 * pixel);
     }
     pixels.truncate(pixels.len() / 4 * 3);
-    Ok((RgbImage { width, height, pixels }, Some(alpha)))
 }
 
 /// Width and height in the header of a picture file, without decoding it.
@@ -64,7 +73,22 @@ pub fn size(path: &Path) -> Result<(u32, u32), ImageError> {
     catch_panic(path, || reader.into_dimensions())
 }
 
-fn decoded(path: &Path) -> Result<DynamicImage, ImageError> {
+/// Whether a file is in one of the [`super::HIGH_RANGE_FORMATS`], by its first bytes.
+pub fn has_high_range(path: &Path) -> bool {
+    let format = open(path, MAX_REST_BYTES).ok().and_then(|reader| reader.format());
+    matches!(format, Some(ImageFormat::Hdr | ImageFormat::OpenExr))
+}
+
+/// A decoded picture in sRGB.
+fn decoded_srgb(path: &Path) -> Result<DynamicImage, ImageError> {
+    if has_high_range(path) {
+        return Err(ImageError::HighDynamicRange { path: path.to_owned() });
+    }
+    decoded(path)
+}
+
+/// A decoded picture in any format.
+pub(super) fn decoded(path: &Path) -> Result<DynamicImage, ImageError> {
     let (width, height) = size(path)?;
     let pixels = u64::from(width) * u64::from(height);
     let reader = open(path, MAX_DECODE_BYTES.min(MAX_PIXEL_BYTES * pixels + MAX_REST_BYTES))?;
@@ -81,7 +105,8 @@ fn catch_panic<T>(path: &Path, decode: impl FnOnce() -> ::image::ImageResult<T>)
 }
 
 fn broken(path: &Path, source: ::image::ImageError) -> ImageError {
-    ImageError::Decode { path: path.to_owned(), source }
+    let formats = if has_high_range(path) { HIGH_RANGE_FORMATS } else { READ_FORMATS };
+    ImageError::Decode { path: path.to_owned(), formats, source }
 }
 
 /// A reader that allocates at most `memory` bytes.

@@ -11,23 +11,30 @@ mod reduced;
 mod resize;
 #[cfg(feature = "pictures")]
 mod save;
+#[cfg(feature = "pictures")]
+mod sky;
 mod ssim;
 
 pub use compare::{Difference, compare};
 pub use error::ImageError;
 pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip};
 #[cfg(feature = "pictures")]
-pub use load::{ends_early, load, load_with_alpha, size};
+pub use load::{ends_early, has_high_range, load, load_with_alpha, size};
 pub(crate) use reduced::reduce_colors;
 pub use resize::{Resizer, resize};
 #[cfg(feature = "pictures")]
 pub use save::{KNOWN_EXTENSIONS, save};
+#[cfg(feature = "pictures")]
+pub use sky::{SkyImage, SkyPixels, load_sky};
 
 /// Pixels per row, and rows, that a picture has at most.
 pub const MAX_SIDE: u32 = 16_384;
 
 /// Picture formats that are read.
 pub const READ_FORMATS: &str = "PNG, JPEG, TGA, BMP, GIF, TIFF, WebP or PPM";
+
+/// Picture formats of linear light without an upper end, which are read for skies.
+pub const HIGH_RANGE_FORMATS: &str = "Radiance HDR or OpenEXR";
 
 /// A picture of three sRGB bytes per pixel, rows from top to bottom.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,6 +45,17 @@ pub struct RgbImage {
     pub height: u32,
     /// `3 * width * height` bytes: R, G, B of the top left pixel first.
     pub pixels: Vec<u8>,
+}
+
+/// A picture of linear RGB, rows from top to bottom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearImage {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `3 * width * height` channels: R, G, B of the top left pixel first.
+    pub pixels: Vec<f32>,
 }
 
 impl RgbImage {

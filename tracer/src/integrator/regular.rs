@@ -7,7 +7,7 @@ use super::stage::{Stage, Watch};
 use crate::cancel::Cancelled;
 use crate::film::{Means, PixelBytes, TilePixels, write_samples};
 use crate::frame::PreparedFrame;
-use crate::rays::{BLOCKS, EyeTile, RayCounts, SIDE, TileColors, TileRays, place};
+use crate::rays::{BLOCKS, RayCounts, SIDE, TileColors, TileRays, TileSamples, place};
 use crate::simd::{LANES, Simd, three};
 
 /// Renders the tiles of a band of rows.
@@ -37,8 +37,7 @@ pub(super) fn render_band<S: Simd, W: Watch>(
         let half = SIDE as f64 / 2.0;
         let center = [f64::from(pixels.left * grid) + half, f64::from(pixels.top * grid) + half];
         let live = live_lanes(grid, &pixels);
-        let tile = EyeTile::new(frame, &rays, live, center, grid);
-        context.trace(simd, &tile)?;
+        context.trace(simd, TileSamples { rays: &rays, live, center, grid })?;
         context.watch.enter(Stage::Encoding);
         let colors = &context.direct.colors;
         if grid == 1 {

@@ -9,8 +9,7 @@ use crate::bvh::WIDTH;
 use crate::compile::Item;
 use crate::frame::PreparedFrame;
 use crate::rays::{PrimitiveId, Ray};
-use crate::scene::{Filter, Wrap};
-use crate::texture::{LEAST_ALPHA, Texture};
+use crate::texture::LEAST_ALPHA;
 
 /// The bits of a single triangle with a cut-out.
 const SINGLE: [u16; 1] = [1];
@@ -55,7 +54,9 @@ impl PreparedFrame {
         let (texture, map) = &self.textures()[map as usize];
         let uv = at_point(&uvs, corners, ray.origin + ray.direction * t) + repeats.as_dvec2();
         let filter = self.view().quality.filter.unwrap_or(map.filter);
-        alpha(texture, filter, map.tiling.wrap, map.tiling.place(uv)) >= f64::from(LEAST_ALPHA) - 0.5
+        let of_texel = |x, y| [f64::from(texture.alpha(x, y))];
+        let [alpha] = texture.filtered(filter, map.tiling.wrap, map.tiling.place(uv), of_texel);
+        alpha >= f64::from(LEAST_ALPHA) - 0.5
     }
 }
 
@@ -68,34 +69,4 @@ fn at_point(uvs: &[Vec2; 3], &[a, b, c]: &[DVec3; 3], point: DVec3) -> DVec2 {
     let v = (ab.cross(at).dot(full) / whole).clamp(0.0, 1.0 - u);
     let [a, b, c] = uvs.map(Vec2::as_dvec2);
     a * (1.0 - u - v) + b * u + c * v
-}
-
-/// Alpha from 0 to 255 at a place of the texture, both coordinates from 0 to 1.
-fn alpha(texture: &Texture, filter: Filter, wrap: Wrap, place: DVec2) -> f64 {
-    let [width, height] = [texture.width(), texture.height()];
-    let (x, y) = (place.x * f64::from(width), place.y * f64::from(height));
-    match filter {
-        // The conversion rounds down, and maps NaN to 0.
-        Filter::Nearest => f64::from(texture.alpha((x as u32).min(width - 1), (y as u32).min(height - 1))),
-        Filter::Bilinear => {
-            let (columns, right) = pair(x, width, wrap);
-            let (rows, up) = pair(y, height, wrap);
-            let row = |y: u32| {
-                let [left, next] = columns.map(|x| f64::from(texture.alpha(x, y)));
-                left * (1.0 - right) + next * right
-            };
-            row(rows[0]) * (1.0 - up) + row(rows[1]) * up
-        }
-    }
-}
-
-/// The two texels around a position along one axis, and the weight of the second.
-fn pair(position: f64, size: u32, wrap: Wrap) -> ([u32; 2], f64) {
-    let from_center = position - 0.5;
-    let first = from_center.floor();
-    let texel = |index: f64| match wrap {
-        Wrap::Repeat => index.rem_euclid(f64::from(size)) as u32,
-        Wrap::Clamp | Wrap::Mirror => (index as u32).min(size - 1),
-    };
-    ([texel(first), texel(first + 1.0)], from_center - first)
 }

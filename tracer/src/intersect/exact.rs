@@ -1,5 +1,7 @@
 //! Exact intersection of one ray with one primitive, in `f64`.
 
+use glam::{DVec3, Vec3};
+
 use crate::compile::Item;
 use crate::frame::{EyeTriangle, PreparedFrame};
 use crate::rays::{PrimitiveId, Ray};
@@ -39,6 +41,41 @@ impl PreparedFrame {
             Item::Sphere(_) | Item::Triangle(_) | Item::Disk(_) => 0,
         };
         (item, position)
+    }
+
+    /// Unit normal on the front of a primitive at one of its points; zero on a triangle without an area.
+    pub(crate) fn front_normal(&self, primitive: PrimitiveId, point: DVec3) -> DVec3 {
+        let PrimitiveId { item, triangle } = primitive;
+        if item >= self.items.first_plane() {
+            return self.planes[(item - self.items.first_plane()) as usize].normal;
+        }
+        match self.items.get(item) {
+            Item::Sphere(index) => {
+                let outward = self.spheres[index].normal(point);
+                if self.scene().spheres[index].inside_out { -outward } else { outward }
+            }
+            Item::Triangle(index) => self.triangles[index].normal,
+            Item::Disk(index) => self.disks[index].plane.normal,
+            Item::Model(index) => {
+                let instance = &self.instances[index];
+                let [a, b, c] = instance.mesh.corners(triangle).map(Vec3::as_dvec3);
+                // Scaled first: the cross product of a tiny triangle may underflow.
+                let normal =
+                    (instance.normals * (b - a).cross(c - a).normalize_or_zero()).normalize_or_zero();
+                if instance.linear.determinant() < 0.0 { -normal } else { normal }
+            }
+        }
+    }
+
+    /// Whether the shading normals of a primitive are its geometric ones, apart from normal maps.
+    pub(crate) fn is_flat(&self, PrimitiveId { item, .. }: PrimitiveId) -> bool {
+        item >= self.items.first_plane()
+            || !matches!(self.items.get(item), Item::Model(index) if self.instances[index].smooth)
+    }
+
+    /// Whether all points of a primitive are in one plane.
+    pub(crate) fn is_planar(&self, PrimitiveId { item, .. }: PrimitiveId) -> bool {
+        item >= self.items.first_plane() || !matches!(self.items.get(item), Item::Sphere(_))
     }
 
     /// Distance of the hit of a ray with one primitive. Of the primitive that the ray starts on only the far side counts,

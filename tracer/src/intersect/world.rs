@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::Hit;
 use crate::compile::Item;
 use crate::frame::PreparedFrame;
-use crate::rays::{PrimitiveId, RayBlock};
+use crate::rays::{HitBlock, PrimitiveId, RayBlock};
 use crate::simd::LANES;
 
 /// The hit of a ray with the scene.
@@ -77,7 +77,8 @@ impl PreparedFrame {
     /// to the bit. Rays behind the sixteenth are ignored.
     pub fn closest_hits(&self, rays: &[RaySegment]) -> [Option<RayHit>; LANES] {
         let block = self.block_of(rays);
-        let hits = self.closest_hits_of(&block);
+        let mut hits = HitBlock::NONE;
+        self.closest_hits_of(&block, u32::MAX, &mut hits);
         std::array::from_fn(|lane| Some(self.in_scene(&self.hit_in(&block, &hits, lane)?)))
     }
 

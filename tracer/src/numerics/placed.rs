@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::scene::{Attenuation, Light, LightKind, Scene};
+use crate::scene::{Attenuation, CameraKind, Light, LightKind, Scene};
 
 /// The scene scaled by `factor`, then moved by `offset`. Lengths and lights scale such that the picture stays the
 /// same, bit for bit for powers of two without an offset.
@@ -11,6 +11,9 @@ pub(super) fn placed(scene: &Scene, factor: f64, offset: DVec3) -> Scene {
     let mut scene = scene.clone();
     scene.camera.position = place(scene.camera.position);
     scene.camera.look_at = place(scene.camera.look_at);
+    if let CameraKind::Orthographic { view_height } = &mut scene.camera.kind {
+        *view_height *= factor;
+    }
     scene.lights.iter_mut().for_each(|light| place_light(light, factor, place));
     for model in &mut scene.models {
         model.translate = place(model.translate);

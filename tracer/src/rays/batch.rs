@@ -15,13 +15,15 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Whether the rays are those of a camera.
+    pub(super) of_camera: bool,
 }
 
 impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        Self { frame, blocks, places: TileRays::empty() }
+        Self { frame, blocks, places: TileRays::empty(), of_camera: false }
     }
 
     /// Removes all rays.
@@ -73,6 +75,10 @@ impl SurfaceSource for RayBatch<'_> {
         LocalBatch(Box::new(std::array::from_fn(|block| self.blocks[block].local(instance))))
     }
 
+    fn are_of_camera(&self) -> bool {
+        self.of_camera
+    }
+
     fn places(&self) -> &TileRays {
         &self.places
     }
@@ -83,7 +89,7 @@ pub(crate) struct LocalBatch(Box<[LocalBlock; BLOCKS]>);
 
 impl LocalRays<RayBatch<'_>> for LocalBatch {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
+    fn origins<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
         self.0[block].origins(simd)
     }
 

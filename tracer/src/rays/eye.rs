@@ -1,60 +1,62 @@
-//! Tiles of the camera: rays that start at the origin of eye space.
+//! Tiles of a pinhole camera: rays that start at the origin of eye space.
 
 use glam::DVec3;
 
-use super::{BLOCKS, LocalRays, PrimitiveId, Projection, Ray, RaySource, SurfaceSource, TileRays};
-use crate::frame::{Instance, PreparedFrame};
+use super::{
+    BLOCKS, CameraTile, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource,
+    TileRays, TileSamples,
+};
+use crate::frame::{Affine, Instance, PinholeRays, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, three};
 
-/// The rays of one tile of a frame.
+/// The rays of one tile of a frame with a pinhole camera.
 pub(crate) struct EyeTile<'a> {
-    pub frame: &'a PreparedFrame,
-    pub rays: &'a TileRays,
+    frame: &'a PreparedFrame,
+    camera: &'a PinholeRays,
+    samples: TileSamples<'a>,
     /// Projection of eye space.
-    pub projection: Projection,
-    /// Bits of the live rays of each block.
-    pub live: [u32; BLOCKS],
+    projection: Projection,
     /// Error bounds of coincident surfaces in the tile's picture and in depth: see [`Projection::drift`].
     drift: [f32; 2],
-    /// Samples along a side of a pixel, in units of the tile.
-    grid: f64,
     /// Size of the tile's picture relative to that of the frame.
     enlarged: f64,
-    /// The tile's centre, in samples of the tile from the top left corner of the picture.
-    center: [f64; 2],
     /// Direction through the tile's centre, and the steps to the right and down.
     steps: [DVec3; 3],
     rounded_steps: [[f32; 3]; 3],
 }
 
 impl<'a> EyeTile<'a> {
-    /// Rays around `center`, in samples from the top left corner of the picture; `grid` samples are along a side of a pixel.
-    pub(crate) fn new(
-        frame: &'a PreparedFrame,
-        rays: &'a TileRays,
-        live: [u32; BLOCKS],
-        center: [f64; 2],
-        grid: u32,
-    ) -> Self {
-        let [right, down] = frame.rays.steps(grid);
-        let enlarged = f64::from(grid) / f64::from(frame.rays.grid());
-        let grid = f64::from(grid);
-        let steps = [frame.rays.through(center[0] / grid, center[1] / grid), right, down];
+    /// The rays of some samples; `camera` is that of the frame.
+    pub(crate) fn new(frame: &'a PreparedFrame, camera: &'a PinholeRays, samples: TileSamples<'a>) -> Self {
+        let [right, down] = camera.steps(samples.grid);
+        let enlarged = samples.enlarged(camera.grid());
+        let [across, along] = samples.middle();
+        let steps = [camera.through(across, along), right, down];
         let rounded_steps = three!(i => steps[i].as_vec3().to_array());
-        let picture = frame.to_picture.enlarged(enlarged).centered(center[0], center[1]);
-        let [near, far] = Projection::drift(&picture, frame.coarsest);
-        let projection = Projection::new(picture, 1.0, false).drifting([near, far], 2.0 * frame.coarsest);
-        let drift = [near, far];
-        Self { frame, rays, projection, drift, grid, enlarged, center, live, steps, rounded_steps }
+        let [x, y] = samples.center;
+        let picture = frame.to_picture.enlarged(enlarged).centered(x, y);
+        let drift = Projection::drift(&picture, frame.coarsest);
+        let projection = Projection::new(picture, 1.0, false).drifting(drift, 2.0 * frame.coarsest);
+        Self { frame, camera, samples, projection, drift, enlarged, steps, rounded_steps }
+    }
+}
+
+impl<'a> EyeTile<'a> {
+    /// The frame, for as long as it lives.
+    pub(super) fn of_frame(&self) -> &'a PreparedFrame {
+        self.frame
     }
 
-    /// Projection of an instance's mesh.
-    #[inline(always)]
-    pub(crate) fn projection_of(&self, instance: &Instance) -> Projection {
-        let [x, y] = self.center;
-        Projection::new(instance.to_picture.enlarged(self.enlarged).centered(x, y), 1.0, false)
-            .drifting(self.drift, f64::from(instance.drift))
+    /// Map from eye space to the tile's picture.
+    pub(super) fn map(&self) -> Affine {
+        let [x, y] = self.samples.center;
+        self.frame.to_picture.enlarged(self.enlarged).centered(x, y)
+    }
+
+    /// Error bounds of coincident surfaces in the tile's picture and in depth.
+    pub(super) fn drift(&self) -> [f32; 2] {
+        self.drift
     }
 }
 
@@ -66,13 +68,12 @@ impl RaySource for EyeTile<'_> {
 
     #[inline(always)]
     fn live(&self, block: usize) -> u32 {
-        self.live[block]
+        self.samples.live[block]
     }
 
     fn ray(&self, block: usize, lane: usize) -> Ray {
-        let x = self.center[0] + f64::from(self.rays.x[block].0[lane]);
-        let y = self.center[1] + f64::from(self.rays.y[block].0[lane]);
-        Ray { origin: DVec3::ZERO, direction: self.frame.rays.through(x / self.grid, y / self.grid) }
+        let [across, along] = self.samples.place(block, lane);
+        Ray { origin: DVec3::ZERO, direction: self.camera.through(across, along) }
     }
 
     #[inline(always)]
@@ -88,7 +89,7 @@ impl SurfaceSource for EyeTile<'_> {
 
     #[inline(always)]
     fn directions<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
-        combine(simd, &self.rounded_steps, self.rays, block)
+        combine(simd, &self.rounded_steps, self.samples.rays, block)
     }
 
     #[inline(always)]
@@ -97,8 +98,17 @@ impl SurfaceSource for EyeTile<'_> {
     }
 
     #[inline(always)]
+    fn are_of_camera(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
     fn places(&self) -> &TileRays {
-        self.rays
+        self.samples.rays
+    }
+
+    fn eye(&self) -> Option<&EyeTile<'_>> {
+        Some(self)
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalTile {
@@ -113,7 +123,36 @@ impl SurfaceSource for EyeTile<'_> {
     }
 }
 
-/// A tile of the camera in the space of a mesh.
+impl CameraTile for EyeTile<'_> {
+    #[inline(always)]
+    fn samples(&self) -> &TileSamples<'_> {
+        &self.samples
+    }
+}
+
+impl PictureTile for EyeTile<'_> {
+    const PARALLEL: bool = false;
+    const STARTS: bool = false;
+
+    #[inline(always)]
+    fn picture(&self) -> &TileRays {
+        self.samples.rays
+    }
+
+    #[inline(always)]
+    fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    #[inline(always)]
+    fn projection_of(&self, instance: &Instance) -> Projection {
+        let [x, y] = self.samples.center;
+        Projection::new(instance.to_picture.enlarged(self.enlarged).centered(x, y), 1.0, false)
+            .drifting(self.drift, f64::from(instance.drift))
+    }
+}
+
+/// A tile of a pinhole camera in the space of a mesh.
 pub(crate) struct LocalTile {
     origin: [f32; 3],
     steps: [[f32; 3]; 3],
@@ -121,19 +160,19 @@ pub(crate) struct LocalTile {
 
 impl LocalRays<EyeTile<'_>> for LocalTile {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, _: usize) -> Vec3x16<S> {
+    fn origins<S: Simd>(&self, simd: S, _: &EyeTile<'_>, _: usize) -> Vec3x16<S> {
         Vec3x16::splat(simd, self.origin)
     }
 
     #[inline(always)]
     fn directions<S: Simd>(&self, simd: S, tile: &EyeTile<'_>, block: usize) -> Vec3x16<S> {
-        combine(simd, &self.steps, tile.rays, block)
+        combine(simd, &self.steps, tile.samples.rays, block)
     }
 }
 
-/// Directions of the rays of a block, from the direction of the tile's centre and the steps to the right and down.
+/// Vectors of the rays of a block (directions, or origins), from that of the tile's centre and the steps to the right and down.
 #[inline(always)]
-fn combine<S: Simd>(simd: S, steps: &[[f32; 3]; 3], rays: &TileRays, block: usize) -> Vec3x16<S> {
+pub(super) fn combine<S: Simd>(simd: S, steps: &[[f32; 3]; 3], rays: &TileRays, block: usize) -> Vec3x16<S> {
     let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
     let [center, right, down] = three!(i => Vec3x16::splat(simd, steps[i]));
     center.add(right.scale(x)).add(down.scale(y))

@@ -47,6 +47,12 @@ impl HitBlock {
         PrimitiveId { item: self.item.0[lane], triangle: self.triangle.0[lane] }
     }
 
+    /// Sets a lane to a lane of another block.
+    pub(crate) fn put(&mut self, lane: usize, other: &HitBlock, from: usize) {
+        self.set(lane, other.slot(from));
+        self.coincident = self.coincident & !(1 << lane) | (other.coincident >> from & 1) << lane;
+    }
+
     /// Sets the primitive that a ray hits.
     pub(crate) fn set(&mut self, lane: usize, primitive: PrimitiveId) {
         self.item.0[lane] = primitive.item;

@@ -158,27 +158,40 @@ impl Frustum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::PinholeRays;
-    use crate::scene::{Camera, FrameView, Quality};
+    use crate::frame::CameraRays;
+    use crate::scene::{Camera, CameraKind, FrameView, Quality};
 
-    #[test]
-    fn samples_of_the_camera_are_projected_to_their_places() {
+    fn rays(kind: CameraKind) -> CameraRays {
         let camera = Camera {
             position: DVec3::new(1.0, 2.0, 3.0),
             look_at: DVec3::new(1.0, 2.0, -5.0),
             up: DVec3::Y,
             fov: 90.0,
             zoom: 1.0,
-            kind: crate::scene::CameraKind::PINHOLE,
+            kind,
         };
         let quality = Quality::default();
-        let rays =
-            PinholeRays::new(&FrameView { camera, width: 64, height: 48, samples: 4, spin: 0.0, quality });
+        CameraRays::new(&FrameView { camera, width: 64, height: 48, samples: 4, spin: 0.0, quality }, 1.0)
+    }
+
+    #[test]
+    fn samples_of_the_camera_are_projected_to_their_places() {
+        let CameraRays::Pinhole(rays) = rays(CameraKind::PINHOLE) else { panic!("another camera") };
         let projection = Projection::new(rays.picture_map().centered(40.0, 60.0), 1.0, false);
         let [a, b, g] = projection.exact(rays.of_sample(43, 57) * 7.0).to_array();
         assert!(
             (g - 7.0).abs() < 1e-9 && (a / g - 3.5).abs() < 1e-9 && (b / g + 2.5).abs() < 1e-9,
             "{a} {b} {g}"
         );
+    }
+
+    #[test]
+    fn samples_of_parallel_rays_are_projected_to_their_places() {
+        let kind = CameraKind::Orthographic { view_height: 3.0 };
+        let CameraRays::Parallel(rays) = rays(kind) else { panic!("another camera") };
+        let projection = Projection::new(rays.picture_map().shifted(40.0, 60.0), 1.0, true);
+        let point = rays.origin(43.5 / 2.0, 57.5 / 2.0) + rays.direction() * 7.0;
+        let [a, b, g] = projection.exact(point).to_array();
+        assert!((g - 7.0).abs() < 1e-9 && (a - 3.5).abs() < 1e-9 && (b + 2.5).abs() < 1e-9, "{a} {b} {g}");
     }
 }

@@ -24,6 +24,11 @@ pub struct RayCounts {
     pub secondary: u64,
 }
 
+impl RayCounts {
+    /// Largest number of reflected and transmitted rays of one ray from the camera.
+    pub const MAX_SECONDARY: u16 = 1024;
+}
+
 impl AddAssign for RayCounts {
     fn add_assign(&mut self, other: Self) {
         self.primary += other.primary;

@@ -3,7 +3,7 @@
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.
 
-use super::{PrimitiveId, Ray, TileRays};
+use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, f32x16};
@@ -31,6 +31,9 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     /// Whether all rays start at the origin of eye space.
     const COMMON_ORIGIN: bool;
 
+    /// Whether the rays are those of the camera, which do not see a background that is not visible.
+    fn are_of_camera(&self) -> bool;
+
     /// The rays in the space of a mesh.
     type Local: LocalRays<Self>;
 
@@ -43,8 +46,18 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     /// Places of the rays in the camera's picture.
     fn places(&self) -> &TileRays;
 
+    /// The tile of a pinhole camera that the rays are, if they are one.
+    fn eye(&self) -> Option<&EyeTile<'_>> {
+        None
+    }
+
     /// The rays in the space of an instance's mesh, or in eye space.
     fn local(&self, instance: Option<&Instance>) -> Self::Local;
+
+    /// Length of the way of the light before a ray, in eye units: that of the rays between it and the camera.
+    fn way_before(&self, _block: usize, _lane: usize) -> f64 {
+        0.0
+    }
 
     /// Points at `t` along the rays of a block. `direction` is that of [`SurfaceSource::directions`].
     #[inline(always)]
@@ -54,10 +67,52 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     }
 }
 
+/// Tiles of a camera with a projection.
+pub(crate) trait CameraTile: SurfaceSource + PictureTile {
+    /// The samples of the tile.
+    fn samples(&self) -> &TileSamples<'_>;
+}
+
+/// Tiles that are a picture of the scene: their closest hits are found together, see `intersect::tile`.
+pub(crate) trait PictureTile: RaySource {
+    /// Whether rays are parallel and start at depth 0, and do not start at a point.
+    const PARALLEL: bool;
+
+    /// Whether the rays start at depths of their own, on one primitive.
+    const STARTS: bool;
+
+    /// Places of the rays in the picture.
+    fn picture(&self) -> &TileRays;
+
+    /// Projection of eye space.
+    fn projection(&self) -> &Projection;
+
+    /// Projection of an instance's mesh.
+    fn projection_of(&self, instance: &Instance) -> Projection;
+
+    /// Depth of the point at `t` along a ray.
+    #[inline(always)]
+    fn depth(&self, _block: usize, _lane: usize, t: f64) -> f64 {
+        t
+    }
+
+    /// Whether the rays start on this primitive.
+    #[inline(always)]
+    fn is_start(&self, _primitive: PrimitiveId) -> bool {
+        false
+    }
+
+    /// Bits of the rays of a block that start before a closeness with these bounds: those that may, and those that do for certain.
+    #[inline(always)]
+    fn started<S: Simd>(&self, _: S, _block: usize, _low: f32x16<S>, _high: f32x16<S>) -> [u32; 2] {
+        [0xffff; 2]
+    }
+}
+
 /// The rays of a source in another space, rounded.
 pub(crate) trait LocalRays<R> {
     /// Origins of the rays of a block.
-    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
+    fn origins<S: Simd>(&self, simd: S, rays: &R, block: usize) -> Vec3x16<S>;
 
     /// Directions of the rays of a block.
     fn directions<S: Simd>(&self, simd: S, rays: &R, block: usize) -> Vec3x16<S>;

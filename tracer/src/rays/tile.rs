@@ -42,6 +42,40 @@ pub(crate) const fn place(block: usize, lane: usize) -> (usize, usize) {
     (block % 4 * 4 + lane % 4, block / 4 * 4 + lane / 4)
 }
 
+/// Samples of the camera's picture that are traced together.
+#[derive(Clone, Copy)]
+pub(crate) struct TileSamples<'a> {
+    /// Places of the samples relative to `center`.
+    pub rays: &'a TileRays,
+    /// Bits of the live samples of each block.
+    pub live: [u32; BLOCKS],
+    /// The tile's centre, in samples from the top left corner of the picture.
+    pub center: [f64; 2],
+    /// Samples along a side of a pixel, in the unit of the places.
+    pub grid: u32,
+}
+
+impl TileSamples<'_> {
+    /// Place of a sample, in pixels from the top left corner of the picture.
+    #[inline(always)]
+    pub(crate) fn place(&self, block: usize, lane: usize) -> [f64; 2] {
+        let grid = f64::from(self.grid);
+        let x = self.center[0] + f64::from(self.rays.x[block].0[lane]);
+        let y = self.center[1] + f64::from(self.rays.y[block].0[lane]);
+        [x / grid, y / grid]
+    }
+
+    /// Place of the tile's centre, in pixels from the top left corner of the picture.
+    pub(crate) fn middle(&self) -> [f64; 2] {
+        self.center.map(|along| along / f64::from(self.grid))
+    }
+
+    /// Size of the tile's picture relative to that of a frame with `grid` samples along a side of a pixel.
+    pub(crate) fn enlarged(&self, grid: u32) -> f64 {
+        f64::from(self.grid) / f64::from(grid)
+    }
+}
+
 /// The places of a tile's rays in the picture of a projection, and rectangles around its blocks.
 #[derive(Clone)]
 pub(crate) struct TileRays {

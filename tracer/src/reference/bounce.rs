@@ -95,7 +95,8 @@ impl Oracle {
         let leave = |direction: DVec3, share: DVec3, bodies: Bodies| {
             let weight = traveller.weight * share;
             let origin = surface.clear_origin();
-            let ray = Ray { origin, direction: direction.normalize(), place: surface.place };
+            let before = surface.before + surface.way;
+            let ray = Ray { origin, direction: direction.normalize(), place: surface.place, before };
             let contributes = weight.max_element() >= least && weight.max_element() > 0.0;
             contributes.then_some(Traveller { ray, starts_on: Some(surface.primitive), weight, bodies })
         };

@@ -12,6 +12,8 @@
 //!   visibility   closest hits, and the light that passes between two points
 //!   surface      the point that a ray hits
 //!   texture      texture lookups
+//!   pyramid      textures in ever smaller sizes
+//!   footprint    texture lookups over the part of a surface that a sample shows
 //!   material     colours and tilted normals of a surface point
 //!   terminator   where shadow rays start
 //!   extent       the share of a light that arrives, also of one with a radius
@@ -30,8 +32,10 @@ mod bounce;
 mod camera;
 mod extent;
 mod flatten;
+mod footprint;
 mod material;
 mod optics;
+mod pyramid;
 mod shading;
 mod shape;
 mod sky;
@@ -49,9 +53,10 @@ use glam::DVec3;
 use crate::image::RgbImage;
 use crate::intersect::{RayHit, RaySegment};
 use crate::mesh::CompiledMesh;
-use crate::scene::{FrameView, Scene};
+use crate::scene::{Filter, FrameView, Scene, TextureMap};
 use crate::srgb;
 use crate::texture::Texture;
+use pyramid::Level;
 use shape::Primitive;
 use visibility::Found;
 
@@ -66,6 +71,8 @@ pub struct Oracle {
     primitives: Vec<Primitive>,
     /// Points on each light: see [`Oracle::with_light_points`].
     light_points: Vec<Vec<Vec<DVec3>>>,
+    /// The levels of each texture; none if no texture is filtered by them.
+    pyramids: Vec<Vec<Level>>,
     size: f64,
 }
 
@@ -80,8 +87,12 @@ impl Oracle {
     ) -> Self {
         let primitives = flatten::flatten(scene, meshes, view);
         let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
+        let filter_of = |map: &TextureMap| view.quality.filter.unwrap_or(map.filter);
+        let trilinear = scene.textures.iter().any(|map| filter_of(map) == Filter::Trilinear);
+        let pyramids =
+            textures.iter().filter(|_| trilinear).map(|texture| pyramid::levels(texture)).collect();
         let (scene, textures) = (scene.clone(), textures.to_vec());
-        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), size }
+        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), pyramids, size }
     }
 
     /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,

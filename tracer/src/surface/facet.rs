@@ -181,10 +181,10 @@ impl Surfaces {
         let point = direction.scale(distance / along);
         let ng = normal.scale(splat(simd, 1.0).copysign(-along));
         let bias = surface.put_plane(simd, &group, point, ng, reach);
-        if frame.features.smooth {
+        if frame.features.shaded_normals() {
             group.put(simd, ng, &mut surface.ns);
         }
-        if frame.features.sided {
+        if frame.features.emissive {
             surface.set_front(lanes, bits(along.simd_lt(zero)));
         }
         let sound = bias.simd_le(splat(simd, f32::MAX)) & along.abs().simd_le(splat(simd, f32::MAX));
@@ -245,7 +245,7 @@ impl Batch {
             Item::Sphere(_) | Item::Disk(_) => return,
         };
         let [a, b, c] = corners;
-        let to_a = a.sub(space.rays.origins(simd, 0));
+        let to_a = a.sub(space.rays.origins(simd, rays, 0));
         let normal = b.sub(a).cross(c.sub(a));
         let normal = normal.scale(to_unit(simd, normal.size()));
         // n.d is the same in eye space and in mesh space, up to the scale of the normal.

@@ -7,18 +7,34 @@
 //!   exact          spheres, planes, and triangles too thin for f32, ray by ray in f64
 //!   space          the rays in the space of a mesh
 //!   group          the lanes of a block that hit one item
-//!   texel          textures
+//!   terminator     origins of shadow rays on smooth surfaces
+//!   uv             texture coordinates
+//!   texel          factors of colours by textures, vertex colours and patterns
+//!   filter         texels around a point
+//!   footprint      how much of a texture a sample shows
 //!   vertex_color   vertex colours
+//!   detail         patterns, normal maps, textures of spheres and planes, ray by ray in f64
+//!   place          points in the spaces of objects, the world and textures
+//!   pattern        cubes and squares in two colours
+//!   normal_map     shading normals tilted by textures
 //!   material       colours and exponents of the materials
 //! ```
 
+mod detail;
 mod exact;
 mod facet;
+mod filter;
+mod footprint;
 mod group;
 mod material;
+mod normal_map;
+mod pattern;
+mod place;
 mod space;
+mod terminator;
 mod texel;
 mod triangles;
+mod uv;
 mod vertex_color;
 
 use crate::compile::Item;
@@ -28,9 +44,12 @@ use crate::rays::{BLOCKS, HitBlock, SurfaceSource};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Indices, Lanes, Simd, SimdFloat, each_bit, f32x16, mask_of, splat};
 use facet::Facets;
+use footprint::Cone;
 use group::Group;
 pub(crate) use material::Materials;
+use normal_map::Untilted;
 use space::Space;
+use terminator::Lifts;
 use texel::Texels;
 
 /// Distance of the origin of a shadow ray from its surface, relative to the largest coordinates that went into the point: four
@@ -44,13 +63,14 @@ pub(crate) struct SurfaceBlock {
     pub hit: u32,
     /// Bits of the hits that lights reach: not those of unlit materials.
     pub lit: u32,
-    /// Bits of the lanes that hit the front side. Only set if a material of the scene emits or transmits light.
+    /// Bits of the lanes that hit the front side. Only set if a material of the scene emits light.
     pub front: u32,
     /// Points in eye space.
     pub point: [Lanes; 3],
     /// Geometric unit normals on the viewer's side.
     pub ng: [Lanes; 3],
-    /// Shading unit normals, on the same side as `ng`. Only set if a model of the scene is smooth: else they equal `ng`.
+    /// Shading unit normals, on the same side as `ng`. Only set if a model of the scene is smooth or a material has a normal map: else
+    /// they equal `ng`.
     pub ns: [Lanes; 3],
     /// Unit vectors to the viewer. Only set if a material of the scene is specular.
     pub to_viewer: [Lanes; 3],
@@ -107,6 +127,12 @@ pub(crate) struct Surfaces {
     pub blocks: [SurfaceBlock; BLOCKS],
     /// Factors of colours by textures and vertex colours; only in scenes with either.
     texels: Option<Box<Texels>>,
+    /// Only in frames with textures that are filtered by footprints.
+    cone: Option<Cone>,
+    /// Only in frames with shadows on interpolated normals.
+    lifts: Option<Box<Lifts>>,
+    /// Only in scenes with normal maps.
+    untilted: Option<Box<Untilted>>,
     facets: Facets,
 }
 
@@ -114,7 +140,9 @@ impl Surfaces {
     /// Surfaces for [`Surfaces::find`] to set.
     pub(crate) fn empty(frame: &PreparedFrame) -> Self {
         let blocks = std::array::from_fn(|_| SurfaceBlock::EMPTY);
-        Self { blocks, texels: Texels::for_scene(frame), facets: Facets::new() }
+        let (texels, lifts) = (Texels::for_scene(frame), Lifts::for_frame(frame));
+        let (cone, untilted) = (Cone::for_frame(frame), Untilted::for_frame(frame));
+        Self { blocks, texels, cone, lifts, untilted, facets: Facets::new() }
     }
 
     /// Finds the surface points of the hits of a source's blocks.
@@ -131,6 +159,9 @@ impl Surfaces {
             self.facets.begin_block(block);
             if let Some(texels) = &mut self.texels {
                 texels.clear(block);
+            }
+            if let Some(lifts) = &mut self.lifts {
+                lifts.clear(block);
             }
             while rest != 0 {
                 let item = hits[block].item.0[rest.trailing_zeros() as usize];
@@ -160,6 +191,9 @@ impl Surfaces {
                 let backwards = splat(simd, -1.0) / direction.dot(direction).sqrt();
                 direction.scale(backwards).store(&mut surface.to_viewer);
             }
+        }
+        if frame.features.checkered || frame.features.normal_mapped {
+            self.add_details(rays, hits);
         }
         if hits.iter().any(|hits| hits.coincident != 0) {
             self.raise_bias_of_coincident(frame, hits);
@@ -229,7 +263,8 @@ impl Surfaces {
         if item >= frame.items.first_plane() {
             let index = (item - frame.items.first_plane()) as usize;
             let (normal, material) = (frame.planes[index].normal, frame.scene().planes[index].material);
-            return self.blocks[group.block].put_analytic(group, item, (material, false), |_| normal);
+            self.blocks[group.block].put_analytic(group, item, (material, false), |_| normal);
+            return self.texture_of(group, hits, material);
         }
         match frame.items.get(item) {
             Item::Sphere(index) => {
@@ -237,6 +272,7 @@ impl Surfaces {
                 let described = &frame.scene().spheres[index];
                 let material = (described.material, described.inside_out);
                 self.blocks[group.block].put_analytic(group, item, material, |point| sphere.normal(point));
+                self.texture_of(group, hits, described.material);
             }
             Item::Disk(index) => {
                 let (normal, material) =
@@ -245,6 +281,25 @@ impl Surfaces {
             }
             Item::Triangle(index) => self.put_single_triangle(simd, group, hits, item, index, space),
             Item::Model(index) => self.put_model(simd, group, hits, item, index, space),
+        }
+    }
+
+    /// Sets the texture factors of lanes that hit a sphere or a plane of a material.
+    #[inline(always)]
+    fn texture_of<S: Simd, R: SurfaceSource>(
+        &mut self,
+        group: &Group<'_, R, S>,
+        hits: &HitBlock,
+        material: u32,
+    ) {
+        let frame = group.rays.frame();
+        if !frame.features.textured {
+            return;
+        }
+        let material = &frame.scene().materials[material as usize];
+        if material.texture.is_some() || material.emission_texture.is_some() {
+            let footprint = self.footprint(group, hits);
+            self.texture_exactly(group.rays, (group.block, group.lanes), hits, footprint);
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::group::{Group, ThreeVectors, barycentric, put};
 use super::space::{Space, space_of};
-use super::texel::CornerUvs;
+use super::terminator::SmoothPoints;
+use super::uv::CornerUvs;
 use super::vertex_color::CornerColors;
 use super::{Surfaces, material_of};
 use crate::bvh::WIDTH;
@@ -114,10 +115,11 @@ impl Surfaces {
     ) {
         let &Group { rays, block, lanes, direction, .. } = group;
         let frame = rays.frame();
+        let footprint = if corners.uvs.is_some() { self.footprint(group, hits) } else { None };
         let surface = &mut self.blocks[block];
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let [a, b, c] = corners.places;
-        let to_a = a.sub(space.rays.origins(simd, block));
+        let to_a = a.sub(space.rays.origins(simd, rays, block));
         let (ab, ac) = (b.sub(a), c.sub(a));
         let normal = ab.cross(ac);
         let normal = normal.scale(to_unit(simd, normal.size()));
@@ -142,10 +144,15 @@ impl Surfaces {
                 select(usable, turned, ng.0[i])
             }));
             group.put(simd, ns, &mut surface.ns);
-        } else if frame.features.smooth {
+            if let Some(lifts) = &mut self.lifts {
+                let normals = &[na, nb, nc];
+                let points = SmoothPoints { at, ab, ac, weights: [u, v], normals, against, ng };
+                lifts.put(simd, group, space, &points);
+            }
+        } else if frame.features.shaded_normals() {
             group.put(simd, ng, &mut surface.ns);
         }
-        if frame.features.sided {
+        if frame.features.emissive {
             surface.set_front(lanes, bits(along.simd_lt(zero)));
         }
         if let (true, Some(texels)) = (corners.uvs.is_some() || corners.colors.is_some(), &mut self.texels) {
@@ -153,7 +160,8 @@ impl Surfaces {
             let weights = barycentric(simd, at, ab, ac);
             let materials = &surface.material;
             if let Some(uvs) = &corners.uvs {
-                texels.fill(frame, block, lanes, materials, &uvs.at(simd, weights));
+                let uv = uvs.at(simd, weights).with(footprint);
+                texels.fill(frame, block, lanes, materials, &uv);
             }
             if let Some(colors) = &corners.colors {
                 texels.tint(simd, frame, block, lanes, materials, colors.at(simd, weights));

@@ -33,11 +33,15 @@ pub enum Filter {
     Nearest,
     /// The four texels around, weighted by nearness, in linear light.
     Bilinear,
+    /// Bilinear in the two levels of a pyramid of ever smaller pictures whose texels are next in size to a pixel, weighted by
+    /// nearness (Williams, "Pyramidal Parametrics", 1983). Alpha cut-outs are filtered as by `Bilinear`.
+    Trilinear,
 }
 
 impl Filter {
     /// Each value with its word.
-    pub const WORDS: [(&'static str, Self); 2] = [("nearest", Self::Nearest), ("bilinear", Self::Bilinear)];
+    pub const WORDS: [(&'static str, Self); 3] =
+        [("nearest", Self::Nearest), ("bilinear", Self::Bilinear), ("trilinear", Self::Trilinear)];
 }
 
 /// Texels outside of [0, 1], in both directions of a picture.

@@ -1,26 +1,39 @@
-//! Textures: pictures on surfaces, and how they are looked up.
+//! Textures: pictures on surfaces and of skies, and how they are looked up.
 //!
 //! A texture is one immutable blob of bytes, named by its BLAKE3 hash like a compiled mesh. The master makes it of a picture,
 //! and every worker receives it as it is.
+//!
+//! ```text
+//!   blob              its bytes
+//!   alpha             what alpha cuts out and hides
+//!   shared_exponent   linear RGB in four bytes, for high dynamic range
+//!   map               filter, wrap, scale and offset of a lookup
+//!   uv                texture coordinates with and without whole repeats
+//! ```
 
+mod alpha;
 mod blob;
+mod lookup;
 mod map;
+mod pyramid;
+mod shared_exponent;
 mod uv;
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-pub use blob::{FORMAT_VERSION, MAGIC, Texture};
+pub use blob::{FORMAT_VERSION, MAGIC, Replaced, Texture};
 pub use map::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};
+pub use shared_exponent::MAX_CHANNEL;
 pub use uv::{MAX_UV, are_usable, split_repeats, without_repeats};
 
-pub(crate) use blob::LEAST_ALPHA;
+pub(crate) use alpha::LEAST_ALPHA;
 #[cfg(feature = "import")]
 pub(crate) use blob::check_size;
 pub(crate) use uv::is_usable;
 
-/// Most texels of one texture: 8192 x 8192, 192 MiB.
+/// Most texels of one texture: 8192 x 8192, 192 or 256 MiB.
 pub const MAX_TEXELS: u64 = 1 << 26;
 
 /// The name of a texture: BLAKE3 of its bytes.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use rayfarm_tracer::scene::{FrameView, Quality, load};
+use rayfarm_tracer::scene::{CameraKind, FovAxis, FrameView, Quality, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 
 const SCENES: [&str; 5] = ["room.toml", "lights.toml", "textured.toml", "instances.toml", "product.toml"];
@@ -63,6 +63,29 @@ fn a_frame_cut_into_rows_is_the_same_frame_at_any_width_and_number_of_samples() 
                 let same = pieces.eq(whole);
                 assert!(same, "{name}, {width} x {height}, grid {grid}, {quality:?}, cut at {cuts:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_frame_cut_into_rows_is_the_same_frame_with_every_kind_of_camera() {
+    let mut state = 0x0bad_cafe;
+    let horizontal = CameraKind::Pinhole { fov_axis: FovAxis::Horizontal };
+    for name in SCENES {
+        let scene = compiled(name);
+        let mut camera = scene.scene().camera;
+        let view_height = 0.7 * camera.position.distance(camera.look_at);
+        for kind in [horizontal, CameraKind::Orthographic { view_height }, CameraKind::Fisheye] {
+            camera.kind = kind;
+            let (width, height) = (1 + next(&mut state) % 70, 1 + next(&mut state) % 50);
+            let (grid, adaptive) = (1 + next(&mut state) % 3, next(&mut state).is_multiple_of(2));
+            let quality = Quality { adaptive, ..Quality::default() };
+            let view = FrameView { camera, width, height, samples: grid * grid, spin: 0.0, quality };
+            let frame = PreparedFrame::new(Arc::clone(&scene), &view).unwrap();
+            let whole = rendered(&frame, 0..height);
+            let cuts = cuts(height, &mut state);
+            let pieces = cuts.windows(2).flat_map(|cut| rendered(&frame, cut[0]..cut[1]));
+            assert!(pieces.eq(whole), "{name}, {kind:?}, {width} x {height}, grid {grid}, cut at {cuts:?}");
         }
     }
 }

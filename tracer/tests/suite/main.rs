@@ -3,7 +3,9 @@
 #![allow(clippy::panic, clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod adaptive;
+mod auxiliary;
 mod build_quality;
+mod cameras;
 mod coincident;
 mod common;
 mod cuts;

@@ -5,7 +5,8 @@ use std::time::Duration;
 use bytes::Bytes;
 use rayfarm_protocol::{Cost, FrameId, Lease, PixelsHeader};
 use rayfarm_scheduler::{Event, WorkerId};
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::RayCounts;
+use rayfarm_tracer::scene::{FrameView, MAX_LIGHTS, MAX_SHADOW_SAMPLES};
 
 use super::Driver;
 use super::reply::Reply;
@@ -28,18 +29,19 @@ pub(crate) enum AnswerError {
 const MORE_ROWS: u64 = 32;
 /// Primary rays of a pixel beyond its samples: at its corners and through its centre.
 const MORE_RAYS: u64 = 4;
-/// Upper bound of the rays that follow from one primary ray, by lights and bounces.
-const RAYS_FROM_ONE: u64 = 1 << 16;
+/// Upper bound of the reflected and transmitted rays of one primary ray.
+const SECONDARY_FROM_ONE: u64 = RayCounts::MAX_SECONDARY as u64;
+/// Upper bound of the shadow rays of one primary ray: from each surface to each point of each light.
+const SHADOW_FROM_ONE: u64 = (1 + SECONDARY_FROM_ONE) * MAX_LIGHTS as u64 * MAX_SHADOW_SAMPLES as u64;
 
 /// Limits the ray counts of a reply, which a worker may set to any number, to what rows of a view can take.
 fn plausible(cost: Cost, view: &FrameView, rows: u32) -> Cost {
     let pixels = u64::from(view.width).saturating_mul(u64::from(rows) + MORE_ROWS);
     let primary = pixels.saturating_mul(u64::from(view.samples) + MORE_RAYS);
-    let others = primary.saturating_mul(RAYS_FROM_ONE);
     Cost {
         primary: cost.primary.min(primary),
-        shadow: cost.shadow.min(others),
-        secondary: cost.secondary.min(others),
+        shadow: cost.shadow.min(primary.saturating_mul(SHADOW_FROM_ONE)),
+        secondary: cost.secondary.min(primary.saturating_mul(SECONDARY_FROM_ONE)),
         ..cost
     }
 }
@@ -116,7 +118,8 @@ mod tests {
         let cut = plausible(absurd, &view(), 8);
         let samples = u64::from(view().width) * 8 * u64::from(view().samples);
         assert!(cut.primary >= samples && cut.primary < 100 * samples, "{cut:?}");
-        assert!(cut.shadow < u64::MAX >> 16 && cut.secondary < u64::MAX >> 16, "{cut:?}");
+        assert_eq!(cut.secondary, cut.primary * 1024, "at most 1024 reflected and transmitted rays");
+        assert!(cut.shadow > cut.secondary && cut.shadow < u64::MAX, "{cut:?}");
         let endless = FrameView { width: u32::MAX, samples: u32::MAX, ..view() };
         assert_eq!(plausible(absurd, &endless, u32::MAX).primary, u64::MAX);
     }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use rayfarm_tracer::scene::Setting;
-use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobForm, KnobValue};
+use rayfarm_tracer::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, NumberRange};
 
 /// Words of a switch.
 const SWITCH: [&str; 2] = ["on", "off"];
@@ -16,7 +16,7 @@ static VALUE_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| KNOBS.iter().map(va
 /// Values of knobs on the command line; each overrides the scene file.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct QualityArgs {
-    given: Vec<(&'static Knob, &'static KnobValue)>,
+    given: Vec<(&'static Knob, GivenValue)>,
 }
 
 impl QualityArgs {
@@ -31,7 +31,9 @@ impl QualityArgs {
 
     /// Whether the command line gives the knob of this name this value.
     pub(crate) fn selects(&self, name: &str, word: &str) -> bool {
-        self.given.iter().any(|(knob, value)| knob.name == name && value.word == Some(word))
+        let is_word =
+            |value: &GivenValue| matches!(value, GivenValue::Listed(value) if value.word == Some(word));
+        self.given.iter().any(|(knob, value)| knob.name == name && is_word(value))
     }
 }
 
@@ -72,12 +74,14 @@ fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
     let arg = Arg::new(knob.option).long(knob.option).value_name(value_name).help(help(knob.summary));
     let arg = match knob.form {
         KnobForm::Count => arg.value_parser(move |text: &str| count(knob, text)),
+        KnobForm::Number(range) => arg.value_parser(move |text: &str| number(range, text)),
         KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => {
             let words = PossibleValuesParser::new(words(knob));
-            arg.value_parser(words.try_map(move |text| knob.value(&text).ok_or("unknown word")))
+            let known = move |text: String| knob.value(&text).map(GivenValue::Listed).ok_or("unknown word");
+            arg.value_parser(words.try_map(known))
         }
     };
-    if knob.form == KnobForm::Switch && knob.best().word == Some("off") {
+    if matches!(knob.form, KnobForm::Switch) && knob.best().word == Some("off") {
         // A switch that is usually off: the option alone turns it on.
         arg.num_args(0..=1).require_equals(true).default_missing_value("on")
     } else {
@@ -89,19 +93,30 @@ fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
 fn words(knob: &'static Knob) -> Vec<&'static str> {
     match knob.form {
         KnobForm::Switch => SWITCH.to_vec(),
-        KnobForm::Word | KnobForm::Fraction | KnobForm::Count => {
-            let best_first = knob.values.iter().rev();
-            best_first.flat_map(|value| value.word.iter().chain(value.aliases).copied()).collect()
+        KnobForm::Word | KnobForm::Fraction | KnobForm::Count | KnobForm::Number(_) => {
+            let values = knob.values.iter().rev().chain(knob.apart);
+            values.flat_map(|value| value.word.iter().chain(value.aliases).copied()).collect()
         }
     }
 }
 
 /// The value with this number, which may have leading zeros.
-fn count(knob: &'static Knob, text: &str) -> Result<&'static KnobValue, String> {
+fn count(knob: &'static Knob, text: &str) -> Result<GivenValue, String> {
     let number = text.parse::<u32>().ok().map(|number| number.to_string());
-    number.and_then(|number| knob.value(&number)).ok_or_else(|| {
+    number.and_then(|number| knob.value(&number)).map(GivenValue::Listed).ok_or_else(|| {
         let numbers: Vec<&str> = knob.values.iter().filter_map(|value| value.word).collect();
         format!("expected one of {}", numbers.join(", "))
+    })
+}
+
+/// A number of a range; whole ones may have leading zeros.
+fn number(range: &'static NumberRange, text: &str) -> Result<GivenValue, String> {
+    let parsed: Option<f64> =
+        if range.whole { text.parse::<u32>().ok().map(f64::from) } else { text.parse().ok() };
+    let number = parsed.filter(|number| range.contains(*number));
+    number.map(|number| GivenValue::Number(range, number as f32)).ok_or_else(|| {
+        let kind = if range.whole { "whole number" } else { "number" };
+        format!("expected a {kind} from {} to {}", range.least, range.most)
     })
 }
 
@@ -109,6 +124,7 @@ fn value_name(knob: &Knob) -> String {
     match knob.form {
         KnobForm::Switch => SWITCH.join("|"),
         KnobForm::Count => "N".to_owned(),
+        KnobForm::Number(range) => if range.whole { "N" } else { "X" }.to_owned(),
         KnobForm::Word | KnobForm::Fraction => knob.words().collect::<Vec<_>>().join("|"),
     }
 }

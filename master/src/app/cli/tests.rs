@@ -1,7 +1,9 @@
 use std::net::SocketAddr;
 
 use rayfarm_tracer::scene::knobs::KNOBS;
-use rayfarm_tracer::scene::{Setting, Up};
+use rayfarm_tracer::scene::{
+    ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Setting, Shading, Up,
+};
 
 use super::*;
 use crate::farm::SegmentPolicy;
@@ -255,11 +257,9 @@ fn a_run_has_a_timeline_and_control() {
 
 #[test]
 fn knobs_are_parsed_and_override_the_scene() {
-    use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
-
     let all = "--samples 9 --adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4 \
-               --dither";
-    let full = Setting { samples: 4, ..Setting::FULL };
+               --dither --max-depth 7 --min-contribution 0.02 --shadow-samples 5 --smooth-terminator off";
+    let full = Setting { samples: 4, scale: RenderScale::Full, quality: Quality::default() };
     let reduced = Setting {
         samples: 9,
         scale: RenderScale::ThreeQuarters,
@@ -271,7 +271,10 @@ fn knobs_are_parsed_and_override_the_scene() {
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
             dither: true,
-            ..Quality::default()
+            max_depth: 7,
+            min_contribution: 0.02,
+            shadow_samples: 5,
+            smooth_terminator: false,
         },
     };
     let args = render(&format!("rayfarm-master render a.toml -o b.png {all}")).picture.quality;
@@ -280,7 +283,7 @@ fn knobs_are_parsed_and_override_the_scene() {
     let none = view("rayfarm-master a.toml").picture.quality;
     assert_eq!(none.over(reduced), reduced);
     let back = "--samples 04 --adaptive=off --shadows on --shading full --filter bilinear --exponent exact --colors exact --scale 1 \
-                --dither=off";
+                --dither=off --max-depth 05 --min-contribution 4e-3 --shadow-samples 16 --smooth-terminator on";
     let back = view(&format!("rayfarm-master {back} a.toml")).picture.quality;
     let bilinear = Quality { filter: Some(Filter::Bilinear), ..full.quality };
     assert_eq!(back.over(reduced), Setting { quality: bilinear, ..full });
@@ -295,9 +298,30 @@ fn knobs_are_parsed_and_override_the_scene() {
         ("--adaptive=yes", "on, off"),
         ("--scale 0.6", "1, 3/4"),
         ("--colors 565", "reduced"),
+        ("--max-depth 65", "expected a whole number from 0 to 64"),
+        ("--max-depth 1.0", "expected a whole number from 0 to 64"),
+        ("--max-depth=-1", "expected a whole number from 0 to 64"),
+        ("--min-contribution 1.01", "expected a number from 0 to 1"),
+        ("--min-contribution nan", "expected a number from 0 to 1"),
+        ("--shadow-samples 0", "expected a whole number from 1 to 1024"),
+        ("--shadow-samples 1025", "expected a whole number from 1 to 1024"),
+        ("--smooth-terminator", "a value is required"),
+        ("--shading normal", "diffuse, normals, depth, item, albedo"),
     ] {
         let message = refused(&format!("rayfarm-master bench a.toml {wrong}"));
         assert!(message.contains(known), "{message}");
+    }
+}
+
+#[test]
+fn every_word_of_the_table_is_a_value_of_its_option() {
+    let usual = Setting { samples: 4, scale: RenderScale::Full, quality: Quality::default() };
+    for knob in KNOBS {
+        for word in knob.words() {
+            let line = format!("rayfarm-master render a.toml -o b.png --{}={word}", knob.option);
+            let found = render(&line).picture.quality.over(usual);
+            assert!(knob.value(word).unwrap().is_of(&found), "{line}");
+        }
     }
 }
 

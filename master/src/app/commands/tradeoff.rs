@@ -78,7 +78,7 @@ fn measure(
     folder: &Folder,
 ) -> Result<Report, CommandError> {
     let steps = Steps::new();
-    let settings = MeasuredSetting::applicable(&context.scene.features());
+    let settings = MeasuredSetting::applicable(&context.scene.features(), &context.view);
     let reference_view = context.reference_view();
     steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
     let reference = context.reference(&|rows| steps.done(u64::from(rows)))?;
@@ -109,7 +109,7 @@ fn check(
     reference: &RgbImage,
     steps: &Steps,
 ) -> Result<ReferenceCheck, CommandError> {
-    let pixels = sample_pixels(view.width, view.height, affordable_pixels(&context.scene, view.samples));
+    let pixels = sample_pixels(view.width, view.height, affordable_pixels(&context.scene, view));
     steps.part("reference against the oracle", pixels.len() as u64);
     let oracle = Oracle::new(&source.scene, &source.meshes, &source.textures, view);
     check_pixels(&oracle, reference, &pixels, context.threads, context.cancelled, &|| steps.done(1))

@@ -17,6 +17,10 @@ enum ReportedValue {
     Fraction(Option<f64>),
     /// `null` for the value that has no word.
     Word(Option<&'static str>),
+    /// A whole number of a range.
+    Whole(u32),
+    /// A number of a range, in its shortest form.
+    Number(f32),
 }
 
 impl Knobs {
@@ -31,6 +35,8 @@ impl Knobs {
             KnobForm::Switch => Some(ReportedValue::Switch(word == Some("on"))),
             KnobForm::Fraction => Some(ReportedValue::Fraction(word.and_then(fraction))),
             KnobForm::Word => Some(ReportedValue::Word(word)),
+            KnobForm::Number(range) if range.whole => Some(ReportedValue::Whole(range.of(&self.0) as u32)),
+            KnobForm::Number(range) => Some(ReportedValue::Number(range.of(&self.0))),
             KnobForm::Count => None,
         }
     }
@@ -50,7 +56,9 @@ fn fraction(text: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use rayfarm_tracer::scene::{ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Shading};
+    use rayfarm_tracer::scene::{
+        ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, RenderSettings, Shading,
+    };
 
     use super::*;
 
@@ -61,8 +69,11 @@ mod tests {
     #[test]
     fn full_quality_is_reported() {
         assert_eq!(
-            json(Setting::FULL),
-            r#"{"scale":1.0,"adaptive":false,"shadows":true,"shading":"full","filter":null,"exponent":"exact","colors":"exact","dither":false}"#
+            json(RenderSettings::default().setting()),
+            concat!(
+                r#"{"scale":1.0,"adaptive":false,"shadows":true,"shadow_samples":16,"terminator":true,"shading":"full","depth":5,"#,
+                r#""min_contribution":0.004,"filter":null,"exponent":"exact","colors":"exact","dither":false}"#
+            )
         );
     }
 
@@ -76,12 +87,25 @@ mod tests {
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
             dither: true,
-            ..Quality::default()
+            max_depth: 7,
+            min_contribution: 0.05,
+            shadow_samples: 5,
+            smooth_terminator: false,
         };
         assert_eq!(
             json(Setting { samples: 4, scale: RenderScale::Half, quality }),
-            r#"{"scale":0.5,"adaptive":true,"shadows":false,"shading":"diffuse","filter":"nearest","exponent":"fast","colors":"reduced","dither":true}"#
+            concat!(
+                r#"{"scale":0.5,"adaptive":true,"shadows":false,"shadow_samples":5,"terminator":false,"shading":"diffuse","depth":7,"#,
+                r#""min_contribution":0.05,"filter":"nearest","exponent":"fast","colors":"reduced","dither":true}"#
+            )
         );
+    }
+
+    #[test]
+    fn pictures_without_light_are_reported() {
+        let quality = Quality { shading: Shading::Normals, ..Quality::default() };
+        let setting = Setting { quality, ..RenderSettings::default().setting() };
+        assert!(json(setting).contains(r#""shading":"normals""#));
     }
 
     #[test]

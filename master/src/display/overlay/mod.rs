@@ -1,5 +1,6 @@
 //! Overlay of the picture: figures, panels, the list of keys, and messages.
 
+use std::borrow::Cow;
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -23,12 +24,14 @@ const WHITE: u32 = 0x00f4_f4f4;
 const SOFT: u32 = 0x00c4_ccd4;
 
 /// Keys of the window, and the effect of each.
-const KEYS: [(&str, &str); 16] = [
+const KEYS: [(&str, &str); 18] = [
     ("W A S D", "move"),
     ("Q E", "move down, up"),
     ("arrows", "look around"),
+    (", .", "roll left, right"),
     ("drag", "orbit"),
     ("wheel", "nearer, farther"),
+    ("+ -", "zoom (or page up, page down)"),
     ("R", "back to the start"),
     ("O", "hide the figures"),
     ("F", "workers and their time"),
@@ -94,7 +97,7 @@ pub(super) struct Figures {
     /// Lines of the quality controller.
     pub(super) quality: Vec<String>,
     /// Labels of all knobs that are not at full quality.
-    pub(super) reductions: Vec<&'static str>,
+    pub(super) reductions: Vec<Cow<'static, str>>,
     /// Connected workers.
     pub(super) workers: usize,
     /// Render threads of all workers.
@@ -112,7 +115,7 @@ impl Figures {
         let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
         lines.extend(self.quality.iter().cloned());
-        lines.extend(self.reductions.iter().copied().map(str::to_owned));
+        lines.extend(self.reductions.iter().map(ToString::to_string));
         lines.push(format!(
             "{}, {}",
             counted(self.workers as u64, "worker"),

@@ -61,7 +61,9 @@ fn figures_are_legible_on_the_canvas() {
 fn the_quality_controller_and_every_reduced_knob_have_a_line() {
     let reductions = ["scale 1/2", "no shadows"];
     let quality = vec!["moving: loses FLIP 0.050".to_owned()];
-    let lines = Figures { quality: quality.clone(), reductions: reductions.to_vec(), ..figures() }.lines();
+    let lines =
+        Figures { quality: quality.clone(), reductions: reductions.map(Into::into).to_vec(), ..figures() }
+            .lines();
     let expected =
         [&figures().lines()[..2], &quality, &reductions.map(str::to_owned), &figures().lines()[2..]].concat();
     assert_eq!(lines, expected);

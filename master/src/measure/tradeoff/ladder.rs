@@ -12,9 +12,12 @@ use crate::viewer::quality_controller::{Ladder, Origin, Rung, bytes, continued};
 ///
 /// # Errors
 /// In words: a table without a row for the picture at rest, or a picture at rest with a reduced knob. The table's errors are
-/// differences to the picture with every knob at full quality, not to a reduced one.
+/// differences to the picture with every knob at full quality, not to a reduced one. A low number, such as the depth, is the scene's
+/// own full quality, and not refused.
 pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, String> {
-    let turned = wanted.setting().reductions();
+    let full = MeasuredSetting::plain().applied_to(&wanted.view).setting().reductions();
+    let mut turned = wanted.setting().reductions();
+    turned.retain(|reduction| !full.contains(reduction));
     if !turned.is_empty() {
         return Err(format!(
             "was measured against pictures with every knob at full quality, and this one is at rest with {}: leave that out, or \
@@ -127,6 +130,20 @@ mod tests {
     fn a_table_without_the_picture_at_rest_is_refused_with_what_it_has() {
         let message = ladder(&table(), &resting(9)).unwrap_err();
         assert!(message.contains("9 samples") && message.contains("samples-16"), "{message}");
+    }
+
+    #[test]
+    fn numbers_of_the_picture_at_rest_are_its_full_quality() {
+        let mut table = table();
+        table.rows.push(row("depth-3", 15.0, 0.055));
+        table.rows.push(row("depth-1", 10.0, 0.06));
+        let mut wanted = resting(1);
+        wanted.view.quality.max_depth = 3;
+        let ladder = ladder(&table, &wanted).unwrap();
+        let figures = |rung: &Rung| (wanted.at_most(&rung.setting).view.quality.max_depth, rung.cost);
+        let figures: Vec<(u8, f64)> = ladder.rungs().iter().map(figures).collect();
+        // The depth of 3 is that of the picture at rest, and its row no rung.
+        assert_eq!(figures, [(3, 1.0), (1, 0.5), (3, 0.3)]);
     }
 
     #[test]

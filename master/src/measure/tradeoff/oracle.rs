@@ -5,7 +5,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::reference::Oracle;
+use rayfarm_tracer::scene::FrameView;
 use serde::Serialize;
+
+use crate::measure::ray_bounds::RayBounds;
 
 /// Budget in tests of a ray against a primitive: about ten seconds of one core.
 const MAX_TESTS: u64 = 2_000_000_000;
@@ -23,11 +26,13 @@ pub(crate) struct ReferenceCheck {
     pub(crate) above_one_step: usize,
 }
 
-/// Number of pixels that the budget allows in this scene.
-pub(crate) fn affordable_pixels(scene: &CompiledScene, samples: u32) -> usize {
+/// Number of pixels of a view that the budget allows in this scene.
+pub(crate) fn affordable_pixels(scene: &CompiledScene, view: &FrameView) -> usize {
     let data = scene.scene();
-    let primitives = scene.triangle_count() + (data.spheres.len() + data.planes.len()) as u64;
-    let rays = u64::from(samples) * (1 + data.lights.len() as u64);
+    let shapes = data.spheres.len() + data.disks.len() + data.planes.len();
+    let primitives = scene.triangle_count() + shapes as u64;
+    let RayBounds { shadow, secondary } = RayBounds::of(scene, &view.quality);
+    let rays = u64::from(view.samples).saturating_mul(1 + shadow.saturating_add(secondary));
     let pixels = MAX_TESTS / primitives.max(1).saturating_mul(rays).max(1);
     pixels.clamp(*PIXELS.start(), *PIXELS.end()) as usize
 }

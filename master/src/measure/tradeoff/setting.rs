@@ -1,20 +1,36 @@
 //! Measured settings: combinations of knobs, named by the slugs of the table of knobs.
 
 use rayfarm_tracer::scene::knobs::{KNOBS, KnobValue};
-use rayfarm_tracer::scene::{FrameView, Quality, SceneFeatures, Setting};
+use rayfarm_tracer::scene::{FrameView, RenderScale, SceneFeatures, Setting};
 
 use crate::farm::ViewRequest;
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.
-const NAMES: [&str; 33] = [
+const NAMES: [&str; 49] = [
     PLAIN,
     "fast-exponent",
     "diffuse",
     "nearest",
+    "bilinear",
+    "trilinear",
     "no-shadows",
+    "shadow-samples-9",
+    "shadow-samples-4",
+    "shadow-samples-1",
+    "hard-terminator",
+    "contribution-0-01",
+    "contribution-0-03",
+    "contribution-0-1",
+    "depth-3",
+    "depth-2",
+    "depth-1",
+    "depth-0",
     "reduced-colors",
     "diffuse+no-shadows",
+    "depth-1+shadow-samples-4",
+    "scale-1-2+depth-1",
+    "scale-1-2+shadow-samples-4",
     "scale-3-4",
     "scale-3-4+no-shadows",
     "scale-3-4+diffuse",
@@ -55,9 +71,19 @@ pub(crate) struct MeasuredSetting {
 }
 
 impl MeasuredSetting {
-    /// Settings in which every changed knob can change the picture of a scene with these features.
-    pub(crate) fn applicable(features: &SceneFeatures) -> Vec<Self> {
-        all().filter(|measured| measured.setting.without_idle(features) == measured.setting).collect()
+    /// Settings in which every changed knob can change the picture of `view` in a scene with these features. Where a number of the
+    /// view is that low already, a setting that lowers it is one of the others, and is left out.
+    pub(crate) fn applicable(features: &SceneFeatures, view: &FrameView) -> Vec<Self> {
+        let features = features.shown_by(view.quality.shading);
+        let mut found: Vec<Self> = Vec::new();
+        for measured in all().filter(|measured| measured.setting.without_idle(&features) == measured.setting)
+        {
+            let request = measured.applied_to(view);
+            if !found.iter().any(|other| other.applied_to(view) == request) {
+                found.push(measured);
+            }
+        }
+        found
     }
 
     /// The setting without changed knobs.
@@ -70,10 +96,11 @@ impl MeasuredSetting {
         all().find(|measured| measured.name == name)
     }
 
-    /// The request for a picture of `view` under this setting. Knobs of `view` are reset, except dither, which loses nothing.
+    /// The request for a picture of `view` under this setting. Knobs of `view` are reset, except those that full quality keeps:
+    /// dither, which loses nothing, the kind of a picture without light, and numbers such as the depth, which the setting lowers.
     pub(crate) fn applied_to(&self, view: &FrameView) -> ViewRequest {
-        let Setting { samples, scale, quality } = self.setting;
-        let quality = Quality { dither: view.quality.dither, ..quality };
+        let full = view.setting(RenderScale::Full).restored();
+        let Setting { samples, scale, quality } = full.at_most(&self.setting);
         ViewRequest { view: FrameView { samples, quality, ..*view }, scale }
     }
 }
@@ -100,6 +127,8 @@ fn value_with(slug: &str) -> Option<&'static KnobValue> {
 mod tests {
     use std::collections::BTreeSet;
 
+    use rayfarm_tracer::scene::{Quality, Shading};
+
     use super::*;
 
     const NOTHING: SceneFeatures = SceneFeatures {
@@ -115,7 +144,6 @@ mod tests {
         shadows: false,
         bounces: false,
         transparent: false,
-        sided: false,
         shadowless: false,
         soft_shadows: false,
         checkered: false,
@@ -126,7 +154,10 @@ mod tests {
         powers: true,
         textured: true,
         filtered: true,
+        smooth: true,
         shadows: true,
+        soft_shadows: true,
+        bounces: true,
         ..NOTHING
     };
 
@@ -155,18 +186,21 @@ mod tests {
 
     #[test]
     fn a_scene_with_all_features_has_all_settings() {
-        assert_eq!(MeasuredSetting::applicable(&EVERYTHING).len(), NAMES.len());
-        assert!(MeasuredSetting::applicable(&NOTHING).contains(&MeasuredSetting::plain()));
+        let view = crate::test_scene::view();
+        assert_eq!(MeasuredSetting::applicable(&EVERYTHING, &view).len(), NAMES.len());
+        assert!(MeasuredSetting::applicable(&NOTHING, &view).contains(&MeasuredSetting::plain()));
     }
 
     #[test]
     fn a_scene_without_highlights_shadows_or_textures_has_no_knobs_for_them() {
         let names = |features| {
-            let settings = MeasuredSetting::applicable(&features);
+            let settings = MeasuredSetting::applicable(&features, &crate::test_scene::view());
             settings.iter().map(|setting| setting.name).collect::<Vec<_>>()
         };
         let bare = names(NOTHING);
-        for word in ["diffuse", "exponent", "shadows", "nearest"] {
+        for word in
+            ["diffuse", "exponent", "shadow", "linear", "nearest", "depth", "contribution", "terminator"]
+        {
             assert!(!bare.iter().any(|name| name.contains(word)), "{bare:?}");
         }
         for name in [PLAIN, "scale-1-2", "samples-16", "reduced-colors"] {
@@ -186,5 +220,51 @@ mod tests {
             assert!(!pictures[..index].contains(picture), "{}", NAMES[index]);
         }
         assert_eq!(pictures[0].view, FrameView { samples: 1, ..view }, "knobs of the view are reset");
+    }
+
+    #[test]
+    fn full_quality_has_the_numbers_of_the_view() {
+        let own = Quality {
+            max_depth: 2,
+            min_contribution: 0.02,
+            shadow_samples: 6,
+            shadows: false,
+            smooth_terminator: false,
+            ..Quality::default()
+        };
+        let view = FrameView { quality: own, ..crate::test_scene::view() };
+        let full = Quality { shadows: true, smooth_terminator: true, ..own };
+        assert_eq!(MeasuredSetting::plain().applied_to(&view).view.quality, full);
+        let named = |name| MeasuredSetting::named(name).unwrap().applied_to(&view).view.quality;
+        assert_eq!(named("depth-1+shadow-samples-4"), Quality { max_depth: 1, shadow_samples: 4, ..full });
+        assert_eq!((named("depth-3"), named("contribution-0-01")), (full, full), "no number is raised");
+        let names: Vec<_> =
+            MeasuredSetting::applicable(&EVERYTHING, &view).iter().map(|setting| setting.name).collect();
+        for (name, is_measured) in [
+            ("depth-3", false),
+            ("depth-2", false),
+            ("depth-1", true),
+            ("contribution-0-01", false),
+            ("contribution-0-03", true),
+            ("shadow-samples-9", false),
+            ("shadow-samples-4", true),
+        ] {
+            assert_eq!(names.contains(&name), is_measured, "{name}");
+        }
+    }
+
+    #[test]
+    fn pictures_without_light_are_measured_as_they_are() {
+        let quality = Quality { shading: Shading::Normals, ..Quality::default() };
+        let view = FrameView { quality, ..crate::test_scene::view() };
+        let settings = MeasuredSetting::applicable(&EVERYTHING, &view);
+        assert!(settings.iter().all(|one| one.applied_to(&view).view.quality.shading == Shading::Normals));
+        let names: Vec<_> = settings.iter().map(|setting| setting.name).collect();
+        for word in
+            ["diffuse", "exponent", "shadow", "linear", "nearest", "depth", "contribution", "terminator"]
+        {
+            assert!(!names.iter().any(|name| name.contains(word)), "{names:?}");
+        }
+        assert!(names.contains(&"scale-1-2") && names.contains(&"samples-4+adaptive"));
     }
 }

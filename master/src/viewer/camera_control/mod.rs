@@ -1,16 +1,21 @@
 //! Control of the camera: movements to a camera, without a window.
 //!
-//! The camera is kept as a position, two angles and a distance to its look-at point. A movement goes as far as speed times
-//! time, so it is the same on a slow farm as on a fast one; speeds follow from the size of the scene.
+//! The camera is kept as a position, three angles, a distance to its look-at point and a magnification. A movement goes as far
+//! as speed times time, so it is the same on a slow farm as on a fast one; speeds follow from the size of the scene.
+
+mod lens;
 
 use glam::DVec3;
-use rayfarm_tracer::scene::Camera;
+use rayfarm_tracer::scene::{Camera, CameraKind};
 
 use super::orbit::upright_axis;
 
 /// Speed of movements, in scene sizes per second.
 const MOVE_PER_SECOND: f64 = 0.3;
 const LOOK_RADIANS_PER_SECOND: f64 = 1.0;
+const ROLL_RADIANS_PER_SECOND: f64 = 1.0;
+/// Factor of the picture's size per second.
+const MAGNIFIED_PER_SECOND: f64 = 2.0;
 /// A drag over the window's whole height turns by half a circle.
 const DRAG_RADIANS: f64 = std::f64::consts::PI;
 /// Factor of the distance to the look-at point per notch of the wheel.
@@ -47,8 +52,8 @@ impl CameraControl {
             Some(pose) => Camera {
                 position: pose.position,
                 look_at: pose.look_at(&self.frame),
-                up: self.frame.up,
-                ..self.home
+                up: pose.up(&self.frame),
+                ..lens::magnified(&self.home, pose.magnification)
             },
         }
     }
@@ -84,12 +89,44 @@ impl CameraControl {
         }
     }
 
-    /// Moves the camera towards its look-at point by notches of a wheel; negative ones move it away.
-    pub(crate) fn zoom(&mut self, notches: f64) {
-        let notches = finite(notches);
-        if notches != 0.0 {
-            self.change(|pose, frame, scene_size| pose.approach(notches, frame, scene_size));
+    /// Rolls the camera about its view direction for `seconds`. `right` is in -1..=1; rolled to the right, the picture turns to
+    /// the left.
+    pub(crate) fn roll(&mut self, right: f64, seconds: f64) {
+        let right = finite(right);
+        if right != 0.0 {
+            let radians = step_seconds(seconds) * ROLL_RADIANS_PER_SECOND;
+            self.change(|pose, _, _| {
+                pose.roll = (pose.roll + right * radians).rem_euclid(std::f64::consts::TAU);
+            });
         }
+    }
+
+    /// Magnifies the picture for `seconds`. `inwards` is in -1..=1.
+    pub(crate) fn magnify(&mut self, inwards: f64, seconds: f64) {
+        let inwards = finite(inwards).clamp(-1.0, 1.0);
+        if inwards != 0.0 {
+            self.magnify_by(libm::pow(MAGNIFIED_PER_SECOND, inwards * step_seconds(seconds)));
+        }
+    }
+
+    /// Moves the camera towards its look-at point by notches of a wheel; negative ones move it away. The picture of an
+    /// orthographic camera does not change with its distance, and is magnified instead.
+    pub(crate) fn zoom(&mut self, notches: f64) {
+        let notches = finite(notches).clamp(-100.0, 100.0);
+        if notches == 0.0 {
+            return;
+        }
+        match self.home.kind {
+            CameraKind::Orthographic { .. } => self.magnify_by(libm::pow(WHEEL_FACTOR, -notches)),
+            CameraKind::Pinhole { .. } | CameraKind::Fisheye => {
+                self.change(|pose, frame, scene_size| pose.approach(notches, frame, scene_size));
+            }
+        }
+    }
+
+    fn magnify_by(&mut self, factor: f64) {
+        let home = self.home;
+        self.change(|pose, _, _| pose.magnification = lens::limited(&home, pose.magnification * factor));
     }
 
     fn change(&mut self, change: impl FnOnce(&mut Pose, &Frame, f64)) {
@@ -131,7 +168,7 @@ impl Frame {
     }
 }
 
-/// Position and direction of the camera.
+/// Position and direction of the camera, and the magnification of its picture.
 #[derive(Clone, Copy, Debug)]
 struct Pose {
     position: DVec3,
@@ -141,6 +178,10 @@ struct Pose {
     pitch: f64,
     /// Distance to the look-at point.
     distance: f64,
+    /// Radians about the view direction, to the right.
+    roll: f64,
+    /// Relative to the scene's camera.
+    magnification: f64,
 }
 
 impl Pose {
@@ -153,7 +194,23 @@ impl Pose {
             yaw: 0.0,
             pitch: finite(pitch).clamp(-STEEPEST, STEEPEST),
             distance,
+            roll: 0.0,
+            magnification: 1.0,
         }
+    }
+
+    /// The up direction of the camera.
+    fn up(&self, frame: &Frame) -> DVec3 {
+        let (sin, cos) = libm::sincos(self.roll);
+        let forward = self.direction(frame);
+        let along = forward * forward.dot(frame.up);
+        along + (frame.up - along) * cos + forward.cross(frame.up) * sin
+    }
+
+    /// A movement to the right and upwards in the picture, as it is for the camera without its roll.
+    fn without_roll(&self, right: f64, up: f64) -> (f64, f64) {
+        let (sin, cos) = libm::sincos(self.roll);
+        (right * cos + up * sin, up * cos - right * sin)
     }
 
     fn direction(&self, frame: &Frame) -> DVec3 {
@@ -165,9 +222,9 @@ impl Pose {
     }
 
     fn fly(&mut self, direction: DVec3, frame: &Frame, distance: f64) {
-        let movement = self.direction(frame) * direction.z
-            + frame.rightwards(self.yaw) * direction.x
-            + frame.up * direction.y;
+        let (right, up) = self.without_roll(direction.x, direction.y);
+        let movement =
+            self.direction(frame) * direction.z + frame.rightwards(self.yaw) * right + frame.up * up;
         self.position += movement.clamp_length_max(1.0) * distance;
     }
 
@@ -182,12 +239,14 @@ impl Pose {
     fn approach(&mut self, notches: f64, frame: &Frame, scene_size: f64) {
         let centre = self.look_at(frame);
         let (nearest, farthest) = (DISTANCES.0 * scene_size, DISTANCES.1 * scene_size);
-        let wanted = self.distance * libm::pow(WHEEL_FACTOR, notches.clamp(-100.0, 100.0));
+        let wanted = self.distance * libm::pow(WHEEL_FACTOR, notches);
         self.distance = wanted.clamp(nearest.min(self.distance), farthest.max(self.distance));
         self.position = centre - self.direction(frame) * self.distance;
     }
 
-    fn turn(&mut self, yaw: f64, pitch: f64) {
+    /// Turns to the right and upwards in the picture, by radians.
+    fn turn(&mut self, right: f64, up: f64) {
+        let (yaw, pitch) = self.without_roll(right, up);
         self.yaw = (self.yaw + yaw).rem_euclid(std::f64::consts::TAU);
         self.pitch = (self.pitch + pitch).clamp(-STEEPEST, STEEPEST);
     }
@@ -196,7 +255,10 @@ impl Pose {
 /// Unit of movements: the size of everything finite, held near what the camera shows, so that a close-up in a large scene
 /// and a scene on a huge floor can both be controlled.
 fn scene_size(home: &Camera, bounds: Option<(DVec3, DVec3)>) -> f64 {
-    let in_view = 2.0 * home.position.distance(home.look_at);
+    let in_view = match home.kind {
+        CameraKind::Orthographic { view_height } => view_height / home.zoom,
+        CameraKind::Pinhole { .. } | CameraKind::Fisheye => 2.0 * home.position.distance(home.look_at),
+    };
     let size = bounds.map_or(in_view, |(low, high)| (high - low).length());
     if size.is_finite() && size > 0.0 { in_view.clamp(size / 20.0, size) } else { in_view }
 }

@@ -206,6 +206,8 @@ fn apply(
         InputAction::Move { direction, seconds } => camera.fly(direction, seconds),
         InputAction::Look { right, up, seconds } => camera.look(right, up, seconds),
         InputAction::Orbit { right, down } => camera.orbit(right, down),
+        InputAction::Roll { right, seconds } => camera.roll(right, seconds),
+        InputAction::Magnify { inwards, seconds } => camera.magnify(inwards, seconds),
         InputAction::Zoom { notches } => camera.zoom(notches),
         InputAction::ResetCamera => camera.reset(),
         InputAction::Resize { width, height } => {

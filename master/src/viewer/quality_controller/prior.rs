@@ -70,7 +70,8 @@ fn settings(samples: u32) -> Vec<Setting> {
 
 /// Whether the effect of a value is known. The best value has none.
 fn is_known(knob: &Knob, value: &KnobValue) -> bool {
-    SAMPLING.contains(&knob.name) || value.slug.is_none_or(|slug| effect(slug).is_some())
+    let is_best = std::ptr::eq(value, knob.best());
+    is_best || SAMPLING.contains(&knob.name) || value.slug.is_some_and(|slug| effect(slug).is_some())
 }
 
 /// The setting with another value of one knob.

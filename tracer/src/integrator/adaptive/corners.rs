@@ -7,7 +7,7 @@ use super::super::regular::lanes_of;
 use super::super::stage::{Stage, Watch};
 use super::BAND;
 use crate::cancel::Cancelled;
-use crate::rays::{BLOCKS, EyeTile, SIDE, TileColors, TileRays, place};
+use crate::rays::{BLOCKS, SIDE, TileColors, TileRays, TileSamples, place};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, f32x16, three};
 use crate::srgb;
@@ -52,8 +52,7 @@ impl Corners {
         for left in (0..columns).step_by(SIDE) {
             let live = lanes_of(columns - left, rows.start..(rows.end + 1).min(BAND));
             let center = [f64::from(left) + middle, f64::from(top) + middle];
-            let tile = EyeTile::new(frame, &rays, live, center, 1);
-            context.trace(simd, &tile)?;
+            context.trace(simd, TileSamples { rays: &rays, live, center, grid: 1 })?;
             context.watch.enter(Stage::Encoding);
             self.put(simd, &live, &context.direct.colors, left as usize, place);
         }
@@ -64,8 +63,7 @@ impl Corners {
             let live = in_row((columns - left) as usize);
             let rays = TileRays::row(simd, &live);
             let center = [f64::from(left) + f64::from(ROW_TILE - 1) / 2.0, f64::from(top + BAND) + 0.5];
-            let tile = EyeTile::new(frame, &rays, live, center, 1);
-            context.trace(simd, &tile)?;
+            context.trace(simd, TileSamples { rays: &rays, live, center, grid: 1 })?;
             context.watch.enter(Stage::Encoding);
             self.put(simd, &live, &context.direct.colors, left as usize, |block, lane| {
                 (block * LANES + lane, BAND as usize)

@@ -3,7 +3,7 @@
 use super::super::direct::TileContext;
 use super::super::stage::Watch;
 use crate::cancel::Cancelled;
-use crate::rays::{BLOCKS, EyeTile, TileColors, TileRays};
+use crate::rays::{BLOCKS, TileColors, TileRays, TileSamples};
 use crate::simd::{LANES, Simd, three};
 
 /// Places of the samples of a pixel.
@@ -96,7 +96,7 @@ impl Gathered {
         }
         self.rays.bound(simd, &self.live);
         let center = center.map(|along| f64::from(along * pattern.grid));
-        let tile = EyeTile::new(context.frame, &self.rays, self.live, center, pattern.grid);
-        context.trace(simd, &tile)
+        let samples = TileSamples { rays: &self.rays, live: self.live, center, grid: pattern.grid };
+        context.trace(simd, samples)
     }
 }

@@ -9,12 +9,14 @@
 //!
 //! ```text
 //!   context      a tile of rays, from its hits to its colours
+//!   auxiliary    pictures without light: normals, depth, items, diffuse colours
 //!   background   rays without a hit
 //!   bounce       reflected and transmitted rays
 //!   emission     unlit materials, and light that surfaces emit
 //!   shadow       S_j
 //! ```
 
+mod auxiliary;
 mod background;
 mod bounce;
 mod context;
@@ -62,11 +64,14 @@ pub(super) fn shade<S: Simd, R: SurfaceSource, W: Watch>(
     context: &mut TileContext<'_, W>,
 ) {
     let frame = context.frame;
+    if !frame.view().quality.shading.is_light() {
+        return auxiliary::shade(rays, &context.hits, &context.surfaces, &mut context.direct.colors);
+    }
     let (surfaces, colors) = (&mut context.surfaces, &mut context.direct.colors);
     for block in 0..BLOCKS {
         let hit = surfaces.blocks[block].hit;
         if rays.live(block) & !hit != 0 {
-            background::background(simd, &frame.scene().background, rays, block).store(&mut colors[block]);
+            background::background(simd, rays, block, &mut colors[block]);
         }
         if hit != 0 {
             let behind = Vec3x16::load(simd, &colors[block]);
@@ -136,7 +141,7 @@ fn add_light<S: Simd, R: SurfaceSource, W: Watch>(
 }
 
 /// Computes the unoccluded contribution of a light to the points of a block, and the origins of their shadow rays: the points,
-/// moved off their surfaces to the side of the light. Returns the bits of the points with a contribution.
+/// moved off their surfaces to the side of the light, or onto the smooth ones. Returns the bits of the points with a contribution.
 #[inline(always)]
 fn unoccluded<S: Simd>(
     simd: S,
@@ -149,11 +154,12 @@ fn unoccluded<S: Simd>(
     let surface = &surfaces.blocks[block];
     let points = Vec3x16::load(simd, &surface.point);
     let geometric = Vec3x16::load(simd, &surface.ng);
-    let normals = if frame.features.smooth { Vec3x16::load(simd, &surface.ns) } else { geometric };
+    let normals = if frame.features.shaded_normals() { Vec3x16::load(simd, &surface.ns) } else { geometric };
     let zero = splat(simd, 0.0);
     let incidence = light.incidence(simd, points);
     let n_dot_l = normals.dot(incidence.direction);
     let facing = incidence.reached & bits(n_dot_l.simd_gt(zero));
+    let facing = surfaces.before_untilted(simd, block, incidence.direction, facing);
     if facing & surface.lit == 0 {
         return 0;
     }
@@ -166,8 +172,8 @@ fn unoccluded<S: Simd>(
     let [r, g, b] = contribution.0;
     let enough = r.max(g).max(b).simd_ge(splat(simd, LEAST_CONTRIBUTION));
     if light.shadows {
-        let bias = surface.bias.load(simd);
-        let side = select(geometric.dot(incidence.direction).simd_lt(zero), -bias, bias);
+        let along = geometric.dot(incidence.direction);
+        let side = surfaces.to_shadow_origins(simd, block, along);
         points.add(geometric.scale(side)).store(&mut scratch.shadow_origins[block]);
     }
     facing & bits(enough)

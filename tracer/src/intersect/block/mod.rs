@@ -13,18 +13,16 @@ use crate::rays::{HitBlock, RayBlock, RaySource};
 use crate::simd::{Simd, dispatch, each_bit};
 
 impl PreparedFrame {
-    /// The closest hits of the live rays of a block.
-    pub(crate) fn closest_hits_of(&self, block: &RayBlock<'_>) -> HitBlock {
-        let mut hits = HitBlock::NONE;
-        with_stack(|stack| dispatch!(self.level, simd => self.find_nearest(simd, stack, block, &mut hits)));
-        for lane in each_bit(hits.coincident) {
+    /// Finds the closest hits of some live rays of a block. Their lanes of `hits` must have none.
+    pub(crate) fn closest_hits_of(&self, block: &RayBlock<'_>, lanes: u32, hits: &mut HitBlock) {
+        with_stack(|stack| dispatch!(self.level, simd => self.find_nearest(simd, stack, block, lanes, hits)));
+        for lane in each_bit(hits.coincident & lanes) {
             let (nearest, starts_on) = (hits.slot(lane), block.starts_on(0, lane));
             let (preferred, others) =
                 self.preferred(&block.ray(0, lane), nearest, block.t_max(lane), starts_on);
             hits.coincident &= !(u32::from(!others) << lane);
             hits.set(lane, preferred);
         }
-        hits
     }
 
     /// Bits of the live rays of a block that hit anything.
@@ -39,8 +37,15 @@ impl PreparedFrame {
 
     /// Finds the nearest hits; `coincident` has the rays whose hit may coincide with others.
     #[inline(always)]
-    fn find_nearest<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>, hits: &mut HitBlock) {
-        for lane in each_bit(block.live(0)) {
+    fn find_nearest<S: Simd>(
+        &self,
+        simd: S,
+        mut stack: Stack,
+        block: &RayBlock<'_>,
+        lanes: u32,
+        hits: &mut HitBlock,
+    ) {
+        for lane in each_bit(block.live(0) & lanes) {
             let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
             let found = self.nearest(simd, stack.above(), &ray, block.t_max(lane), starts_on);
             if let Some((primitive, tied)) = found {

@@ -122,7 +122,8 @@ fn check_block(frame: &mut PreparedFrame, rays: &[RaySegment]) {
         for (lane, (ray, segment)) in usable.iter().enumerate() {
             block.set(lane, *ray, segment.t_max, id(frame, segment.starts_on));
         }
-        let hits = frame.closest_hits_of(&block);
+        let mut hits = HitBlock::NONE;
+        frame.closest_hits_of(&block, u32::MAX, &mut hits);
         let any = frame.any_hits_of(&block);
         for (lane, expected) in expected.iter().enumerate() {
             let found = frame.hit_in(&block, &hits, lane).map(|hit| (hit.t.to_bits(), hit.primitive));
@@ -172,7 +173,8 @@ fn a_block_without_live_rays_hits_nothing() {
     let (scene, mesh) = scene_of(&[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]], DVec3::ZERO, DVec3::ONE);
     let frame = frame_of(&scene, &mesh);
     let block = RayBlock::new(&frame);
-    let hits = frame.closest_hits_of(&block);
+    let mut hits = HitBlock::NONE;
+    frame.closest_hits_of(&block, u32::MAX, &mut hits);
     assert!((0..LANES).all(|lane| hits.primitive(lane).is_none()));
     assert_eq!(frame.any_hits_of(&block), 0);
 }

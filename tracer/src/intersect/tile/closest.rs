@@ -1,4 +1,7 @@
-//! The closest hits of the rays of a tile of the camera.
+//! The closest hits of the rays of a tile: one of a camera with a projection, or of a plane mirror.
+//!
+//! The closeness z of a hit at t is 1 / t for rays from a point, and -t for parallel rays; see `rays::Projection`. Parallel rays
+//! start at depth 0, and what is behind has a positive z.
 
 use super::projected_triangles::{At, ProjectedTriangles};
 use super::query::{TileQuery, cover_nearest_first, cover_projected};
@@ -6,20 +9,25 @@ use super::traversal::{NodeFilter, Traversal};
 use super::{Picture, Scratch};
 use crate::compile::Item;
 use crate::intersect::{Hit, cutout};
-use crate::rays::{ALL_BLOCKS, BLOCKS, EyeTile, HitBlock, NO_ITEM, PrimitiveId, ROUNDING, RaySource};
+use crate::rays::{ALL_BLOCKS, BLOCKS, HitBlock, NO_ITEM, PictureTile, PrimitiveId, ROUNDING};
 use crate::simd::{
     Lanes, Simd, SimdBase, bits, each_bit, f32x16, mask_of, select, select_indices, splat, u32x16,
 };
 
-/// Closeness (1 / depth) of the hits of a tile, with error bounds.
+/// Closeness of the hits of a tile, with error bounds.
 pub(super) struct Closeness {
-    /// Bounds of the closeness of each ray's hit; 0 without a hit, infinity for rays that are not live.
+    /// Bounds of the closeness of each ray's hit; [`nowhere`] without a hit, infinity for rays that are not live.
     low: [Lanes; BLOCKS],
     high: [Lanes; BLOCKS],
     /// Least of `low` in each block.
     least: Lanes,
     /// Least of `least`.
     least_of_all: f32,
+}
+
+/// Closeness of what is infinitely far away.
+const fn nowhere<T: PictureTile>() -> f32 {
+    if T::PARALLEL { f32::NEG_INFINITY } else { 0.0 }
 }
 
 impl Closeness {
@@ -32,14 +40,14 @@ impl Closeness {
 
     /// Resets all rays to no hit.
     #[inline(always)]
-    fn clear<S: Simd>(&mut self, simd: S, live: &[u32; BLOCKS]) {
+    fn clear<S: Simd, T: PictureTile>(&mut self, simd: S, tile: &T) {
         let infinite = splat(simd, f32::INFINITY);
         self.least_of_all = f32::INFINITY;
         for block in 0..BLOCKS {
-            let start = select(mask_of(simd, live[block]), splat(simd, 0.0), infinite);
+            let start = select(mask_of(simd, tile.live(block)), splat(simd, nowhere::<T>()), infinite);
             self.low[block].store(start);
             self.high[block].store(start);
-            self.least.0[block] = if live[block] == 0 { f32::INFINITY } else { 0.0 };
+            self.least.0[block] = if tile.live(block) == 0 { f32::INFINITY } else { nowhere::<T>() };
             self.least_of_all = self.least_of_all.min(self.least.0[block]);
         }
     }
@@ -55,81 +63,85 @@ impl Closeness {
         }
     }
 
-    /// Records an exact hit. Hits that coincide with it are at most `slack` behind it.
-    fn record(&mut self, block: usize, lane: usize, t: f64, slack: f64) {
-        let closeness = |t: f64| (1.0 / t) as f32;
-        self.low[block].0[lane] = closeness(t + slack) * (1.0 - ROUNDING);
-        self.high[block].0[lane] = closeness(t) * (1.0 + ROUNDING);
+    /// Records an exact hit at a depth. Hits that coincide with it are not behind `farthest`.
+    fn record<T: PictureTile>(&mut self, block: usize, lane: usize, depth: f64, farthest: f64) {
+        let (low, high) = if T::PARALLEL {
+            (-(farthest as f32) * (1.0 + ROUNDING), -(depth as f32) * (1.0 - ROUNDING))
+        } else {
+            let closeness = |depth: f64| (1.0 / depth) as f32;
+            (closeness(farthest) * (1.0 - ROUNDING), closeness(depth) * (1.0 + ROUNDING))
+        };
+        self.low[block].0[lane] = low;
+        self.high[block].0[lane] = high;
     }
 }
 
-impl EyeTile<'_> {
-    /// Finds the closest hit of each live ray.
-    #[inline(always)]
-    pub(crate) fn find_closest<S: Simd>(
-        &self,
-        simd: S,
-        hits: &mut [HitBlock; BLOCKS],
-        scratch: &mut Scratch,
-    ) {
-        let Scratch { scene_stack, mesh_stack, projected, closeness, .. } = scratch;
-        closeness.clear(simd, &self.live);
-        for hits in hits.iter_mut() {
-            *hits = HitBlock::NONE;
-        }
-        let picture = Picture { projection: &self.projection, rays: self.rays };
-        let mut query = ClosestQuery { tile: self, item: NO_ITEM, cutouts: &[], closeness, hits };
-        let mut traversal = Traversal::new(&self.frame.nodes, &[], picture, scene_stack).around_last();
-        while let Some((leaf, _)) = traversal.next(simd, &query) {
-            for &item in self.frame.items_of(leaf) {
-                query.item = item;
-                query.cutouts = self.frame.cutouts_of(item);
-                match self.frame.items.get(item) {
-                    Item::Model(index) => {
-                        let instance = &self.frame.instances[index];
-                        let projection = self.projection_of(instance);
-                        let picture = Picture { projection: &projection, rays: self.rays };
-                        cover_nearest_first(simd, &instance.mesh, picture, mesh_stack, projected, &mut query);
-                    }
-                    Item::Triangle(index) => {
-                        let corners = self.frame.triangles[index].corners;
-                        projected.project_exactly(0, &self.projection, corners, self.rays);
-                        cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
-                    }
-                    Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
+/// Finds the closest hit of each live ray of a tile.
+#[inline(always)]
+pub(crate) fn find_closest<S: Simd, T: PictureTile>(
+    simd: S,
+    tile: &T,
+    hits: &mut [HitBlock; BLOCKS],
+    scratch: &mut Scratch,
+) {
+    let (frame, rays) = (tile.frame(), tile.picture());
+    let Scratch { scene_stack, mesh_stack, projected, closeness, .. } = scratch;
+    closeness.clear(simd, tile);
+    for hits in hits.iter_mut() {
+        *hits = HitBlock::NONE;
+    }
+    let picture = Picture { projection: tile.projection(), rays };
+    let mut query = ClosestQuery { tile, item: NO_ITEM, cutouts: &[], closeness, hits };
+    let mut traversal = Traversal::new(&frame.nodes, &[], picture, scene_stack).around_last();
+    while let Some((leaf, _)) = traversal.next(simd, &query) {
+        for &item in frame.items_of(leaf) {
+            query.item = item;
+            query.cutouts = frame.cutouts_of(item);
+            match frame.items.get(item) {
+                Item::Model(index) => {
+                    let instance = &frame.instances[index];
+                    let projection = tile.projection_of(instance);
+                    let picture = Picture { projection: &projection, rays };
+                    cover_nearest_first(simd, &instance.mesh, picture, mesh_stack, projected, &mut query);
                 }
+                Item::Triangle(index) => {
+                    let corners = frame.triangles[index].corners;
+                    projected.project_exactly(0, tile.projection(), corners, rays);
+                    cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
+                }
+                Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
             }
-        }
-        for plane in 0..self.frame.planes.len() as u32 {
-            query.item = self.frame.items.first_plane() + plane;
-            query.test_every_ray(simd);
-        }
-        if hits.iter().any(|hits| hits.coincident != 0) {
-            self.resolve_coincident(hits);
         }
     }
+    for plane in 0..frame.planes.len() as u32 {
+        query.item = frame.items.first_plane() + plane;
+        query.test_every_ray(simd);
+    }
+    if hits.iter().any(|hits| hits.coincident != 0) {
+        resolve_coincident(tile, hits);
+    }
+}
 
-    /// Rays whose nearest hit may coincide with others hit one of the same surface everywhere: see `intersect::coincide`.
-    #[cold]
-    #[inline(never)]
-    fn resolve_coincident(&self, hits: &mut [HitBlock; BLOCKS]) {
-        for (block, hits) in hits.iter_mut().enumerate() {
-            for lane in each_bit(hits.coincident) {
-                let nearest = hits.slot(lane);
-                let ray = self.ray(block, lane);
-                let (preferred, others) =
-                    self.frame.preferred(&ray, nearest, f64::INFINITY, self.starts_on(block, lane));
-                hits.coincident &= !(u32::from(!others) << lane);
-                hits.set(lane, preferred);
-            }
+/// Rays whose nearest hit may coincide with others hit one of the same surface everywhere: see `intersect::coincide`.
+#[cold]
+#[inline(never)]
+fn resolve_coincident<T: PictureTile>(tile: &T, hits: &mut [HitBlock; BLOCKS]) {
+    for (block, hits) in hits.iter_mut().enumerate() {
+        for lane in each_bit(hits.coincident) {
+            let nearest = hits.slot(lane);
+            let ray = tile.ray(block, lane);
+            let (preferred, others) =
+                tile.frame().preferred(&ray, nearest, f64::INFINITY, tile.starts_on(block, lane));
+            hits.coincident &= !(u32::from(!others) << lane);
+            hits.set(lane, preferred);
         }
     }
 }
 
 /// Query for the closest triangle. While a tile is searched, [`HitBlock::coincident`] has the rays whose hit may coincide
 /// with others.
-struct ClosestQuery<'a, 'b> {
-    tile: &'a EyeTile<'a>,
+struct ClosestQuery<'a, 'b, T> {
+    tile: &'a T,
     /// The item whose triangles are tested.
     item: u32,
     /// Bits of its triangles that alpha cuts out.
@@ -147,12 +159,12 @@ struct Nearest<S: Simd> {
     changed: u32,
 }
 
-impl ClosestQuery<'_, '_> {
+impl<T: PictureTile> ClosestQuery<'_, '_, T> {
     /// Tests an item without lines in the picture, exactly, ray by ray.
     #[inline(always)]
     fn test_every_ray<S: Simd>(&mut self, simd: S) {
         for block in 0..BLOCKS {
-            for lane in each_bit(self.tile.live[block]) {
+            for lane in each_bit(self.tile.live(block)) {
                 self.test_exactly(block, lane, 0);
             }
         }
@@ -163,7 +175,7 @@ impl ClosestQuery<'_, '_> {
     #[inline(never)]
     fn test_exactly(&mut self, block: usize, lane: usize, triangle: u32) {
         let (ray, starts_on) = (self.tile.ray(block, lane), self.tile.starts_on(block, lane));
-        let frame = self.tile.frame;
+        let frame = self.tile.frame();
         let primitive = PrimitiveId { item: self.item, triangle };
         let Some(hit) = frame.hit_of(&ray, primitive, starts_on) else { return };
         let slack = frame.slack(&ray, primitive, hit.t);
@@ -175,7 +187,8 @@ impl ClosestQuery<'_, '_> {
         }
         if best.is_none_or(|best| hit.wins_over(&best, frame)) {
             hits.set(lane, primitive);
-            self.closeness.record(block, lane, hit.t, slack);
+            let depth = |t: f64| self.tile.depth(block, lane, t);
+            self.closeness.record::<T>(block, lane, depth(hit.t), depth(hit.t + slack));
         }
     }
 
@@ -207,7 +220,7 @@ impl ClosestQuery<'_, '_> {
         triangles: u32,
         block: usize,
     ) -> bool {
-        let rays = self.tile.rays;
+        let rays = self.tile.picture();
         let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
         let mut nearest = self.load(simd, block, 0);
         let mut tested = 0;
@@ -217,7 +230,21 @@ impl ClosestQuery<'_, '_> {
             let (z_low, z_high) = (z - error, z + error);
             // All that is not farther for certain, even if a number is NaN.
             let maybe = maybe & !bits(z_high.simd_lt(nearest.low));
-            let certain = maybe & certain & bits(z_low.simd_gt(nearest.high));
+            let mut certain = maybe & certain & bits(z_low.simd_gt(nearest.high));
+            let mut maybe = maybe;
+            if T::STARTS {
+                if self.tile.is_start(PrimitiveId { item: self.item, triangle: first + lane as u32 }) {
+                    continue;
+                }
+                let [may_have, has] = self.tile.started(simd, block, z_low, z_high);
+                maybe &= may_have;
+                certain &= has;
+            }
+            if T::PARALLEL {
+                // Only the exact test distinguishes a triangle on the plane of the origins from one behind it.
+                certain &= bits(z_high.simd_lt(splat(simd, 0.0)));
+                maybe &= !bits(z_low.simd_gt(splat(simd, 0.0)));
+            }
             let mask = mask_of(simd, certain);
             nearest.low = select(mask, z_low, nearest.low);
             nearest.high = select(mask, z_high, nearest.high);
@@ -252,7 +279,7 @@ impl ClosestQuery<'_, '_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let rays = self.tile.rays;
+                let rays = self.tile.picture();
                 let (x, y) = (rays.x[block].load(simd), rays.y[block].load(simd));
                 let mut tested = 0;
                 for lane in each_bit(triangles) {
@@ -270,8 +297,9 @@ impl ClosestQuery<'_, '_> {
     }
 }
 
-impl<S: Simd> NodeFilter<S> for ClosestQuery<'_, '_> {
+impl<S: Simd, T: PictureTile> NodeFilter<S> for ClosestQuery<'_, '_, T> {
     const ON_GRID: bool = true;
+    const FROM_PLANE: bool = T::PARALLEL;
 
     fn least(&self) -> &Lanes {
         &self.closeness.least
@@ -287,14 +315,14 @@ impl<S: Simd> NodeFilter<S> for ClosestQuery<'_, '_> {
     }
 }
 
-impl<S: Simd> TileQuery<S> for ClosestQuery<'_, '_> {
+impl<S: Simd, T: PictureTile> TileQuery<S> for ClosestQuery<'_, '_, T> {
     /// Block by block, so that the hits of a block stay in registers.
     #[inline(always)]
     fn cover(&mut self, simd: S, projected: &ProjectedTriangles, first: u32, blocks: u32) {
         let mut changed = 0;
         let cut = cutout::bits_at(self.cutouts, first);
         for block in each_bit(blocks) {
-            let rectangle = self.tile.rays.around(block);
+            let rectangle = self.tile.picture().around(block);
             let triangles = projected.touching(simd, rectangle, self.closeness.least.0[block]);
             if triangles != 0 {
                 let mut any = self.cover_block(simd, projected, first, triangles & !cut, block);

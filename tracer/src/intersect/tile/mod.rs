@@ -1,8 +1,9 @@
 //! Tiles: 256 rays that start at one point, or are parallel, traced together.
 //!
-//! All primary rays of a frame start at the eye, and shadow rays of a point light end at it. Projected from there, sixteen by
-//! sixteen neighbouring rays are a small square of a picture, and a triangle is three straight lines in that picture. So the
-//! work that a packet tracer does per ray is done once per tile, or once per triangle:
+//! All primary rays of a pinhole camera start at the eye, and shadow rays of a point light end at it. Projected from there,
+//! sixteen by sixteen neighbouring rays are a small square of a picture, and a triangle is three straight lines in that picture.
+//! So are parallel rays, those of an orthographic camera and of a directional light, projected along their direction. So the work
+//! that a packet tracer does per ray is done once per tile, or once per triangle:
 //!
 //! ```text
 //!   Projection           the picture from the point: (x, y) where a ray crosses the plane at depth 1    rays/projection.rs
@@ -12,7 +13,7 @@
 //!   TileQuery            the remaining triangles against blocks of sixteen rays                         query.rs
 //! ```
 //!
-//! [`closest`] finds the closest hits of a tile of the camera, [`shadow`] the points of a tile that a light does not reach.
+//! [`closest`] finds the closest hits of a tile of a camera, [`shadow`] the points of a tile that a light does not reach.
 //!
 //! **Certain or exact.** All of this is `f32`, with an error bound of every number. A ray that is inside all lines, and
 //! nearer, by more than the bounds is decided. All others are tested exactly, in `f64`. So rounding never decides a hit, and
@@ -32,6 +33,7 @@ mod traversal;
 
 use crate::rays::{Projection, TileRays};
 use closest::Closeness;
+pub(crate) use closest::find_closest;
 use points::Points;
 use projected_triangles::ProjectedTriangles;
 use traversal::{Frontier, TraversalStack};

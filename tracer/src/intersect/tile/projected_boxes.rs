@@ -65,6 +65,12 @@ pub(super) fn in_frustum<S: Simd>(simd: S, node: &WideNode, frustum: &Frustum) -
     !bits(outside)
 }
 
+/// Bits of the children that may reach depths above 0. `depth` is the row of depths, with its error bound.
+#[inline(always)]
+pub(super) fn in_front<S: Simd>(simd: S, node: &WideNode, depth: &Row, error: f32) -> u32 {
+    bits(depth.greatest(simd, node).simd_ge(splat(simd, -error)))
+}
+
 /// Rectangles around the boxes of a node in the picture.
 pub(super) struct ProjectedBoxes {
     sides: [Lanes; 4],

@@ -207,13 +207,16 @@ impl ProjectedTriangles {
         for (lanes, number) in self.z.iter_mut().zip([z0, zx, zy]) {
             lanes.0[lane] = number;
         }
-        // A plane that moves across itself comes closer in proportion to the change of its distance.
+        // A plane that moves across itself comes closer in proportion to the change of its distance from a point, and to parallel
+        // rays by the way along them.
         let drift = if projection.drift > 0.0 {
             projection.drift * across.length() * projection.volume() / determinant.abs()
         } else {
             0.0
         };
-        let z_error = (4.0 * ROUNDING + drift as f32) * size([z0, zx, zy])
+        let drift = if projection.parallel { drift as f32 } else { drift as f32 * size([z0, zx, zy]) };
+        let z_error = 4.0 * ROUNDING * size([z0, zx, zy])
+            + drift
             + (zx.abs() + zy.abs()) * rays.error
             + gradient_error as f32 * (1.0 + 2.0 * reach);
         self.z_error.0[lane] = z_error;

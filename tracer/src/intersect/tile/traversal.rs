@@ -4,7 +4,7 @@
 //! level: loads of one level's nodes overlap, which suits queries for any triangle.
 
 use super::Picture;
-use super::projected_boxes::{ProjectedBoxes, Row, in_frustum};
+use super::projected_boxes::{ProjectedBoxes, Row, in_front, in_frustum};
 use crate::bvh::{MAX_WIDE_DEPTH, WIDTH, WideChild, WideNode};
 use crate::mesh::TriangleBlock;
 use crate::rays::{ALL_BLOCKS, Frustum};
@@ -14,6 +14,9 @@ use crate::simd::{Indices, Lanes, Simd, SimdBase, bits, each_bit, prefetch, sele
 pub(super) trait NodeFilter<S: Simd> {
     /// Whether rays are on a grid with step 1, so that boxes and triangles between them can be dropped.
     const ON_GRID: bool;
+
+    /// Whether rays are parallel and start at depth 0, so that boxes behind it can be dropped.
+    const FROM_PLANE: bool = false;
 
     /// Least closeness that matters to each block of rays; infinity if none does.
     fn least(&self) -> &Lanes;
@@ -121,6 +124,9 @@ impl<'a> NodeTester<'a> {
             wanted &= !crossing | in_frustum(simd, node, &Frustum::new(projection, rays.union));
         }
         wanted &= crossing | boxes.overlapping::<S, F>(simd, rays.union);
+        if F::FROM_PLANE {
+            wanted &= in_front(simd, node, &self.rows[2], projection.error[1]);
+        }
         let least = filter.least();
         let few = wanted.count_ones() <= blocks.count_ones();
         let mut by_block = if few { Indices::ZERO } else { boxes.blocks_of_all(simd, rays, least, blocks) };

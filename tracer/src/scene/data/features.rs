@@ -23,7 +23,7 @@ pub struct SceneFeatures {
     pub unlit: bool,
     /// A material is cut out by alpha.
     pub cut_out: bool,
-    /// A model has interpolated normals, which differ from the geometric ones.
+    /// A model has interpolated normals.
     pub smooth: bool,
     /// A light casts shadows.
     pub shadows: bool,
@@ -31,8 +31,6 @@ pub struct SceneFeatures {
     pub bounces: bool,
     /// A material transmits: sides are told apart, and shadows are not all or nothing.
     pub transparent: bool,
-    /// A material emits or transmits: the front of a surface differs from its back.
-    pub sided: bool,
     /// A material of some geometry casts no shadow.
     pub shadowless: bool,
     /// A light that casts shadows has an extent.
@@ -63,7 +61,6 @@ impl SceneFeatures {
             shadows: scene.lights.iter().any(|light| light.shadows),
             bounces: any(Material::bounces),
             transparent: any(Material::is_transparent),
-            sided: any(|material| material.is_emissive() || material.is_transparent()),
             shadowless: any(|material| !material.casts_shadow),
             soft_shadows: scene.lights.iter().any(|light| light.shadows && light.radius > 0.0),
             checkered: any(|material| material.checker.is_some()),
@@ -71,18 +68,43 @@ impl SceneFeatures {
         }
     }
 
+    /// Whether shading normals differ from geometric ones: they are interpolated, or tilted by a normal map.
+    #[inline(always)]
+    pub fn shaded_normals(&self) -> bool {
+        self.smooth || self.normal_mapped
+    }
+
     /// Features that remain after applying a quality setting.
     #[must_use]
     pub fn at(self, quality: &Quality) -> Self {
         let full = quality.shading == Shading::Full;
+        let shown = self.shown_by(quality.shading);
         Self {
-            specular: self.specular && full,
-            powers: self.powers && full,
-            filtered: self.filtered && quality.filter != Some(Filter::Nearest),
-            shadows: self.shadows && quality.shadows,
-            soft_shadows: self.soft_shadows && quality.shadows,
-            bounces: self.bounces && quality.max_depth > 0,
-            ..self
+            specular: shown.specular && full,
+            powers: shown.powers && full,
+            filtered: shown.filtered && quality.filter != Some(Filter::Nearest),
+            shadows: shown.shadows && quality.shadows,
+            soft_shadows: shown.soft_shadows && quality.shadows,
+            bounces: shown.bounces && quality.max_depth > 0,
+            ..shown
+        }
+    }
+
+    /// Features that pictures of a kind show. Those of light show all.
+    #[must_use]
+    pub fn shown_by(self, shading: Shading) -> Self {
+        let holes = Self { cut_out: self.cut_out, ..Self::default() };
+        match shading {
+            Shading::Full | Shading::Diffuse => self,
+            Shading::Normals => Self { smooth: self.smooth, normal_mapped: self.normal_mapped, ..holes },
+            Shading::Depth | Shading::Item => holes,
+            Shading::Albedo => Self {
+                textured: self.textured,
+                filtered: self.filtered,
+                vertex_colors: self.vertex_colors,
+                checkered: self.checkered,
+                ..holes
+            },
         }
     }
 }
@@ -166,5 +188,37 @@ mod tests {
         assert!(!left.specular && !left.powers && !left.shadows);
         let fast = Quality { exponent: ExponentPrecision::Fast, ..Quality::default() };
         assert_eq!(features.at(&fast), features);
+    }
+
+    #[test]
+    fn pictures_without_light_use_no_feature_of_light() {
+        let everything = SceneFeatures {
+            specular: true,
+            powers: true,
+            textured: true,
+            filtered: true,
+            vertex_colors: true,
+            emissive: true,
+            unlit: true,
+            cut_out: true,
+            smooth: true,
+            shadows: true,
+            bounces: true,
+            transparent: true,
+            shadowless: true,
+            soft_shadows: true,
+            checkered: true,
+            normal_mapped: true,
+        };
+        let at = |shading| everything.at(&Quality { shading, ..Quality::default() });
+        assert_eq!(at(Shading::Full), everything);
+        let holes = SceneFeatures { cut_out: true, ..SceneFeatures::default() };
+        assert_eq!((at(Shading::Depth), at(Shading::Item)), (holes, holes));
+        assert_eq!(at(Shading::Normals), SceneFeatures { smooth: true, normal_mapped: true, ..holes });
+        let colored = SceneFeatures { textured: true, filtered: true, vertex_colors: true, ..holes };
+        assert_eq!(at(Shading::Albedo), SceneFeatures { checkered: true, ..colored });
+        let nearest =
+            Quality { shading: Shading::Albedo, filter: Some(Filter::Nearest), ..Quality::default() };
+        assert!(!everything.at(&nearest).filtered);
     }
 }

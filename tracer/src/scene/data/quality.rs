@@ -29,8 +29,8 @@ pub struct Quality {
     pub min_contribution: f32,
     /// Points of a light with a radius that shadow rays go to, where the light itself has no number.
     pub shadow_samples: u16,
-    /// Whether points with interpolated normals are lit as if the surface were smooth, so that the shadow's edge does not show the
-    /// triangles.
+    /// Whether shadow rays of points with interpolated normals start on the smooth surface that the normals describe, so that the
+    /// edge of a mesh's own shadow does not show its triangles.
     pub smooth_terminator: bool,
 }
 
@@ -52,7 +52,8 @@ impl Default for Quality {
     }
 }
 
-/// Terms of the shading equation that are computed.
+/// What a picture shows: light, by all or some terms of the shading equation, or a property of the surfaces. Those pictures have a
+/// black background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Shading {
     /// All terms that the materials have.
@@ -61,11 +62,12 @@ pub enum Shading {
     Diffuse,
     /// Not light but the shading normal, turned to the viewer, in world space: (n + 1) / 2 as a linear colour.
     Normals,
-    /// Not light but the distance from the camera, in greys: nearer is brighter.
+    /// Not light but the distance d from the start of the ray, in greys: 1 / (1 + d / s), where s is the distance from the camera
+    /// to the point that it looks at.
     Depth,
-    /// Not light but a colour for each object.
+    /// Not light but a colour for each model, sphere, disk, plane and single triangle.
     Item,
-    /// Not light but the diffuse colour with its textures.
+    /// Not light but the diffuse colour, with textures, vertex colours and checkers.
     Albedo,
 }
 
@@ -89,7 +91,19 @@ pub enum ColorDepth {
 
 impl Shading {
     /// Each value with its word.
-    pub const WORDS: [(&'static str, Self); 2] = [("full", Self::Full), ("diffuse", Self::Diffuse)];
+    pub const WORDS: [(&'static str, Self); 6] = [
+        ("full", Self::Full),
+        ("diffuse", Self::Diffuse),
+        ("normals", Self::Normals),
+        ("depth", Self::Depth),
+        ("item", Self::Item),
+        ("albedo", Self::Albedo),
+    ];
+
+    /// Whether pictures show light: else no light is computed, and no ray leaves a surface.
+    pub fn is_light(self) -> bool {
+        matches!(self, Self::Full | Self::Diffuse)
+    }
 }
 
 impl ExponentPrecision {

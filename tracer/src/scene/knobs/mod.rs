@@ -3,6 +3,9 @@
 //! [`KNOBS`] lists every knob with its names, its values from cheapest to best, how each value is applied to a [`Setting`],
 //! and when the knob matters. A new knob is an entry of the table and the code of the tracer that obeys it.
 //!
+//! Some knobs take any number of a range ([`NumberRange`]); their lists have the numbers that the quality controller and
+//! `tradeoff` choose from. Some have values apart from the order, which no program chooses by itself ([`Knob::apart`]).
+//!
 //! ```
 //! use rayfarm_tracer::scene::Setting;
 //! use rayfarm_tracer::scene::knobs::Knob;
@@ -15,17 +18,21 @@
 //! # Ok::<(), &str>(())
 //! ```
 
+mod number;
 mod setting;
 mod table;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 pub use super::data::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setting, Shading, word_of};
+pub use number::NumberRange;
 pub use table::KNOBS;
 
 use super::data::SceneFeatures;
 
-/// A knob: one property of a [`Setting`] with a fixed list of values.
+/// A knob: one property of a [`Setting`] with a list of values.
 #[derive(Debug)]
 pub struct Knob {
     /// Name in reports and in the JSON of `--json`.
@@ -38,18 +45,22 @@ pub struct Knob {
     pub summary: &'static str,
     /// How a value is written.
     pub form: KnobForm,
-    /// All values, the cheapest first. The last one is the best: it leaves the picture as the scene requests it.
+    /// The values in their order, the cheapest first. The last one is the best: as a limit it changes no setting. A knob with a
+    /// [`NumberRange`] also has the numbers between them.
     pub values: &'static [KnobValue],
+    /// Values that are neither cheaper nor better than others, because they request another kind of picture. No limit changes
+    /// them, and no limit has them.
+    pub apart: &'static [KnobValue],
     /// Whether a cheaper value reduces the accuracy of a picture. Other knobs are never turned automatically.
     pub reduces: bool,
     /// Whether the value has an effect next to the other knobs of a setting, whatever the scene.
-    pub acts: fn(&Setting) -> bool,
-    /// Whether the picture of a scene with these features can depend on the knob.
-    pub matters: fn(&SceneFeatures, &Setting) -> bool,
+    acts: fn(&Setting) -> bool,
+    /// See [`Knob::matters`].
+    matters: fn(&SceneFeatures, &Setting) -> bool,
 }
 
 /// How the values of a knob are written in scene files and on command lines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum KnobForm {
     /// `true` or `false` in a scene file, `on` or `off` on the command line, where the option alone means `on`.
     Switch,
@@ -59,6 +70,34 @@ pub enum KnobForm {
     Count,
     /// A number or a fraction: 0.5, or 1/2, which is in quotes in a scene file.
     Fraction,
+    /// Any number of a range, whether or not it is one of the values.
+    Number(&'static NumberRange),
+}
+
+/// A value of a knob as a scene file or a command line gives it.
+#[derive(Clone, Copy, Debug)]
+pub enum GivenValue {
+    /// A value of the table.
+    Listed(&'static KnobValue),
+    /// A number of a range.
+    Number(&'static NumberRange, f32),
+}
+
+impl GivenValue {
+    /// Gives a setting this value.
+    pub fn apply(&self, setting: &mut Setting) {
+        match self {
+            Self::Listed(value) => value.apply(setting),
+            Self::Number(range, number) => range.apply(*number, setting),
+        }
+    }
+
+    /// Whether a setting has this value.
+    pub fn is_of(&self, setting: &Setting) -> bool {
+        let mut applied = *setting;
+        self.apply(&mut applied);
+        applied == *setting
+    }
 }
 
 /// A value of a knob.
@@ -83,12 +122,16 @@ impl Knob {
 
     /// The value with this word or alias.
     pub fn value(&self, text: &str) -> Option<&'static KnobValue> {
-        self.values.iter().find(|value| value.word == Some(text) || value.aliases.contains(&text))
+        self.all().find(|value| value.word == Some(text) || value.aliases.contains(&text))
     }
 
-    /// The value that a setting has; the best one for a sample count beyond the list.
+    /// The value that a setting has. For a number between two of the list it is the cheaper one of them; for a number that is
+    /// cheaper than all of the list, the cheapest.
     pub fn value_of(&self, setting: &Setting) -> &'static KnobValue {
-        &self.values[self.rank_of(setting)]
+        match self.rank_of(setting) {
+            Some(rank) => &self.values[rank],
+            None => self.apart.iter().find(|value| value.is_of(setting)).unwrap_or(self.best()),
+        }
     }
 
     /// The best value.
@@ -96,15 +139,48 @@ impl Knob {
         &self.values[self.values.len() - 1]
     }
 
-    /// The words of all values, the best first.
+    /// The words of all values, the best first, and then those apart from the order.
     pub fn words(&self) -> impl Iterator<Item = &'static str> {
-        self.values.iter().rev().filter_map(|value| value.word)
+        self.values.iter().rev().chain(self.apart).filter_map(|value| value.word)
     }
 
-    /// Place of a setting's value among the values: 0 is the cheapest.
-    fn rank_of(&self, setting: &Setting) -> usize {
-        let last = self.values.len() - 1;
-        self.values.iter().position(|value| value.is_of(setting)).unwrap_or(last)
+    /// Short name of the reduction of a setting for overlays and logs, such as "no shadows" or "depth 1"; `None` where nothing is
+    /// reduced.
+    pub fn reduction(&self, setting: &Setting) -> Option<Cow<'static, str>> {
+        match self.form {
+            KnobForm::Number(range) => range.reduction(setting).map(Cow::Owned),
+            _ => self.value_of(setting).label.map(Cow::Borrowed),
+        }
+    }
+
+    /// Whether the picture of a scene with these features, at this setting, can depend on the knob.
+    pub fn matters(&self, features: &SceneFeatures, setting: &Setting) -> bool {
+        (self.matters)(&features.shown_by(setting.quality.shading), setting)
+    }
+
+    /// Lowers a setting to the value of `limit`, where that is cheaper.
+    fn limit(&self, setting: &mut Setting, limit: &Setting) {
+        if let KnobForm::Number(range) = self.form {
+            return range.limit(setting, limit);
+        }
+        if let (Some(own), Some(most)) = (self.rank_of(setting), self.rank_of(limit))
+            && most < own
+        {
+            self.values[most].apply(setting);
+        }
+    }
+
+    /// Place of a setting's value among the ordered values: 0 is the cheapest. `None` for a value apart from the order.
+    fn rank_of(&self, setting: &Setting) -> Option<usize> {
+        if let KnobForm::Number(range) = self.form {
+            return Some(range.rank_of(setting, self.values));
+        }
+        self.values.iter().position(|value| value.is_of(setting))
+    }
+
+    /// The ordered values and those apart from the order.
+    fn all(&self) -> impl Iterator<Item = &'static KnobValue> {
+        self.values.iter().chain(self.apart)
     }
 }
 

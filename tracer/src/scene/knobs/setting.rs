@@ -1,12 +1,15 @@
 //! Operations on whole settings, as loops over the table of knobs.
 
-use super::{ColorDepth, ExponentPrecision};
+use std::borrow::Cow;
+
+use super::{ColorDepth, ExponentPrecision, KnobForm};
 use super::{KNOBS, Quality, RenderScale, Setting, Shading};
 use crate::scene::data::SceneFeatures;
-use crate::scene::validate::MAX_SAMPLES;
+use crate::scene::validate::{MAX_DEPTH, MAX_SAMPLES, MAX_SHADOW_SAMPLES};
 
 impl Setting {
-    /// The best value of every knob, and the largest sample count: as a limit it changes no setting.
+    /// The best value of every knob: as a limit it changes no setting. It is no setting to render with: the depth, for example, is
+    /// the largest that is allowed.
     pub const FULL: Self = Self {
         samples: MAX_SAMPLES,
         scale: RenderScale::Full,
@@ -18,41 +21,52 @@ impl Setting {
             exponent: ExponentPrecision::Exact,
             colors: ColorDepth::Exact,
             dither: false,
-            max_depth: 5,
-            min_contribution: 0.004,
-            shadow_samples: 16,
+            max_depth: MAX_DEPTH,
+            min_contribution: 0.0,
+            shadow_samples: MAX_SHADOW_SAMPLES,
             smooth_terminator: true,
         },
     };
 
-    /// For each knob the cheaper value of both settings. Knobs that reduce nothing keep their value.
+    /// For each knob the cheaper value of both settings. Knobs that reduce nothing keep their value, and so do values apart from
+    /// the order.
     #[must_use]
     pub fn at_most(self, limit: &Self) -> Self {
         let mut setting = self;
         for knob in KNOBS.iter().filter(|knob| knob.reduces) {
-            let rank = knob.rank_of(limit);
-            if rank < knob.rank_of(&self) {
-                knob.values[rank].apply(&mut setting);
-            }
+            knob.limit(&mut setting, limit);
         }
         setting
     }
 
-    /// The setting with the best value for every knob that makes no difference to a scene with these features.
+    /// Full quality of the same picture: the setting with the best value of every knob that reduces accuracy. Numbers of a range
+    /// keep their values, because full quality is the scene's own number, and so do values apart from the order.
     #[must_use]
-    pub fn without_idle(self, features: &SceneFeatures) -> Self {
+    pub fn restored(self) -> Self {
         let mut setting = self;
-        for knob in KNOBS.iter().filter(|knob| knob.reduces) {
-            if !(knob.matters)(features, &setting) {
+        for knob in KNOBS.iter().filter(|knob| knob.reduces && !matches!(knob.form, KnobForm::Number(_))) {
+            if knob.rank_of(&setting).is_some() {
                 knob.best().apply(&mut setting);
             }
         }
         setting
     }
 
-    /// Labels of all values that reduce the accuracy, in the order of the table.
-    pub fn reductions(&self) -> Vec<&'static str> {
+    /// The setting, as a limit, with the best value for every knob that makes no difference to a scene with these features.
+    #[must_use]
+    pub fn without_idle(self, features: &SceneFeatures) -> Self {
+        let mut setting = self;
+        for knob in KNOBS.iter().filter(|knob| knob.reduces) {
+            if !knob.matters(features, &setting) {
+                knob.best().apply(&mut setting);
+            }
+        }
+        setting
+    }
+
+    /// Short names of all values that reduce the accuracy, in the order of the table.
+    pub fn reductions(&self) -> Vec<Cow<'static, str>> {
         let acting = KNOBS.iter().filter(|knob| (knob.acts)(self));
-        acting.filter_map(|knob| knob.value_of(self).label).collect()
+        acting.filter_map(|knob| knob.reduction(self)).collect()
     }
 }

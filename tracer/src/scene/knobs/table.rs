@@ -1,6 +1,9 @@
 //! The table of knobs.
 
-use super::{ColorDepth, ExponentPrecision, Knob, KnobForm, KnobValue, RenderScale, Setting, Shading};
+use super::{
+    ColorDepth, ExponentPrecision, Knob, KnobForm, KnobValue, NumberRange, RenderScale, Setting, Shading,
+};
+use crate::scene::validate::{MAX_DEPTH, MAX_SHADOW_SAMPLES};
 use crate::texture::Filter;
 
 /// All knobs, in the order in which reports list them.
@@ -12,6 +15,7 @@ pub static KNOBS: &[Knob] = &[
         summary: "Rays per pixel: a square number, 1, 4, 9, 16, ...",
         form: KnobForm::Count,
         values: SAMPLE_COUNTS,
+        apart: &[],
         reduces: true,
         acts: |_| true,
         matters: |_, _| true,
@@ -31,6 +35,7 @@ pub static KNOBS: &[Knob] = &[
                 .with_aliases(&["0.75"]),
             usual("1", |s| s.scale = RenderScale::Full),
         ],
+        apart: &[],
         reduces: true,
         acts: |_| true,
         matters: |_, _| true,
@@ -45,6 +50,7 @@ pub static KNOBS: &[Knob] = &[
             reduced("on", "adaptive samples", "adaptive", |s| s.quality.adaptive = true),
             usual("off", |s| s.quality.adaptive = false),
         ],
+        apart: &[],
         reduces: true,
         acts: |setting| setting.samples > 1,
         matters: |_, setting| setting.samples > 1,
@@ -59,23 +65,131 @@ pub static KNOBS: &[Knob] = &[
             reduced("off", "no shadows", "no-shadows", |s| s.quality.shadows = false),
             usual("on", |s| s.quality.shadows = true),
         ],
+        apart: &[],
         reduces: true,
-        acts: |_| true,
+        acts: shows_light,
         matters: |features, _| features.shadows,
+    },
+    Knob {
+        name: "shadow_samples",
+        key: "shadow_samples",
+        option: "shadow-samples",
+        summary: "Points of a light with a radius that shadow rays go to, from 1 to 1024.",
+        form: KnobForm::Number(&NumberRange {
+            least: 1.0,
+            most: MAX_SHADOW_SAMPLES as f32,
+            whole: true,
+            rises: true,
+            get: |s| f32::from(s.quality.shadow_samples),
+            set: |s, number| s.quality.shadow_samples = number as u16,
+            label: |number| format!("{number} shadow sample{}", if number == 1.0 { "" } else { "s" }),
+        }),
+        values: &[
+            fewer("1", "shadow-samples-1", |s| s.quality.shadow_samples = 1),
+            fewer("4", "shadow-samples-4", |s| s.quality.shadow_samples = 4),
+            fewer("9", "shadow-samples-9", |s| s.quality.shadow_samples = 9),
+            usual("16", |s| s.quality.shadow_samples = 16),
+            usual("25", |s| s.quality.shadow_samples = 25),
+            usual("36", |s| s.quality.shadow_samples = 36),
+            usual("64", |s| s.quality.shadow_samples = 64),
+            usual("256", |s| s.quality.shadow_samples = 256),
+            usual("1024", |s| s.quality.shadow_samples = MAX_SHADOW_SAMPLES),
+        ],
+        apart: &[],
+        reduces: true,
+        acts: |setting| shows_light(setting) && setting.quality.shadows,
+        matters: |features, setting| features.soft_shadows && setting.quality.shadows,
+    },
+    Knob {
+        name: "terminator",
+        key: "smooth_terminator",
+        option: "smooth-terminator",
+        summary: "Whether shadow rays of smooth meshes start on the smooth surface, or on its triangles.",
+        form: KnobForm::Switch,
+        values: &[
+            reduced("off", "hard terminator", "hard-terminator", |s| s.quality.smooth_terminator = false),
+            usual("on", |s| s.quality.smooth_terminator = true),
+        ],
+        apart: &[],
+        reduces: true,
+        acts: |setting| shows_light(setting) && setting.quality.shadows,
+        matters: |features, setting| features.smooth && features.shadows && setting.quality.shadows,
     },
     Knob {
         name: "shading",
         key: "shading",
         option: "shading",
-        summary: "The terms of the shading: all, or without highlights.",
+        summary: "The terms of the shading: all, or without highlights; or a picture of something else than light.",
         form: KnobForm::Word,
         values: &[
             reduced("diffuse", "diffuse only", "diffuse", |s| s.quality.shading = Shading::Diffuse),
             usual("full", |s| s.quality.shading = Shading::Full),
         ],
+        apart: &[
+            usual("normals", |s| s.quality.shading = Shading::Normals),
+            usual("depth", |s| s.quality.shading = Shading::Depth),
+            usual("item", |s| s.quality.shading = Shading::Item),
+            usual("albedo", |s| s.quality.shading = Shading::Albedo),
+        ],
         reduces: true,
         acts: |_| true,
-        matters: |features, _| features.specular,
+        matters: |features, setting| features.specular || !shows_light(setting),
+    },
+    Knob {
+        name: "depth",
+        key: "max_depth",
+        option: "max-depth",
+        summary: "The largest number of reflections and transmissions of a ray, from 0 to 64.",
+        form: KnobForm::Number(&NumberRange {
+            least: 0.0,
+            most: MAX_DEPTH as f32,
+            whole: true,
+            rises: true,
+            get: |s| f32::from(s.quality.max_depth),
+            set: |s, number| s.quality.max_depth = number as u8,
+            label: |number| format!("depth {number}"),
+        }),
+        values: &[
+            fewer("0", "depth-0", |s| s.quality.max_depth = 0),
+            fewer("1", "depth-1", |s| s.quality.max_depth = 1),
+            fewer("2", "depth-2", |s| s.quality.max_depth = 2),
+            fewer("3", "depth-3", |s| s.quality.max_depth = 3),
+            usual("5", |s| s.quality.max_depth = 5),
+            usual("8", |s| s.quality.max_depth = 8),
+            usual("16", |s| s.quality.max_depth = 16),
+            usual("64", |s| s.quality.max_depth = MAX_DEPTH),
+        ],
+        apart: &[],
+        reduces: true,
+        acts: shows_light,
+        matters: |features, _| features.bounces,
+    },
+    Knob {
+        name: "min_contribution",
+        key: "min_contribution",
+        option: "min-contribution",
+        summary: "A reflection or transmission that can add less than this, from 0 to 1, is not traced.",
+        form: KnobForm::Number(&NumberRange {
+            least: 0.0,
+            most: 1.0,
+            whole: false,
+            rises: false,
+            get: |s| s.quality.min_contribution,
+            set: |s, number| s.quality.min_contribution = number,
+            label: |number| format!("contributions from {number}"),
+        }),
+        values: &[
+            fewer("0.1", "contribution-0-1", |s| s.quality.min_contribution = 0.1),
+            fewer("0.03", "contribution-0-03", |s| s.quality.min_contribution = 0.03),
+            fewer("0.01", "contribution-0-01", |s| s.quality.min_contribution = 0.01),
+            usual("0.004", |s| s.quality.min_contribution = 0.004),
+            usual("0.001", |s| s.quality.min_contribution = 0.001),
+            usual("0", |s| s.quality.min_contribution = 0.0),
+        ],
+        apart: &[],
+        reduces: true,
+        acts: |setting| shows_light(setting) && setting.quality.max_depth > 0,
+        matters: |features, setting| features.bounces && setting.quality.max_depth > 0,
     },
     Knob {
         name: "filter",
@@ -86,6 +200,9 @@ pub static KNOBS: &[Knob] = &[
         values: &[
             reduced("nearest", "nearest texels", "nearest", |s| s.quality.filter = Some(Filter::Nearest)),
             reduced("bilinear", "bilinear texels", "bilinear", |s| s.quality.filter = Some(Filter::Bilinear)),
+            reduced("trilinear", "trilinear texels", "trilinear", |s| {
+                s.quality.filter = Some(Filter::Trilinear);
+            }),
             KnobValue {
                 word: None,
                 aliases: &[],
@@ -94,8 +211,9 @@ pub static KNOBS: &[Knob] = &[
                 apply: |s| s.quality.filter = None,
             },
         ],
+        apart: &[],
         reduces: true,
-        acts: |_| true,
+        acts: |setting| shows_light(setting) || setting.quality.shading == Shading::Albedo,
         matters: |features, _| features.filtered,
     },
     Knob {
@@ -110,8 +228,9 @@ pub static KNOBS: &[Knob] = &[
             }),
             usual("exact", |s| s.quality.exponent = ExponentPrecision::Exact),
         ],
+        apart: &[],
         reduces: true,
-        acts: |_| true,
+        acts: shows_light,
         matters: |features, setting| features.powers && setting.quality.shading == Shading::Full,
     },
     Knob {
@@ -126,6 +245,7 @@ pub static KNOBS: &[Knob] = &[
             }),
             usual("exact", |s| s.quality.colors = ColorDepth::Exact),
         ],
+        apart: &[],
         reduces: true,
         acts: |_| true,
         matters: |_, _| true,
@@ -146,6 +266,7 @@ pub static KNOBS: &[Knob] = &[
             },
             usual("off", |s| s.quality.dither = false),
         ],
+        apart: &[],
         reduces: false,
         acts: |_| true,
         matters: |_, _| true,
@@ -172,6 +293,11 @@ const SAMPLE_COUNTS: &[KnobValue] = &[
     samples("256", "samples-256", |s| s.samples = 256),
 ];
 
+/// Whether the picture of a setting shows light.
+fn shows_light(setting: &Setting) -> bool {
+    setting.quality.shading.is_light()
+}
+
 /// A sample count. Reports give the number itself, so it has no label.
 const fn samples(word: &'static str, slug: &'static str, apply: fn(&mut Setting)) -> KnobValue {
     KnobValue { word: Some(word), aliases: &[], label: None, slug: Some(slug), apply }
@@ -187,7 +313,12 @@ const fn reduced(
     KnobValue { word: Some(word), aliases: &[], label: Some(label), slug: Some(slug), apply }
 }
 
-/// The value at full quality.
+/// A number below the default. Its short name is made of the number.
+const fn fewer(word: &'static str, slug: &'static str, apply: fn(&mut Setting)) -> KnobValue {
+    KnobValue { word: Some(word), aliases: &[], label: None, slug: Some(slug), apply }
+}
+
+/// A value that reduces nothing.
 const fn usual(word: &'static str, apply: fn(&mut Setting)) -> KnobValue {
     KnobValue { word: Some(word), aliases: &[], label: None, slug: None, apply }
 }

@@ -2,26 +2,38 @@
 
 use std::collections::BTreeSet;
 
+use proptest::prelude::*;
+
 use super::*;
-use crate::scene::validate::{MAX_SAMPLES, is_sample_count};
+use crate::scene::data::RenderSettings;
+use crate::scene::validate::{MAX_DEPTH, MAX_SAMPLES, MAX_SHADOW_SAMPLES, is_sample_count};
 use crate::texture::Filter;
 
 fn all_off() -> SceneFeatures {
     SceneFeatures::default()
 }
 
-fn names(pick: fn(&Knob) -> &'static str) -> Vec<&'static str> {
-    KNOBS.iter().map(pick).collect()
-}
+/// Name, key and option of each knob.
+const NAMES: [[&str; 3]; 13] = [
+    ["samples"; 3],
+    ["scale"; 3],
+    ["adaptive"; 3],
+    ["shadows"; 3],
+    ["shadow_samples", "shadow_samples", "shadow-samples"],
+    ["terminator", "smooth_terminator", "smooth-terminator"],
+    ["shading"; 3],
+    ["depth", "max_depth", "max-depth"],
+    ["min_contribution", "min_contribution", "min-contribution"],
+    ["filter"; 3],
+    ["exponent"; 3],
+    ["colors", "pixels", "colors"],
+    ["dither"; 3],
+];
 
 #[test]
 fn knobs_have_their_names_keys_and_options() {
-    let expected =
-        ["samples", "scale", "adaptive", "shadows", "shading", "filter", "exponent", "colors", "dither"];
-    assert_eq!(names(|knob| knob.name), expected);
-    assert_eq!(names(|knob| knob.option), expected);
-    let keys = expected.map(|name| if name == "colors" { "pixels" } else { name });
-    assert_eq!(names(|knob| knob.key), keys);
+    let found: Vec<[&str; 3]> = KNOBS.iter().map(|knob| [knob.name, knob.key, knob.option]).collect();
+    assert_eq!(found, NAMES);
 }
 
 #[test]
@@ -30,8 +42,12 @@ fn words_of_values_are_the_best_first() {
     assert_eq!(words("scale"), ["1", "3/4", "1/2", "1/3", "1/4"]);
     assert_eq!(words("adaptive"), ["off", "on"]);
     assert_eq!(words("shadows"), ["on", "off"]);
-    assert_eq!(words("shading"), ["full", "diffuse"]);
-    assert_eq!(words("filter"), ["bilinear", "nearest"]);
+    assert_eq!(words("shadow_samples"), ["1024", "256", "64", "36", "25", "16", "9", "4", "1"]);
+    assert_eq!(words("terminator"), ["on", "off"]);
+    assert_eq!(words("shading"), ["full", "diffuse", "normals", "depth", "item", "albedo"]);
+    assert_eq!(words("depth"), ["64", "16", "8", "5", "3", "2", "1", "0"]);
+    assert_eq!(words("min_contribution"), ["0", "0.001", "0.004", "0.01", "0.03", "0.1"]);
+    assert_eq!(words("filter"), ["trilinear", "bilinear", "nearest"]);
     assert_eq!(words("exponent"), ["exact", "fast"]);
     assert_eq!(words("colors"), ["exact", "reduced"]);
     assert_eq!(words("dither"), ["off", "on"]);
@@ -44,7 +60,7 @@ fn words_of_values_are_the_best_first() {
 fn every_value_is_found_again_in_a_setting_that_has_it() {
     let mut slugs = BTreeSet::new();
     for knob in KNOBS {
-        for value in knob.values {
+        for value in knob.all() {
             let mut setting = Setting::FULL;
             value.apply(&mut setting);
             assert!(std::ptr::eq(knob.value_of(&setting), value), "{} {:?}", knob.name, value.word);
@@ -56,7 +72,6 @@ fn every_value_is_found_again_in_a_setting_that_has_it() {
         assert!(std::ptr::eq(knob.value_of(&Setting::FULL), knob.best()), "{}", knob.name);
         assert!(knob.value("no such value").is_none());
     }
-    assert_eq!(Setting::FULL.quality, Quality::default());
     assert!(Knob::named("no such knob").is_none());
 }
 
@@ -78,6 +93,10 @@ fn values_set_what_their_words_say() {
     }
     assert!(set("adaptive", "on").quality.adaptive && !set("shadows", "off").quality.shadows);
     assert!(set("dither", "on").quality.dither);
+    assert_eq!(set("depth", "3").quality.max_depth, 3);
+    assert_eq!(set("min_contribution", "0.03").quality.min_contribution, 0.03);
+    assert_eq!(set("shadow_samples", "25").quality.shadow_samples, 25);
+    assert!(!set("terminator", "off").quality.smooth_terminator);
     for (word, shading) in Shading::WORDS {
         assert_eq!(set("shading", word).quality.shading, shading);
     }
@@ -89,6 +108,67 @@ fn values_set_what_their_words_say() {
     }
     for (word, colors) in ColorDepth::WORDS {
         assert_eq!(set("colors", word).quality.colors, colors);
+    }
+}
+
+#[test]
+fn listed_numbers_are_those_of_their_words_in_order() {
+    for knob in KNOBS {
+        let KnobForm::Number(range) = knob.form else { continue };
+        let number = |value: &KnobValue| {
+            let mut setting = Setting::FULL;
+            value.apply(&mut setting);
+            range.of(&setting)
+        };
+        for value in knob.values {
+            assert_eq!(value.word.unwrap().parse(), Ok(number(value)), "{}", knob.name);
+            assert!(range.contains(number(value).into()), "{}: {:?}", knob.name, value.word);
+        }
+        for pair in knob.values.windows(2) {
+            let [cheaper, better] = [&pair[0], &pair[1]].map(number);
+            assert!((cheaper < better) == range.rises && cheaper != better, "{}", knob.name);
+        }
+        let ends = if range.rises { [range.least, range.most] } else { [range.most, range.least] };
+        assert_eq!(range.of(&Setting::FULL), ends[1], "{}", knob.name);
+    }
+}
+
+#[test]
+fn a_number_between_two_values_is_no_better_than_the_cheaper_one() {
+    let word = |name: &str, setting: &Setting| Knob::named(name).unwrap().value_of(setting).word;
+    let with = |quality| Setting { quality, ..Setting::FULL };
+    for (depth, expected) in [(0, "0"), (4, "3"), (5, "5"), (7, "5"), (63, "16"), (64, "64")] {
+        let setting = with(Quality { max_depth: depth, ..Quality::default() });
+        assert_eq!(word("depth", &setting), Some(expected), "{depth}");
+    }
+    for (least, expected) in [(1.0, "0.1"), (0.05, "0.1"), (0.02, "0.03"), (0.003, "0.004"), (0.0, "0")] {
+        let setting = with(Quality { min_contribution: least, ..Quality::default() });
+        assert_eq!(word("min_contribution", &setting), Some(expected), "{least}");
+    }
+    for (samples, expected) in [(1, "1"), (3, "1"), (15, "9"), (1023, "256"), (1024, "1024")] {
+        let setting = with(Quality { shadow_samples: samples, ..Quality::default() });
+        assert_eq!(word("shadow_samples", &setting), Some(expected), "{samples}");
+    }
+}
+
+#[test]
+fn numbers_outside_of_a_range_are_not_contained() {
+    let KnobForm::Number(depth) = Knob::named("depth").unwrap().form else { panic!("no number") };
+    for (number, contained) in [
+        (0.0, true),
+        (7.0, true),
+        (64.0, true),
+        (65.0, false),
+        (-1.0, false),
+        (1.5, false),
+        (f64::NAN, false),
+    ] {
+        assert_eq!(depth.contains(number), contained, "{number}");
+    }
+    let KnobForm::Number(least) = Knob::named("min_contribution").unwrap().form else { panic!("no number") };
+    for (number, contained) in [(0.0, true), (0.05, true), (1.0, true), (1.01, false), (f64::INFINITY, false)]
+    {
+        assert_eq!(least.contains(number), contained, "{number}");
     }
 }
 
@@ -115,12 +195,58 @@ fn a_limit_makes_nothing_better() {
 }
 
 #[test]
+fn a_limit_lowers_numbers_to_its_own_and_not_to_listed_ones() {
+    let with = |max_depth, min_contribution, shadow_samples| {
+        let quality = Quality { max_depth, min_contribution, shadow_samples, ..Quality::default() };
+        Setting { quality, ..Setting::FULL }
+    };
+    let own = with(7, 0.0002, 20);
+    assert_eq!(own.at_most(&with(6, 0.02, 18)), with(6, 0.02, 18));
+    assert_eq!(own.at_most(&with(8, 0.0001, 21)), own);
+    assert_eq!(own.at_most(&with(6, 0.0001, 1024)), with(6, 0.0002, 20));
+}
+
+#[test]
+fn pictures_without_light_are_neither_limits_nor_limited() {
+    for shading in [Shading::Normals, Shading::Depth, Shading::Item, Shading::Albedo] {
+        let shown = Setting { quality: Quality { shading, ..Quality::default() }, ..Setting::FULL };
+        let limited = shown.at_most(&cheapest());
+        assert_eq!((limited.quality.shading, limited.scale), (shading, RenderScale::Quarter));
+        assert_eq!(Setting::FULL.at_most(&shown).quality.shading, Shading::Full);
+        assert_eq!(cheapest().at_most(&shown).quality.shading, Shading::Diffuse);
+        assert_eq!(limited.restored().quality.shading, shading);
+        assert_eq!(shown.without_idle(&all_off()).quality.shading, shading);
+        let dark = Quality { shadows: false, smooth_terminator: false, shadow_samples: 1, ..shown.quality };
+        let dark = Setting { quality: Quality { max_depth: 0, min_contribution: 1.0, ..dark }, ..shown };
+        assert_eq!(dark.reductions(), [""; 0], "the picture has no light: {shading:?}");
+        assert!(Knob::named("shading").unwrap().matters(&all_off(), &shown));
+    }
+}
+
+#[test]
+fn full_quality_keeps_numbers_and_dither() {
+    let full = cheapest().restored();
+    let Quality { shadows, adaptive, shading, filter, exponent, colors, dither, .. } = full.quality;
+    assert_eq!((full.samples, full.scale), (MAX_SAMPLES, RenderScale::Full));
+    assert!(shadows && !adaptive && dither && full.quality.smooth_terminator);
+    assert_eq!((shading, filter), (Shading::Full, None));
+    assert_eq!((exponent, colors), (ExponentPrecision::Exact, ColorDepth::Exact));
+    assert_eq!(
+        (full.quality.max_depth, full.quality.min_contribution, full.quality.shadow_samples),
+        (0, 0.1, 1)
+    );
+}
+
+#[test]
 fn knobs_that_make_no_difference_are_left_at_their_best() {
     let setting = cheapest().without_idle(&all_off());
     let Quality { shadows, adaptive, shading, filter, exponent, colors, dither, .. } = setting.quality;
     assert_eq!((shadows, shading, filter), (true, Shading::Full, None));
     assert_eq!((exponent, colors), (ExponentPrecision::Exact, ColorDepth::Reduced));
     assert!(adaptive && dither && setting.scale == RenderScale::Quarter);
+    let Quality { max_depth, min_contribution, shadow_samples, smooth_terminator, .. } = setting.quality;
+    assert_eq!((max_depth, shadow_samples), (MAX_DEPTH, MAX_SHADOW_SAMPLES));
+    assert!(min_contribution == 0.0 && smooth_terminator);
     let glossy = SceneFeatures { specular: true, powers: true, shadows: true, ..all_off() };
     let setting = cheapest().without_idle(&glossy);
     assert_eq!(setting.quality.shading, Shading::Diffuse);
@@ -131,18 +257,93 @@ fn knobs_that_make_no_difference_are_left_at_their_best() {
 }
 
 #[test]
+fn knobs_of_bounces_and_soft_shadows_matter_where_the_scene_has_them() {
+    let usual = RenderSettings::default().setting();
+    let soft = SceneFeatures { shadows: true, soft_shadows: true, smooth: true, bounces: true, ..all_off() };
+    let matter = |features: &SceneFeatures, setting: &Setting| -> Vec<&str> {
+        let names = ["shadow_samples", "terminator", "depth", "min_contribution"];
+        names.into_iter().filter(|name| Knob::named(name).unwrap().matters(features, setting)).collect()
+    };
+    assert_eq!(matter(&soft, &usual), ["shadow_samples", "terminator", "depth", "min_contribution"]);
+    let hard = SceneFeatures { soft_shadows: false, smooth: false, ..soft };
+    assert_eq!(matter(&hard, &usual), ["depth", "min_contribution"]);
+    let unlit = Setting { quality: Quality { shadows: false, max_depth: 0, ..usual.quality }, ..usual };
+    assert_eq!(matter(&soft, &unlit), ["depth"], "the knobs that are off can be turned on");
+    let normals = Setting { quality: Quality { shading: Shading::Normals, ..usual.quality }, ..usual };
+    assert_eq!(matter(&soft, &normals), [""; 0]);
+}
+
+#[test]
 fn reductions_are_labelled() {
     assert_eq!(Setting::FULL.reductions(), [""; 0]);
+    assert_eq!(RenderSettings::default().setting().reductions(), [""; 0]);
     let expected = [
         "scale 1/4",
         "adaptive samples",
         "no shadows",
         "diffuse only",
+        "depth 0",
         "nearest texels",
         "fast exponent",
         "16-bit colours",
     ];
     assert_eq!(cheapest().reductions(), expected);
     let one = Setting { samples: 1, ..cheapest() };
-    assert!(!one.reductions().contains(&"adaptive samples"));
+    assert!(!one.reductions().contains(&"adaptive samples".into()));
+    let quality = Quality {
+        shadow_samples: 5,
+        smooth_terminator: false,
+        max_depth: 4,
+        min_contribution: 0.25,
+        ..Quality::default()
+    };
+    let fewer = Setting { quality, ..Setting::FULL };
+    let expected = ["5 shadow samples", "hard terminator", "depth 4", "contributions from 0.25"];
+    assert_eq!(fewer.reductions(), expected);
+    let one = Setting { quality: Quality { shadow_samples: 1, ..Quality::default() }, ..Setting::FULL };
+    assert_eq!(one.reductions(), ["1 shadow sample"]);
+}
+
+/// A value of each knob: one of its list, apart from its order, or any number of its range.
+fn any_setting() -> impl Strategy<Value = Setting> {
+    let picks =
+        prop::collection::vec((any::<prop::sample::Index>(), 0.0..=1.0_f32, any::<bool>()), KNOBS.len());
+    picks.prop_map(|picks| {
+        let mut setting = Setting::FULL;
+        for (knob, (index, share, listed)) in KNOBS.iter().zip(picks) {
+            match knob.form {
+                KnobForm::Number(range) if !listed => {
+                    let number = range.least + share * (range.most - range.least);
+                    range.apply(if range.whole { number.round() } else { number }, &mut setting);
+                }
+                _ => {
+                    let all: Vec<_> = knob.all().collect();
+                    index.get(&all).apply(&mut setting);
+                }
+            }
+        }
+        setting
+    })
+}
+
+proptest! {
+    #[test]
+    fn full_quality_as_a_limit_changes_no_setting(setting in any_setting()) {
+        prop_assert_eq!(setting.at_most(&Setting::FULL), setting);
+    }
+
+    /// The limited setting is no better than both in every knob, and one of both.
+    #[test]
+    fn a_limited_setting_is_the_cheaper_of_both(own in any_setting(), limit in any_setting()) {
+        let limited = own.at_most(&limit);
+        prop_assert_eq!(limited.at_most(&limit), limited);
+        prop_assert_eq!(limited.at_most(&own), limited);
+        prop_assert_eq!(limited.quality.max_depth, own.quality.max_depth.min(limit.quality.max_depth));
+        let least = own.quality.min_contribution.max(limit.quality.min_contribution);
+        prop_assert_eq!(limited.quality.min_contribution, least);
+        prop_assert_eq!(limited.samples, own.samples.min(limit.samples));
+        let restored = own.restored();
+        prop_assert_eq!(restored.at_most(&own), own);
+        prop_assert_eq!(restored.restored(), restored);
+    }
 }

@@ -6,6 +6,7 @@ mod limits;
 mod model;
 mod moved;
 mod scene_file;
+mod sky;
 mod textures;
 
 #[cfg(test)]

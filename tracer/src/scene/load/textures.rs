@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::sky;
 use crate::image;
 use crate::material::Material;
 use crate::mesh::{CompiledMesh, NamedMaterial, TextureFile};
@@ -31,6 +32,8 @@ enum Use {
     Color,
     /// A mask that cuts out: alpha, or brightness where the alpha cuts nothing out.
     Mask,
+    /// A sky: colours, or linear light of high dynamic range.
+    Sky,
 }
 
 /// An entry of the scene's list of textures.
@@ -53,12 +56,29 @@ impl Textures {
         Ok(Listed { index: self.list(&texture, filter, tiling), cuts: texture.has_alpha() })
     }
 
+    /// Adds the picture file of a panorama, or of a face of a cube map, to the scene's list of textures. The error is a message that
+    /// names the picture.
+    #[allow(dead_code)]
+    pub(super) fn add_sky(&mut self, picture: &Path) -> Result<u32, String> {
+        let texture = self.load(picture, Use::Sky)?;
+        Ok(self.list(&texture, Filter::Bilinear, Tiling::default()))
+    }
+
+    /// Width and height of a texture in the scene's list; `None` if the index is out of range.
+    #[allow(dead_code)]
+    pub(super) fn size(&self, index: u32) -> Option<(u32, u32)> {
+        let id = self.maps.get(index as usize)?.texture;
+        let texture = self.loaded.values().flatten().find(|texture| texture.id() == id)?;
+        Some((texture.width(), texture.height()))
+    }
+
     fn load(&mut self, picture: &Path, used: Use) -> Result<Arc<Texture>, String> {
         let texture = match self.loaded.entry((real(picture)?, used)) {
             Entry::Occupied(entry) => entry.into_mut(),
             // Messages name the file as the scene or model does.
             Entry::Vacant(entry) => {
-                let texture = read(picture, used, Room { used: self.bytes, limit: self.max_bytes });
+                let room = Room { used: self.bytes, limit: self.max_bytes };
+                let texture = read(picture, used, room, &mut self.notes);
                 self.bytes += texture.as_ref().map_or(0, |texture| texture.bytes().len() as u64);
                 if texture.is_ok() && image::ends_early(picture) {
                     let message =
@@ -176,11 +196,12 @@ struct Room {
     limit: u64,
 }
 
-/// Reads a picture as a texture, if there is room for it.
-fn read(picture: &Path, used: Use, room: Room) -> Result<Texture, String> {
+/// Reads a picture as a texture, if there is room for it, and adds warnings about it to `notes`.
+fn read(picture: &Path, used: Use, room: Room, notes: &mut BTreeSet<String>) -> Result<Texture, String> {
     let too_large = |error| format!("{}: {error}", shown(picture));
+    let high_range = image::has_high_range(picture);
     let undecoded = |error: image::ImageError| match recognised_file(picture) {
-        Some(foreign) if !foreign.is_picture() => {
+        Some(foreign) if !foreign.is_picture() && !high_range => {
             format!("cannot read {}: {}", shown(picture), foreign.refusal(Wanted::Picture))
         }
         _ => escaped(&error.to_string()),
@@ -194,9 +215,13 @@ fn read(picture: &Path, used: Use, room: Room) -> Result<Texture, String> {
             room.limit >> 20
         ));
     }
+    if used == Use::Sky {
+        let sky = image::load_sky(picture).map_err(undecoded)?;
+        return sky::texture(picture, &sky, notes).map_err(too_large);
+    }
     let (mut pixels, alpha) = image::load_with_alpha(picture).map_err(undecoded)?;
     let alpha = match (used, alpha) {
-        (Use::Color, alpha) => alpha.unwrap_or_default(),
+        (Use::Color | Use::Sky, alpha) => alpha.unwrap_or_default(),
         (Use::Mask, Some(alpha)) if alpha.iter().any(|&alpha| alpha < LEAST_ALPHA) => alpha,
         (Use::Mask, _) => {
             let brightness = pixels.pixels.chunks_exact(3).map(brightness).collect();

@@ -4,7 +4,7 @@ use super::fault::{Fault, Read};
 use super::table::Table;
 use super::value::Value;
 use crate::scene::data::{RenderScale, Setting};
-use crate::scene::knobs::{KNOBS, Knob, KnobForm, KnobValue};
+use crate::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, KnobValue, NumberRange};
 use crate::scene::validate::is_sample_count;
 
 /// Reads the knobs of a `[render]` table; a missing key keeps its value of `default`.
@@ -31,13 +31,26 @@ fn nothing_to_adapt(value: &Value<'_>) -> Fault {
 }
 
 /// The value of a knob, written in the knob's form.
-fn read(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
-    match knob.form {
+fn read(knob: &'static Knob, value: Value<'_>) -> Read<GivenValue> {
+    let listed = match knob.form {
         KnobForm::Switch => find(knob, value, if value.boolean()? { "on" } else { "off" }),
         KnobForm::Word => word(knob, value),
         KnobForm::Count => find(knob, value, &count(value)?.to_string()),
         KnobForm::Fraction => fraction(knob, value),
-    }
+        KnobForm::Number(range) => return number(range, value),
+    };
+    listed.map(GivenValue::Listed)
+}
+
+/// A number of a range.
+fn number(range: &'static NumberRange, value: Value<'_>) -> Read<GivenValue> {
+    let expected = format!("from {} to {}", range.least, range.most);
+    let number = if range.whole {
+        f64::from(value.whole(&expected, range.whole_numbers())?)
+    } else {
+        value.number(&expected, |number| range.contains(number))?
+    };
+    Ok(GivenValue::Number(range, number as f32))
 }
 
 /// The value of a knob with this word.
@@ -49,8 +62,7 @@ fn find(knob: &'static Knob, value: Value<'_>, word: &str) -> Read<&'static Knob
 }
 
 fn word(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
-    let best_first = knob.values.iter().rev();
-    let words: Vec<(&str, &KnobValue)> = best_first.filter_map(|known| Some((known.word?, known))).collect();
+    let words: Vec<_> = knob.words().filter_map(|word| Some((word, knob.value(word)?))).collect();
     value.word(&words)
 }
 
@@ -100,7 +112,8 @@ mod tests {
     #[test]
     fn every_knob_is_read() {
         let all = "samples = 4\nadaptive = true\nshadows = false\nshading = \"diffuse\"\nfilter = \"nearest\"\nexponent = \"fast\"\n\
-                   pixels = \"reduced\"\nscale = 0.75\ndither = true";
+                   pixels = \"reduced\"\nscale = 0.75\ndither = true\nmax_depth = 7\nmin_contribution = 0.02\nshadow_samples = 5\n\
+                   smooth_terminator = false";
         let reduced = Quality {
             shadows: false,
             adaptive: true,
@@ -109,11 +122,15 @@ mod tests {
             exponent: ExponentPrecision::Fast,
             colors: ColorDepth::Reduced,
             dither: true,
-            ..Quality::default()
+            max_depth: 7,
+            min_contribution: 0.02,
+            shadow_samples: 5,
+            smooth_terminator: false,
         };
         let render_all = render(all).unwrap();
         assert_eq!((render_all.quality, render_all.scale), (reduced, RenderScale::ThreeQuarters));
-        let full = "adaptive = false\nshadows = true\nshading = \"full\"\nexponent = \"exact\"\npixels = \"exact\"\nscale = 1\ndither = false";
+        let full = "adaptive = false\nshadows = true\nshading = \"full\"\nexponent = \"exact\"\npixels = \"exact\"\nscale = 1\ndither = false\n\
+                    max_depth = 5\nmin_contribution = 0.004\nshadow_samples = 16\nsmooth_terminator = true";
         assert_eq!(render(full), render(""));
         assert_eq!(render("").unwrap().quality, Quality::default());
         assert_eq!(render("scale = 0.5").unwrap().scale, RenderScale::Half);
@@ -146,6 +163,15 @@ mod tests {
             ("scale = nan", "2:9 ", "but is nan"),
             ("scale = 0.3", "2:9 ", "but is 0.3"),
             ("scale = \"1/5\"", "2:9 ", "did you mean `1/2`?"),
+            ("max_depth = 65", "2:13 ", "a whole number from 0 to 64, but is 65"),
+            ("max_depth = 1.0", "2:13 ", "a whole number from 0 to 64, but is 1.0"),
+            ("max_depth = -1", "2:13 ", "a whole number from 0 to 64, but is -1"),
+            ("min_contribution = 1.5", "2:20 ", "a number from 0 to 1, but is 1.5"),
+            ("min_contribution = nan", "2:20 ", "a number from 0 to 1, but is nan"),
+            ("shadow_samples = 0", "2:18 ", "a whole number from 1 to 1024, but is 0"),
+            ("shadow_samples = \"all\"", "2:18 ", "a whole number from 1 to 1024, but is \"all\""),
+            ("smooth_terminator = 1", "2:21 ", "true or false, but is 1"),
+            ("shading = \"normal\"", "2:11 ", "did you mean `normals`?"),
             ("scael = 1", "2:1 ", "did you mean `scale`?"),
         ] {
             let message = render(key).unwrap_err();
@@ -156,18 +182,30 @@ mod tests {
     #[test]
     fn every_value_of_the_table_is_read_by_its_key() {
         for knob in KNOBS {
-            for known in knob.values {
-                let Some(word) = known.word else { continue };
+            for word in knob.words() {
                 let written = match knob.form {
                     KnobForm::Switch => (word == "on").to_string(),
                     KnobForm::Word | KnobForm::Fraction => format!("\"{word}\""),
-                    KnobForm::Count => word.to_owned(),
+                    KnobForm::Count | KnobForm::Number(_) => word.to_owned(),
                 };
                 // With several samples, so that adaptive sampling is accepted.
                 let samples = if knob.key == "samples" { "" } else { "samples = 9\n" };
                 let settings = render(&format!("{samples}{} = {written}", knob.key)).unwrap();
-                assert!(known.is_of(&settings.setting()), "{} = {written}", knob.key);
+                assert!(knob.value(word).unwrap().is_of(&settings.setting()), "{} = {written}", knob.key);
             }
         }
+    }
+
+    #[test]
+    fn every_whole_number_of_a_range_is_read() {
+        for knob in KNOBS {
+            let KnobForm::Number(range) = knob.form else { continue };
+            for number in range.whole_numbers() {
+                let settings = render(&format!("{} = {number}", knob.key)).unwrap();
+                assert_eq!(range.of(&settings.setting()), number as f32, "{}", knob.key);
+            }
+        }
+        let smallest = render("min_contribution = 1e-300").unwrap();
+        assert_eq!(smallest.quality.min_contribution, 0.0);
     }
 }

@@ -2,8 +2,8 @@
 
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::MeshMemory;
-use rayfarm_tracer::scene::knobs::Knob;
-use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Material, RenderScale};
+use rayfarm_tracer::scene::knobs::{Knob, word_of};
+use rayfarm_tracer::scene::{ColorDepth, Filter, FrameView, Material, RenderScale, SceneFeatures, Shading};
 use serde::Serialize;
 
 use super::super::source::Source;
@@ -38,17 +38,54 @@ pub(super) struct FeatureFacts {
 
 /// All features, used and unused.
 pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<FeatureFacts> {
+    let used = compiled.features().at(&view.quality);
     vec![
         shadows(source, compiled, view),
         specular(source, compiled, view),
         smooth(source, compiled),
         textures(source, compiled, view),
         vertex_colors(source, compiled),
-        of_materials(source, "emission", compiled.features().emissive, Material::is_emissive),
-        of_materials(source, "unlit materials", compiled.features().unlit, |material| material.unlit),
-        of_materials(source, "cut-outs", compiled.features().cut_out, |material| material.cutout.is_some()),
+        of_materials(source, "checkers", used.checkered, |material| material.checker.is_some()),
+        of_materials(source, "normal maps", used.normal_mapped, |material| material.normal_map.is_some()),
+        of_materials(source, "emission", used.emissive, Material::is_emissive),
+        of_materials(source, "unlit materials", used.unlit, |material| material.unlit),
+        of_materials(source, "cut-outs", used.cut_out, |material| material.cutout.is_some()),
+        soft_shadows(source, used.soft_shadows, view),
+        bounces(source, used.bounces, view),
         samples(view),
     ]
+}
+
+fn soft_shadows(source: &Source, asked_for: bool, view: &FrameView) -> FeatureFacts {
+    let lights = &source.scene.lights;
+    let soft = lights.iter().filter(|light| light.shadows && light.radius > 0.0).count();
+    FeatureFacts {
+        name: "soft shadows",
+        asked_for,
+        why: format!(
+            "{soft} of {} have a radius{}",
+            counted(lights.len() as u64, "light"),
+            turned_off("shadows", view)
+        ),
+        measured_percent: None,
+        bytes: 0,
+    }
+}
+
+fn bounces(source: &Source, asked_for: bool, view: &FrameView) -> FeatureFacts {
+    let materials = &source.scene.materials;
+    let bouncing = materials.iter().filter(|material| material.bounces()).count();
+    FeatureFacts {
+        name: "reflection, transmission",
+        asked_for,
+        why: format!(
+            "{bouncing} of {} have it, up to depth {}",
+            counted(materials.len() as u64, "material"),
+            view.quality.max_depth
+        ),
+        measured_percent: None,
+        bytes: 0,
+    }
 }
 
 fn shadows(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
@@ -70,7 +107,7 @@ fn shadows(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Featu
 /// Note on a feature that the knob of this name turns off.
 fn turned_off(knob: &str, view: &FrameView) -> &'static str {
     let setting = view.setting(RenderScale::Full);
-    let is_off = Knob::named(knob).is_some_and(|knob| knob.value_of(&setting).label.is_some());
+    let is_off = Knob::named(knob).is_some_and(|knob| knob.reduction(&setting).is_some());
     if is_off { "; turned off" } else { "" }
 }
 
@@ -112,7 +149,8 @@ fn smooth(source: &Source, compiled: &CompiledScene) -> FeatureFacts {
 fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> FeatureFacts {
     let maps = &source.scene.textures;
     let filter = |own: Filter| view.quality.filter.unwrap_or(own);
-    let nearest = maps.iter().filter(|map| filter(map.filter) == Filter::Nearest).count();
+    let count = |counted: Filter| maps.iter().filter(|map| filter(map.filter) == counted).count();
+    let nearest = count(Filter::Nearest);
     let asked_for = compiled.features().textured;
     let pictures: usize = source.textures.iter().map(|texture| texture.bytes().len()).sum();
     let uvs = taken_or_saved(source, asked_for, |memory| memory.uv_bytes, MeshMemory::full_uv_bytes);
@@ -122,7 +160,9 @@ fn textures(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Feat
         why: if maps.is_empty() {
             "none".to_owned()
         } else {
-            format!("{nearest} of {} nearest, the others bilinear", counted(maps.len() as u64, "texture"))
+            let trilinear = count(Filter::Trilinear);
+            let textures = counted(maps.len() as u64, "texture");
+            format!("{nearest} nearest and {trilinear} trilinear of {textures}, the others bilinear")
         },
         // The more expensive filter, unless all textures have the other one.
         measured_percent: Some(if asked_for && nearest == maps.len() { NEAREST } else { BILINEAR }),
@@ -188,6 +228,22 @@ fn taken_or_saved(
     }
 }
 
+/// The shading of a surface point.
+fn shading(source: &Source, features: SceneFeatures, view: &FrameView) -> String {
+    if !view.quality.shading.is_light() {
+        return format!(
+            "shading: none, {} in place of light",
+            word_of(&Shading::WORDS, &view.quality.shading)
+        );
+    }
+    let terms = if features.specular {
+        "diffuse and specular"
+    } else {
+        "diffuse only: no directions to the viewer, no exponents"
+    };
+    format!("shading: {terms}, {}", counted(source.scene.lights.len() as u64, "light"))
+}
+
 /// Stages of the tracer for frames of this scene, in order.
 pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameView) -> Vec<String> {
     let (scene, features) = (&source.scene, compiled.features().at(&view.quality));
@@ -195,6 +251,9 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
         vec!["camera rays: tiles of 16 x 16 rays, through hierarchies of 16 children per node".to_owned()];
     if !scene.spheres.is_empty() {
         kernels.push("spheres: one by one where rays hit their boxes, in double precision".to_owned());
+    }
+    if !scene.disks.is_empty() {
+        kernels.push("disks: one by one where rays hit their boxes, in double precision".to_owned());
     }
     if !scene.planes.is_empty() {
         kernels.push(format!(
@@ -214,17 +273,25 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
     if features.cut_out {
         kernels.push("cut-outs: the alpha of each hit on a textured cut-out, in double precision".to_owned());
     }
-    let terms = if features.specular {
-        "diffuse and specular"
-    } else {
-        "diffuse only: no directions to the viewer, no exponents"
-    };
-    kernels.push(format!("shading: {terms}, {}", counted(scene.lights.len() as u64, "light")));
+    kernels.push(shading(source, features, view));
     if features.shadows {
         kernels.push(
             "shadows: the points of each tile as a tile of rays from each light that reaches one of them"
                 .to_owned(),
         );
+    }
+    if features.soft_shadows {
+        let samples = view.quality.shadow_samples;
+        kernels.push(format!(
+            "soft shadows: {} of each light with a radius, if it has no number of its own",
+            counted(samples.into(), "point")
+        ));
+    }
+    if features.bounces {
+        kernels.push(format!(
+            "bounces: reflected and transmitted rays of each tile, generation by generation, up to depth {}",
+            view.quality.max_depth
+        ));
     }
     if view.is_adaptive() {
         kernels.push(format!(

@@ -5,6 +5,7 @@
 mod features;
 mod text;
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use bytes::Bytes;
@@ -21,6 +22,7 @@ use crate::app::cli::ExplainArgs;
 use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
 use crate::farm::{Assets, ViewRequest};
+use crate::measure::ray_bounds::RayBounds;
 
 /// Explanation of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -33,7 +35,7 @@ struct Explanation {
     quality: Knobs,
     /// Labels of all knobs that are not at full quality.
     #[serde(skip)]
-    reductions: Vec<&'static str>,
+    reductions: Vec<Cow<'static, str>>,
     /// Names of the knobs whose values can change the picture.
     knobs_with_effect: Vec<&'static str>,
     /// SIMD level of this machine.
@@ -63,6 +65,7 @@ struct Things {
     lights: usize,
     /// Lights that cast shadows.
     lights_with_shadows: usize,
+    disks: usize,
 }
 
 /// A mesh and its instances.
@@ -119,7 +122,7 @@ struct Travel {
     pixels_per_frame: u64,
 }
 
-/// Upper bounds of rays: not every ray hits a surface, and not every surface faces every light.
+/// Upper bounds of rays: not every ray hits a surface, not every surface bounces, and not every surface faces every light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct Rays {
     primary: u64,
@@ -169,13 +172,13 @@ fn explain(source: &Source, wanted: &ViewRequest) -> Result<Explanation, Command
         textures,
         memory,
         travel: travel(source, view)?,
-        rays_per_frame_at_most: rays(&things, view),
+        rays_per_frame_at_most: rays(&compiled, view),
     })
 }
 
 fn knobs_with_effect(scene: &CompiledScene, setting: &Setting) -> Vec<&'static str> {
     let features = scene.features();
-    KNOBS.iter().filter(|knob| (knob.matters)(&features, setting)).map(|knob| knob.name).collect()
+    KNOBS.iter().filter(|knob| knob.matters(&features, setting)).map(|knob| knob.name).collect()
 }
 
 fn things(source: &Source) -> Things {
@@ -188,6 +191,7 @@ fn things(source: &Source) -> Things {
         materials: scene.materials.len(),
         lights: scene.lights.len(),
         lights_with_shadows: scene.lights.iter().filter(|light| light.shadows).count(),
+        disks: scene.disks.len(),
     }
 }
 
@@ -265,7 +269,7 @@ fn pixel_bytes(view: &FrameView) -> u64 {
     }
 }
 
-fn rays(things: &Things, view: &FrameView) -> Rays {
+fn rays(scene: &CompiledScene, view: &FrameView) -> Rays {
     let [width, height, samples] = [view.width, view.height, view.samples].map(u64::from);
     let primary = if view.is_adaptive() {
         // Corners of each band of rows, centres, and all samples; where segments divide bands, some corners twice.
@@ -273,9 +277,9 @@ fn rays(things: &Things, view: &FrameView) -> Rays {
     } else {
         width * height * samples
     };
-    // No material reflects or transmits yet.
-    let shadow = if view.quality.shadows { primary * things.lights_with_shadows as u64 } else { 0 };
-    Rays { primary, shadow, secondary: 0 }
+    let of_one = RayBounds::of(scene, &view.quality);
+    let [shadow, secondary] = [of_one.shadow, of_one.secondary].map(|rays| primary.saturating_mul(rays));
+    Rays { primary, shadow, secondary }
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 use std::path::Path;
 
+use rayfarm_tracer::scene::{Quality, Shading};
+
 use super::*;
 use crate::app::cli::ModelArgs;
 
@@ -12,9 +14,12 @@ fn explained(scene: &str) -> Explanation {
 }
 
 fn of_file(path: &Path) -> Explanation {
-    let source = Source::load(path, ModelArgs::default(), None).unwrap();
+    of_source(&Source::load(path, ModelArgs::default(), None).unwrap())
+}
+
+fn of_source(source: &Source) -> Explanation {
     let scene = &source.scene;
-    explain(&source, &ViewRequest { view: FrameView::of(scene), scale: scene.render.scale }).unwrap()
+    explain(source, &ViewRequest { view: FrameView::of(scene), scale: scene.render.scale }).unwrap()
 }
 
 const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
@@ -133,6 +138,49 @@ fn only_knobs_that_can_change_the_picture_have_an_effect() {
     let explanation = explained(&more);
     assert_eq!(explanation.knobs_with_effect, expected);
     assert!(text::text(&explanation).contains(&expected.join(", ")));
+}
+
+/// [`BARE`] with shadows and these quality knobs, and mirrors.
+fn mirrors(quality: Quality) -> Explanation {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("quad.obj"), QUAD).unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, BARE.replace("shadows = false", "shadows = true")).unwrap();
+    let mut source = Source::load(&path, ModelArgs::default(), None).unwrap();
+    source.scene.materials.iter_mut().for_each(|material| material.reflect = glam::Vec3::splat(0.5));
+    source.scene.render.quality = quality;
+    of_source(&source)
+}
+
+#[test]
+fn bounces_count_as_secondary_rays_with_their_own_shadows() {
+    let primary = 64 * 48;
+    let mirrors = mirrors(Quality { max_depth: 3, ..Quality::default() });
+    let most = Rays { primary, shadow: primary * 4, secondary: primary * 3 };
+    assert_eq!(mirrors.rays_per_frame_at_most, most);
+    assert_eq!(asked_for(&mirrors), ["shadows", "reflection, transmission"]);
+    assert!(text::text(&mirrors).contains("9,216 secondary"), "{}", text::text(&mirrors));
+    let expected = ["samples", "scale", "shadows", "depth", "min_contribution", "colors", "dither"];
+    assert_eq!(mirrors.knobs_with_effect, expected);
+    assert!(mirrors.kernels.iter().any(|kernel| kernel.contains("up to depth 3")));
+}
+
+#[test]
+fn without_depth_nothing_bounces() {
+    let none = mirrors(Quality { max_depth: 0, ..Quality::default() });
+    assert_eq!(none.rays_per_frame_at_most.secondary, 0);
+    assert_eq!(asked_for(&none), ["shadows"]);
+    assert!(text::text(&none).contains("not at full quality: depth 0"));
+}
+
+#[test]
+fn pictures_without_light_have_no_stage_of_light() {
+    let normals = mirrors(Quality { shading: Shading::Normals, ..Quality::default() });
+    let rays = Rays { primary: 64 * 48, shadow: 0, secondary: 0 };
+    assert_eq!((normals.rays_per_frame_at_most, asked_for(&normals)), (rays, vec![]));
+    assert_eq!(normals.knobs_with_effect, ["samples", "scale", "shading", "colors", "dither"]);
+    let text = text::text(&normals);
+    assert!(text.contains("normals in place of light") && !text.contains("not at full quality"), "{text}");
 }
 
 #[test]

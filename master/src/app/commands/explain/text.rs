@@ -38,6 +38,7 @@ fn write_head(out: &mut String, explanation: &Explanation) -> std::fmt::Result {
     let parts = [
         (things.models, "model"),
         (things.spheres, "sphere"),
+        (things.disks, "disk"),
         (things.planes, "plane"),
         (things.single_triangles, "single triangle"),
         (things.lights, "light"),

@@ -1,6 +1,6 @@
 //! The transparent bodies that a ray is inside of.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::scene::Material;
 
@@ -66,21 +66,24 @@ impl Media {
         Interface { eta: from / index_in(&behind), behind }
     }
 
+    /// Whether light may be absorbed on a way that ends at a surface of a material.
+    pub(super) fn may_absorb(&self, materials: &[Material], end: &Material) -> bool {
+        absorbs(end) || self.innermost().is_some_and(|inside| absorbs(&materials[inside as usize]))
+    }
+
     /// Share of light that is left after a way inside, which ends at a surface of a material; `way` in world units.
-    pub(super) fn left_after(
-        &self,
-        materials: &[Material],
-        (material, front): (u32, bool),
-        way: f64,
-    ) -> Option<DVec3> {
+    pub(super) fn left_after(&self, materials: &[Material], end: (u32, bool), way: f64) -> Option<DVec3> {
+        let absorption = self.absorbing(materials, end)?;
+        Some(DVec3::from_array(absorption.to_array().map(|share| libm::pow(f64::from(share), way))))
+    }
+
+    /// The absorption of the body that a ray is inside of, if it absorbs.
+    fn absorbing(&self, materials: &[Material], (material, front): (u32, bool)) -> Option<Vec3> {
         // The back of a body that the ray never entered: it started inside.
         let started_inside = !front && self.place_of(material).is_none();
         let body = if started_inside { Some(material) } else { self.innermost() };
         let body = &materials[body? as usize];
-        (body.is_transparent() && body.absorption != glam::Vec3::ONE).then(|| {
-            let left = body.absorption.to_array().map(|share| libm::pow(f64::from(share), way));
-            DVec3::from_array(left)
-        })
+        absorbs(body).then_some(body.absorption)
     }
 
     /// Share of light of the background that arrives: a body without end leaves none of a channel that it absorbs.
@@ -91,10 +94,13 @@ impl Media {
     }
 }
 
+/// Whether light is absorbed inside of a material.
+fn absorbs(material: &Material) -> bool {
+    material.is_transparent() && !material.thin && material.absorption != Vec3::ONE
+}
+
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
 
     fn materials() -> Vec<Material> {

@@ -8,26 +8,31 @@
 //! ```text
 //!   secondary   rays that leave a surface
 //!   media       the transparent bodies around a ray
+//!   mirrors     rays that one plane reflects: traced as a tile
 //! ```
 
 mod media;
+mod mirrors;
 mod secondary;
+#[cfg(test)]
+mod tests;
 
 use glam::DVec3;
 
 use super::super::stage::{Stage, Watch};
-use super::{TileContext, shade};
+use super::TileContext;
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
-use crate::rays::{BATCH, BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, RayBatch, RaySource, TileColors};
+use crate::rays::{BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, SurfaceSource, TileColors, TileRays};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::SurfaceBlock;
 use media::Media;
+use mirrors::Mirrors;
 use secondary::{Arrival, Secondary};
 
 /// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
 /// 0.004 of the light, the default of `min_contribution`, end before.
-const MOST_OF_SAMPLE: u16 = 1024;
+const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
 
 /// Queues and memory of the secondary rays of a tile, kept from tile to tile.
 pub(super) struct Bounces<'a> {
@@ -40,6 +45,7 @@ pub(super) struct Bounces<'a> {
     /// Rays of each sample so far.
     counts: [u16; BATCH],
     batch: RayBatch<'a>,
+    mirrors: Mirrors,
 }
 
 impl<'a> Bounces<'a> {
@@ -53,6 +59,7 @@ impl<'a> Bounces<'a> {
                 transmitted: Vec::new(),
                 counts: [0; BATCH],
                 batch: RayBatch::new(frame),
+                mirrors: Mirrors::new(),
             })
         })
     }
@@ -63,13 +70,19 @@ impl<'a> Bounces<'a> {
 /// # Errors
 /// [`Cancelled`], polled before each batch.
 #[inline(never)]
-pub(super) fn add<S: Simd, W: Watch>(
+pub(super) fn add<S: Simd, R: SurfaceSource, W: Watch>(
     simd: S,
-    tile: &EyeTile<'_>,
+    tile: &R,
     context: &mut TileContext<'_, W>,
 ) -> Result<(), Cancelled> {
     let Some(mut bounces) = context.bounces.take() else { return Ok(()) };
-    let result = bounces.trace(simd, tile, context);
+    bounces.begin(tile, context);
+    if let Some(eye) = tile.eye() {
+        bounces.mirrors.find(simd, eye, &bounces.reflected, &mut context.tile);
+    } else {
+        bounces.mirrors.clear();
+    }
+    let result = bounces.trace(simd, tile.places(), context);
     context.bounces = Some(bounces);
     result
 }
@@ -78,10 +91,9 @@ impl<'a> Bounces<'a> {
     fn trace<S: Simd, W: Watch>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         context: &mut TileContext<'a, W>,
     ) -> Result<(), Cancelled> {
-        self.begin(tile, context);
         if self.reflected.is_empty() && self.transmitted.is_empty() {
             return Ok(());
         }
@@ -93,7 +105,7 @@ impl<'a> Bounces<'a> {
             self.queue.append(&mut self.transmitted);
             let queue = std::mem::take(&mut self.queue);
             for rays in queue.chunks(BATCH) {
-                self.trace_batch(simd, tile, rays, context)?;
+                self.trace_batch(simd, places, rays, depth, context)?;
                 self.collect(rays, depth < max_depth, context);
             }
             self.queue = queue;
@@ -103,7 +115,7 @@ impl<'a> Bounces<'a> {
     }
 
     /// Starts the first generation from the hits of a tile.
-    fn begin<W>(&mut self, tile: &EyeTile<'_>, context: &mut TileContext<'_, W>) {
+    fn begin<R: SurfaceSource, W>(&mut self, tile: &R, context: &mut TileContext<'_, W>) {
         self.reflected.clear();
         self.transmitted.clear();
         self.counts = [0; BATCH];
@@ -149,8 +161,9 @@ impl<'a> Bounces<'a> {
     fn trace_batch<S: Simd, W: Watch>(
         &mut self,
         simd: S,
-        tile: &EyeTile<'_>,
+        places: &TileRays,
         rays: &[Secondary],
+        depth: u8,
         context: &mut TileContext<'a, W>,
     ) -> Result<(), Cancelled> {
         if context.is_cancelled() {
@@ -158,31 +171,24 @@ impl<'a> Bounces<'a> {
         }
         context.watch.enter(Stage::Secondary);
         context.counts.secondary += rays.len() as u64;
+        context.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
+        let mut known = [0; BLOCKS];
         let batch = &mut self.batch;
         batch.clear();
         for (index, secondary) in rays.iter().enumerate() {
             batch.set(index, secondary.ray, f64::INFINITY, Some(secondary.starts_on));
             let (block, lane) = place_of(usize::from(secondary.sample));
             let (to_block, to_lane) = place_of(index);
-            batch.places.x[to_block].0[to_lane] = tile.rays.x[block].0[lane];
-            batch.places.y[to_block].0[to_lane] = tile.rays.y[block].0[lane];
+            batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
+            batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
         }
         for (block, hits) in context.hits.iter_mut().enumerate() {
-            *hits = if batch.live(block) == 0 {
-                HitBlock::NONE
-            } else {
-                context.frame.closest_hits_of(&batch.blocks[block])
-            };
+            let start = (block * LANES).min(rays.len());
+            let of_block = &rays[start..rays.len().min(start + LANES)];
+            // Only the first generation leaves a tile of the camera.
+            known[block] = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
         }
-        context.watch.enter(Stage::Surfaces);
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                context.surfaces.find(simd, batch, &context.hits);
-                context.watch.enter(Stage::Shading);
-                shade(simd, batch, context);
-            },
-        );
+        context.trace_batch(simd, batch, known);
         Ok(())
     }
 
@@ -202,10 +208,12 @@ impl<'a> Bounces<'a> {
                     media: secondary.media,
                     sample: secondary.sample,
                 };
-                if frame.features.transparent || (goes_on && hit.material(materials).bounces()) {
+                let material = hit.material(materials);
+                let goes_on = goes_on && material.bounces();
+                if goes_on || secondary.media.may_absorb(materials, material) {
                     let Some((arrival, _)) = hit.arrival(frame, primitive, &incoming) else { continue };
                     weight = arrival.weight;
-                    if goes_on && arrival.material.bounces() {
+                    if goes_on {
                         self.leave(&arrival, frame);
                     }
                 }
@@ -273,15 +281,19 @@ impl Hit<'_> {
         let (surface, lane) = (self.surface, self.lane);
         let t = frame.t_of(self.ray, primitive, incoming.starts_on)?;
         let length = self.ray.direction.length();
-        let vector = |lanes: &[Lanes; 3]| {
-            DVec3::new(f64::from(lanes[0].0[lane]), f64::from(lanes[1].0[lane]), f64::from(lanes[2].0[lane]))
-                .normalize()
-        };
-        let ng = vector(&surface.ng);
-        let ns = if frame.features.smooth { vector(&surface.ns) } else { ng };
+        let point = self.ray.origin + self.ray.direction * t;
+        let outwards = frame.front_normal(primitive, point);
+        let front = outwards.dot(self.ray.direction) < 0.0;
+        let ng = if front { outwards } else { -outwards };
         let index = surface.material.0[lane];
         let materials = &frame.scene().materials;
-        let front = surface.front >> lane & 1 == 1;
+        let material = &materials[index as usize];
+        let flat = frame.is_flat(primitive) && material.normal_map.is_none();
+        let ns = if flat {
+            ng
+        } else {
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(surface.ns[axis].0[lane]))).normalize()
+        };
         let left = if frame.features.transparent {
             incoming.media.left_after(materials, (index, front), t * length / frame.per_unit)
         } else {
@@ -290,13 +302,15 @@ impl Hit<'_> {
         let coincides = self.hits.coincident >> lane & 1 == 1;
         let arrival = Arrival {
             direction: self.ray.direction / length,
-            point: self.ray.origin + self.ray.direction * t,
+            point,
+            t,
             primitive,
             ng,
             ns,
+            on_plane: flat && frame.is_planar(primitive),
             front,
             index,
-            material: &materials[index as usize],
+            material,
             coincidence: if coincides { 4.0 * frame.coarsest } else { 0.0 },
             weight: left.map_or(incoming.weight, |left| incoming.weight * left),
             media: incoming.media,

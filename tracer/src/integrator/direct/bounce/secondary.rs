@@ -20,6 +20,10 @@ pub(super) struct Secondary {
     pub media: Media,
     /// The sample of the tile that it contributes to.
     pub sample: u16,
+    /// The t at which the ray before it arrived.
+    pub arrived: f64,
+    /// Whether it is reflected by the plane of the primitive that it starts on.
+    pub by_plane: bool,
 }
 
 /// A hit of a ray with a surface that reflects or transmits.
@@ -27,10 +31,14 @@ pub(super) struct Arrival<'a> {
     /// Unit direction of the ray.
     pub direction: DVec3,
     pub point: DVec3,
+    /// The t of the hit.
+    pub t: f64,
     pub primitive: PrimitiveId,
     /// Geometric and shading unit normals on the side of the ray.
     pub ng: DVec3,
     pub ns: DVec3,
+    /// Whether all points of the primitive have these normals.
+    pub on_plane: bool,
     /// Whether the ray hits the front side.
     pub front: bool,
     /// Index of the material, and the material.
@@ -72,7 +80,7 @@ impl Arrival<'_> {
             through = refracted.map(|direction| (on_side_of(direction, -self.ng), behind));
         }
         let least = f64::from(frame.view().quality.min_contribution);
-        let leave = |direction: DVec3, share: DVec3, media: Media| {
+        let leave = |direction: DVec3, share: DVec3, media: Media, by_plane: bool| {
             let weight = self.weight * share;
             let origin = self.point + self.ng * self.coincidence;
             let enough = weight.max_element() >= least && weight.max_element() > 0.0;
@@ -82,13 +90,15 @@ impl Arrival<'_> {
                 weight,
                 media,
                 sample: self.sample,
+                arrived: self.t,
+                by_plane,
             };
             (enough && secondary.ray.direction.is_finite() && origin.is_finite()).then_some(secondary)
         };
         let mirrored = on_side_of(reflected(self.direction, self.ns), self.ng);
         Departures {
-            reflected: leave(mirrored, reflect, self.media),
-            transmitted: through.and_then(|(direction, behind)| leave(direction, transmit, behind)),
+            reflected: leave(mirrored, reflect, self.media, self.on_plane && self.coincidence == 0.0),
+            transmitted: through.and_then(|(direction, behind)| leave(direction, transmit, behind, false)),
         }
     }
 }

@@ -3,6 +3,7 @@
 mod models;
 mod pictures;
 mod scenes;
+mod skies;
 mod textures;
 
 use glam::{DVec3, Vec2, Vec3};

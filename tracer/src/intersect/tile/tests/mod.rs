@@ -2,21 +2,24 @@
 //! every level. The triangles are those that a filter with narrow bounds would get wrong: with a corner or an edge on a ray,
 //! edge-on, slivers, layers a few digits apart, around the projection.
 
+mod mirrored;
+
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::Scratch;
+use super::{Scratch, find_closest};
 use crate::compile::{CompiledScene, Item};
-use crate::frame::{PinholeRays, PreparedFrame};
+use crate::frame::{CameraRays, PreparedFrame};
 use crate::light::SHADOW_T_MAX;
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::rays::{
-    BLOCKS, EyeTile, HitBlock, PrimitiveId, Ray, SIDE, ShadowTarget, ShadowTile, TileRays, place,
+    BLOCKS, EyeTile, HitBlock, ParallelTile, PrimitiveId, Ray, SIDE, ShadowTarget, ShadowTile, TileRays,
+    TileSamples, place,
 };
 use crate::scene::{
-    Background, Camera, FrameView, Material, Model, NormalMode, Plane, Quality, RenderSettings, Scene,
-    Sphere, Triangle,
+    Background, Camera, CameraKind, FrameView, Material, Model, NormalMode, Plane, Quality, RenderSettings,
+    Scene, Sphere, Triangle,
 };
 use crate::simd::{self, LANES, Lanes, Simd, dispatch};
 
@@ -55,29 +58,72 @@ impl Random {
     }
 }
 
-/// Triangles that are hard to test against rays from `origin` to `targets`.
-fn hard_triangles(random: &mut Random, origin: DVec3, targets: &[DVec3], count: usize) -> Vec<[DVec3; 3]> {
-    let scale = targets.iter().map(|target| target.distance(origin)).fold(0.0, f64::max);
+/// Rays with a projection: from a point to targets, or parallel and from targets.
+enum Beam<'a> {
+    Point { origin: DVec3, targets: &'a [DVec3] },
+    Parallel { direction: DVec3, targets: &'a [DVec3] },
+}
+
+impl Beam<'_> {
+    /// A point on one of the rays.
+    fn point(&self, random: &mut Random) -> DVec3 {
+        match *self {
+            Self::Point { origin, targets } => {
+                let depths = [1e-6, 1e-3, 0.3, 0.9, 0.999_999, 1.0, 1.000_001, 1.5, 8.0, -0.5];
+                origin + (random.one_of(targets) - origin) * random.one_of(&depths)
+            }
+            Self::Parallel { direction, targets } => {
+                let depths = [0.0, 1e-9, 1e-3, 0.3, 0.999_999, 1.0, 1.000_001, 8.0, -1e-9, -0.5];
+                random.one_of(targets) + direction * random.one_of(&depths)
+            }
+        }
+    }
+
+    /// Direction of the ray through a point, of any length.
+    fn direction_at(&self, point: DVec3) -> DVec3 {
+        match *self {
+            Self::Point { origin, .. } => point - origin,
+            Self::Parallel { direction, .. } => direction,
+        }
+    }
+
+    /// A point that rays start at.
+    fn start(&self) -> DVec3 {
+        match *self {
+            Self::Point { origin, .. } => origin,
+            Self::Parallel { targets, .. } => targets[targets.len() / 2],
+        }
+    }
+
+    /// Largest distance of a target.
+    fn size(&self) -> f64 {
+        let (Self::Point { targets, .. } | Self::Parallel { targets, .. }) = self;
+        targets.iter().map(|target| target.distance(self.start())).fold(0.0, f64::max)
+    }
+}
+
+/// Triangles that are hard to test against the rays of a beam.
+fn hard_triangles(random: &mut Random, beam: &Beam<'_>, count: usize) -> Vec<[DVec3; 3]> {
+    let (scale, start) = (beam.size(), beam.start());
     let mut triangles: Vec<[DVec3; 3]> = Vec::new();
     while triangles.len() < count {
-        let depths = [1e-6, 1e-3, 0.3, 0.9, 0.999_999, 1.0, 1.000_001, 1.5, 8.0, -0.5];
-        let mut aimed = || origin + (random.one_of(targets) - origin) * random.one_of(&depths);
-        let [a, b] = [aimed(), aimed()];
+        let [a, b] = [beam.point(random), beam.point(random)];
         let (small, size) = (scale * random.ten_to(-9.0, -2.0), scale * random.ten_to(-4.0, 0.5));
         let [u, v, w] = [random.vector(), random.vector(), random.vector()];
+        let along = beam.direction_at(a);
         triangles.push(match random.below(8) {
             0 => [a + u * size, a + v * size, a + w * size],
-            // ProjectedBoxes the projection.
-            1 => [origin + u * size, origin + v * size * 10.0, origin + w * size * 10.0],
+            // Around the start of the rays.
+            1 => [start + u * size, start + v * size * 10.0, start + w * size * 10.0],
             // A sliver.
             2 => [a, b, a.lerp(b, random.share()) + u * small],
             // Nearly edge-on.
-            3 => [a, b, origin + (a - origin) * v.x + (b - origin) * v.y + u * small],
+            3 => [a, b, a + along * (v.x - 1.0) + beam.direction_at(b) * v.y + u * small],
             // A corner on a ray, an edge across a ray.
             4 => [a, a + u * size, a + v * size],
             5 => [a + u * size, a - u * size, a + v * size],
-            // Nearly facing the origin: all points have about the same depth.
-            6 => [a, a + (b - a) * v.x, a + (a - origin).cross(b - a).normalize_or_zero() * size],
+            // Nearly facing the rays: all points have about the same depth.
+            6 => [a, a + (b - a) * v.x, a + along.cross(b - a).normalize_or_zero() * size],
             // A layer next to another.
             _ => match triangles.last() {
                 Some(&[a, b, c]) => [a + u * small, b + u * small, c + w * small],
@@ -109,17 +155,23 @@ fn camera(random: &mut Random) -> Camera {
         up: DVec3::new(0.1, 1.0, 0.2),
         fov,
         zoom: 1.0,
-        kind: crate::scene::CameraKind::PINHOLE,
+        kind: CameraKind::PINHOLE,
     }
 }
 
+fn orthographic(random: &mut Random) -> Camera {
+    let view_height = random.one_of(&[1e-6, 1e-2, 1.0, 40.0, 1e6]);
+    Camera { kind: CameraKind::Orthographic { view_height }, ..camera(random) }
+}
+
 /// A scene of these triangles: most in a mesh with up to two nearly equal instances, four as triangles of the scene file, and
-/// sometimes a sphere and a plane.
+/// sometimes a sphere and a plane; and a mirror.
 fn frame_of(
     random: &mut Random,
     triangles: &[[DVec3; 3]],
     camera: Camera,
     (width, height, samples): (u32, u32, u32),
+    mirror: Option<Plane>,
 ) -> PreparedFrame {
     let (singles, rest) = triangles.split_at(4);
     let mesh = mesh_of(rest).map(Arc::new);
@@ -157,7 +209,7 @@ fn frame_of(
         textures: vec![],
         models,
         spheres: vec![spheres; usize::from(few)],
-        planes: vec![planes; usize::from(few)],
+        planes: std::iter::repeat_n(planes, usize::from(few)).chain(mirror).collect(),
         triangles: singles.iter().map(single).collect(),
         background_visible: true,
         disks: Vec::new(),
@@ -202,62 +254,92 @@ fn each_lane(lanes: &[u32; BLOCKS]) -> impl Iterator<Item = (usize, usize)> {
 }
 
 #[inline(always)]
-fn find_closest<S: Simd>(
+fn find_in_tile<S: Simd>(
     simd: S,
     frame: &PreparedFrame,
     live: [u32; BLOCKS],
     corner: (u32, u32),
     hits: &mut [HitBlock; BLOCKS],
 ) {
-    let rays = TileRays::grid(simd);
+    let rays = &TileRays::grid(simd);
     let center = [corner.0, corner.1].map(|corner| f64::from(corner + SIDE as u32 / 2));
-    let tile = EyeTile::new(frame, &rays, live, center, frame.rays.grid());
-    tile.find_closest(simd, hits, &mut Scratch::new());
+    let samples = TileSamples { rays, live, center, grid: frame.rays.grid() };
+    let scratch = &mut Scratch::new();
+    match &frame.rays {
+        CameraRays::Pinhole(camera) => {
+            find_closest(simd, &EyeTile::new(frame, camera, samples), hits, scratch);
+        }
+        CameraRays::Parallel(camera) => {
+            find_closest(simd, &ParallelTile::new(frame, camera, samples), hits, scratch);
+        }
+        CameraRays::Fisheye(_) => panic!("fisheye cameras have no tiles"),
+    }
+}
+
+/// The ray of a sample, by its column and row in the whole picture.
+fn ray_of(rays: &CameraRays, column: u32, row: u32) -> Ray {
+    let grid = f64::from(rays.grid());
+    let (across, along) = ((f64::from(column) + 0.5) / grid, (f64::from(row) + 0.5) / grid);
+    match rays {
+        CameraRays::Pinhole(rays) => Ray { origin: DVec3::ZERO, direction: rays.through(across, along) },
+        CameraRays::Parallel(rays) => Ray { origin: rays.origin(across, along), direction: rays.direction() },
+        CameraRays::Fisheye(rays) => {
+            Ray { origin: DVec3::ZERO, direction: rays.through(across, along).direction }
+        }
+    }
+}
+
+/// Checks, on each level, the closest hits of a tile of a camera among triangles that are hard to test against its rays.
+fn check_closest(seed: u64, camera: fn(&mut Random) -> Camera) {
+    let mut hits = [const { HitBlock::NONE }; BLOCKS];
+    let random = &mut Random(seed);
+    let camera = camera(random);
+    let grid = 1 + random.below(4) as u32;
+    let size = (1 + random.below(40) as u32, 1 + random.below(40) as u32, grid * grid);
+    let (width, height, samples) = size;
+    let view = FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() };
+    let rays = CameraRays::new(&view, 1.0);
+    let corner = (random.below(width as usize * 4) as u32, random.below(height as usize * 4) as u32);
+    let side = SIDE as u32;
+    let of_world: Vec<Ray> =
+        (0..side * side).map(|i| ray_of(&rays, corner.0 + i % side, corner.1 + i / side)).collect();
+    let triangles = if let CameraKind::Orthographic { view_height } = camera.kind {
+        let targets: Vec<DVec3> = of_world.iter().map(|ray| ray.origin).collect();
+        let direction = of_world[0].direction * view_height;
+        hard_triangles(random, &Beam::Parallel { direction, targets: &targets }, 60)
+    } else {
+        let targets: Vec<DVec3> = of_world.iter().map(|ray| ray.direction).collect();
+        hard_triangles(random, &Beam::Point { origin: DVec3::ZERO, targets: &targets }, 60)
+    };
+    let mut frame = frame_of(random, &triangles, camera, size, None);
+    let live = some_lanes(random);
+    let primitives = primitives(&frame);
+    let closest = |ray: &Ray| frame.preferred_of(ray, primitives.iter().copied(), f64::INFINITY, None);
+    let expected: Vec<(usize, usize, Option<PrimitiveId>)> = each_lane(&live)
+        .map(|(block, lane)| {
+            let (column, row) = place(block, lane);
+            let hit = closest(&ray_of(&frame.rays, corner.0 + column as u32, corner.1 + row as u32));
+            (block, lane, hit.map(|(_, primitive)| primitive))
+        })
+        .collect();
+    for level in simd::all() {
+        frame.level = level;
+        dispatch!(level, simd => find_in_tile(simd, &frame, live, corner, &mut hits));
+        for &(block, lane, expected) in &expected {
+            let found = hits[block].primitive(lane);
+            assert_eq!(found, expected, "seed {seed}, {}, {block}/{lane}", simd::name(level));
+        }
+    }
 }
 
 #[test]
 fn closest_hits_of_tiles_are_those_of_brute_force() {
-    let mut hits = [const { HitBlock::NONE }; BLOCKS];
-    for seed in 0..400 {
-        let random = &mut Random(seed);
-        let camera = camera(random);
-        let grid = 1 + random.below(4) as u32;
-        let size = (1 + random.below(40) as u32, 1 + random.below(40) as u32, grid * grid);
-        let (width, height, samples) = size;
-        let rays = PinholeRays::new(&FrameView {
-            camera,
-            width,
-            height,
-            samples,
-            spin: 0.0,
-            quality: Quality::default(),
-        });
-        let corner = (random.below(width as usize * 4) as u32, random.below(height as usize * 4) as u32);
-        let side = SIDE as u32;
-        let targets: Vec<DVec3> =
-            (0..side * side).map(|i| rays.of_sample(corner.0 + i % side, corner.1 + i / side)).collect();
-        let triangles = hard_triangles(random, DVec3::ZERO, &targets, 60);
-        let mut frame = frame_of(random, &triangles, camera, size);
-        let live = some_lanes(random);
-        let primitives = primitives(&frame);
-        let closest = |ray: &Ray| frame.preferred_of(ray, primitives.iter().copied(), f64::INFINITY, None);
-        let expected: Vec<(usize, usize, Option<PrimitiveId>)> = each_lane(&live)
-            .map(|(block, lane)| {
-                let (column, row) = place(block, lane);
-                let direction = frame.rays.of_sample(corner.0 + column as u32, corner.1 + row as u32);
-                let hit = closest(&Ray { origin: DVec3::ZERO, direction });
-                (block, lane, hit.map(|(_, primitive)| primitive))
-            })
-            .collect();
-        for level in simd::all() {
-            frame.level = level;
-            dispatch!(level, simd => find_closest(simd, &frame, live, corner, &mut hits));
-            for &(block, lane, expected) in &expected {
-                let found = hits[block].primitive(lane);
-                assert_eq!(found, expected, "seed {seed}, {}, {block}/{lane}", simd::name(level));
-            }
-        }
-    }
+    (0..400).for_each(|seed| check_closest(seed, camera));
+}
+
+#[test]
+fn closest_hits_of_parallel_tiles_are_those_of_brute_force() {
+    (0..400).for_each(|seed| check_closest(seed, orthographic));
 }
 
 /// Points of a tile: a patch of a surface, smooth or rough, in two parts, or in one place.
@@ -317,9 +399,9 @@ fn check_shadows(seed: u64, far: f64) {
         light = point_of(&points, random.one_of(&lanes));
     }
     let targets: Vec<DVec3> = lanes.iter().map(|&lane| point_of(&points, lane)).collect();
-    let triangles = hard_triangles(random, light, &targets, 60);
+    let triangles = hard_triangles(random, &Beam::Point { origin: light, targets: &targets }, 60);
     let camera = camera(random);
-    let mut frame = frame_of(random, &triangles, camera, (16, 16, 1));
+    let mut frame = frame_of(random, &triangles, camera, (16, 16, 1), None);
     let scale = frame.per_unit;
     for block in &mut points {
         block.iter_mut().for_each(|lanes| lanes.0.iter_mut().for_each(|x| *x *= scale as f32));

@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::affine::Affine;
-use crate::scene::{Camera, FrameView};
+use super::super::affine::Affine;
+use super::Basis;
+use crate::scene::{FovAxis, FrameView};
 
 /// Directions of the rays of a pinhole camera. All rays start at the origin of eye space.
 #[derive(Clone, Copy, Debug)]
@@ -19,12 +20,16 @@ pub(crate) struct PinholeRays {
 }
 
 impl PinholeRays {
-    /// The rays of a view. The view plane has distance 1, height 2 tan(fov / 2) / zoom, and the width that the aspect gives.
-    pub(crate) fn new(view: &FrameView) -> Self {
+    /// The rays of a view. The view plane has distance 1, a side of 2 tan(fov / 2) / zoom along `fov_axis`, and the other side
+    /// that the aspect gives.
+    pub(crate) fn new(view: &FrameView, fov_axis: FovAxis) -> Self {
         let Basis { forward, right, up } = Basis::of(&view.camera);
         let (width, height) = (f64::from(view.width), f64::from(view.height));
-        let half_height = libm::tan(view.camera.fov.to_radians() / 2.0) / view.camera.zoom;
-        let half_width = half_height * width / height;
+        let half_side = libm::tan(view.camera.fov.to_radians() / 2.0) / view.camera.zoom;
+        let (half_width, half_height) = match fov_axis {
+            FovAxis::Vertical => (half_side * width / height, half_side),
+            FovAxis::Horizontal => (half_side, half_side * height / width),
+        };
         Self {
             corner: forward - right * half_width + up * half_height,
             right: right * (2.0 * half_width / width),
@@ -64,31 +69,10 @@ impl PinholeRays {
     }
 }
 
-/// The axes of a camera in world space, right-handed: right x up = -forward.
-#[derive(Clone, Copy, Debug)]
-pub struct Basis {
-    /// Unit vector into the picture.
-    pub forward: DVec3,
-    /// Unit vector to the right of the picture.
-    pub right: DVec3,
-    /// Unit vector to the top of the picture.
-    pub up: DVec3,
-}
-
-impl Basis {
-    /// The axes of a camera. Its `up` need not be perpendicular to its view direction.
-    pub fn of(camera: &Camera) -> Self {
-        let forward = (camera.look_at - camera.position).normalize_or(DVec3::NEG_Z);
-        let sideways = forward.cross(camera.up.normalize_or(DVec3::Y));
-        let right = sideways.try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
-        Self { forward, right, up: right.cross(forward) }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Quality;
+    use crate::scene::{Camera, CameraKind, Quality};
 
     fn view(width: u32, height: u32, samples: u32) -> FrameView {
         let camera = Camera {
@@ -97,14 +81,18 @@ mod tests {
             up: DVec3::Y,
             fov: 90.0,
             zoom: 1.0,
-            kind: crate::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         };
         FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() }
     }
 
+    fn vertical(view: &FrameView) -> PinholeRays {
+        PinholeRays::new(view, FovAxis::Vertical)
+    }
+
     #[test]
     fn the_picture_spans_the_field_of_view() {
-        let rays = PinholeRays::new(&view(4, 2, 1));
+        let rays = vertical(&view(4, 2, 1));
         // Pixel centres at 1/4 of the half height: the plane reaches from y = +1 to -1.
         let top_left = rays.of_sample(0, 0);
         assert!((top_left - DVec3::new(-1.5, 0.5, -1.0)).length() < 1e-12, "{top_left}");
@@ -114,7 +102,7 @@ mod tests {
 
     #[test]
     fn samples_lie_on_a_grid_whose_mean_is_the_centre() {
-        let (one, nine) = (PinholeRays::new(&view(64, 64, 1)), PinholeRays::new(&view(64, 64, 9)));
+        let (one, nine) = (vertical(&view(64, 64, 1)), vertical(&view(64, 64, 9)));
         let inside = |i: u32| nine.of_sample(30 + i % 3, 60 + i / 3);
         let mean = (0..9).map(inside).sum::<DVec3>() / 9.0;
         assert!((mean - one.of_sample(10, 20)).length() < 1e-12);
@@ -126,15 +114,18 @@ mod tests {
     fn zoom_divides_the_view_plane() {
         let mut zoomed = view(4, 2, 1);
         zoomed.camera.zoom = 2.0;
-        let direction = PinholeRays::new(&zoomed).of_sample(0, 0);
+        let direction = vertical(&zoomed).of_sample(0, 0);
         assert!((direction - DVec3::new(-0.75, 0.25, -1.0)).length() < 1e-12, "{direction}");
     }
 
     #[test]
-    fn up_along_the_view_still_gives_axes() {
-        let mut camera = view(1, 1, 1).camera;
-        camera.up = DVec3::NEG_Z;
-        let Basis { forward, right, up } = Basis::of(&camera);
-        assert!(forward.dot(right).abs() < 1e-12 && up.dot(right).abs() < 1e-12 && right.is_normalized());
+    fn a_horizontal_field_of_view_spans_the_width() {
+        // Pixels of 1/2: the plane reaches from x = -1 to +1, and from y = +1/2 to -1/2.
+        let rays = PinholeRays::new(&view(4, 2, 1), FovAxis::Horizontal);
+        let top_left = rays.of_sample(0, 0);
+        assert!((top_left - DVec3::new(-0.75, 0.25, -1.0)).length() < 1e-12, "{top_left}");
+        let tall = PinholeRays::new(&view(2, 4, 1), FovAxis::Horizontal);
+        let bottom_right = tall.of_sample(1, 3);
+        assert!((bottom_right - DVec3::new(0.5, -1.5, -1.0)).length() < 1e-12, "{bottom_right}");
     }
 }
