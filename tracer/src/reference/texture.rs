@@ -11,7 +11,7 @@ use crate::texture::Texture;
 #[derive(Clone, Copy)]
 pub(super) enum Border {
     /// The picture repeated.
-    Around,
+    Cyclic,
     /// The outermost texel.
     Clamped,
     /// The picture repeated, every second time reflected.
@@ -22,7 +22,7 @@ impl Border {
     /// The texel at an index inside or outside of a picture with `size` texels.
     pub(super) fn index(self, index: f64, size: f64) -> f64 {
         match self {
-            Border::Around => index.rem_euclid(size),
+            Border::Cyclic => index.rem_euclid(size),
             Border::Clamped => index.clamp(0.0, size - 1.0),
             Border::Reflected => {
                 let pair = index.rem_euclid(2.0 * size);
@@ -69,7 +69,7 @@ impl Oracle {
 impl Border {
     fn of(map: &TextureMap) -> Self {
         match map.tiling.wrap {
-            Wrap::Repeat => Border::Around,
+            Wrap::Repeat => Border::Cyclic,
             Wrap::Clamp => Border::Clamped,
             Wrap::Mirror => Border::Reflected,
         }
