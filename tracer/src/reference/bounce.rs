@@ -37,7 +37,7 @@ impl Oracle {
             let (mut reflected, mut transmitted) = (Vec::new(), Vec::new());
             for mut traveller in generation {
                 let Some(surface) = self.surface(traveller.ray, traveller.starts_on) else {
-                    sum += self.from_infinity(&traveller, depth > 0);
+                    sum += self.seen_without_hit(&traveller, depth > 0);
                     continue;
                 };
                 traveller.weight *= self.remaining(&traveller, &surface);
@@ -60,7 +60,7 @@ impl Oracle {
     }
 
     /// What a ray sees of the background.
-    fn from_infinity(&self, traveller: &Traveller, bounced: bool) -> DVec3 {
+    fn seen_without_hit(&self, traveller: &Traveller, bounced: bool) -> DVec3 {
         let direction = traveller.ray.direction;
         let seen = if bounced { self.background(direction) } else { self.background_of_camera(direction) };
         traveller.weight * traveller.bodies.remaining_at_infinity(&self.scene.materials) * seen
