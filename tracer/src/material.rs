@@ -29,7 +29,7 @@ pub struct Material {
     pub unlit: bool,
     /// Whether vertex colours of the mesh, if it has any, are a factor of c_d.
     pub vertex_colors: bool,
-    /// A pattern of two colours, in place of c_d and its texture.
+    /// A pattern of two colours: a factor of c_d, which loaders make white, in place of its texture.
     pub checker: Option<Checker>,
     /// Texture that tilts shading normals. Valid only on geometry with texture coordinates.
     pub normal_map: Option<NormalMap>,
@@ -114,6 +114,12 @@ impl Material {
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         let normals = self.normal_map.map(|map| map.texture);
         [self.texture, self.cutout, self.emission_texture, normals].into_iter().flatten()
+    }
+
+    /// Whether it needs texture coordinates: it has a texture, or a checker pattern that is laid in them.
+    pub fn needs_uvs(&self) -> bool {
+        let in_uvs = |checker: Checker| checker.space == CheckerSpace::Uv;
+        self.checker.is_some_and(in_uvs) || self.textures().next().is_some()
     }
 
     /// Whether it reflects or transmits light.

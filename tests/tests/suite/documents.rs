@@ -25,7 +25,7 @@ const KNOBS_HEADING: &str = "\n## Knobs\n";
 const NOT_IN_HELP: [&str; 2] = ["trace", "release"];
 
 /// A scene that ends where an unknown key is refused, for each table.
-const TABLES: [&str; 11] = [
+const TABLES: [&str; 17] = [
     "",
     "[render]\n",
     "[camera]\n",
@@ -33,10 +33,16 @@ const TABLES: [&str; 11] = [
     "[[light]]\n",
     "[material.a]\n",
     "[material.a.diffuse]\n",
+    "[material.a.diffuse]\nchecker = []\n",
+    "[material.a.normal_map]\n",
     "[[model]]\n",
     "[[sphere]]\n",
     "[[plane]]\n",
+    "[[disk]]\n",
     "[[triangle]]\n",
+    "[[rectangle]]\n",
+    "[[box]]\n",
+    "[[group]]\n",
 ];
 
 fn document(name: &str) -> String {

@@ -3,12 +3,16 @@
 mod angle;
 mod camera;
 mod chess;
+mod color;
 mod globe;
+mod noise;
 mod obj;
 mod random;
 mod room;
 mod shape;
 mod shapes;
+mod showroom;
+mod table;
 
 use obj::{Digits, Shading, mtl_text, obj_text};
 use rayfarm_tracer::image::RgbImage;
@@ -57,8 +61,15 @@ impl Part {
 
 /// Every generated file of `models/`.
 pub(crate) fn files() -> Vec<GeneratedFile> {
-    let folders = [room::folder(), camera::folder(), chess::folder(), globe::folder()];
-    folders.iter().flat_map(files_of).chain(globe::textured_files()).collect()
+    let folders = [
+        room::folder(),
+        camera::folder(),
+        chess::folder(),
+        globe::folder(),
+        table::folder(),
+        showroom::folder(),
+    ];
+    folders.iter().flat_map(files_of).chain(globe::textured_files()).chain(table::pictures()).collect()
 }
 
 fn files_of(folder: &Folder) -> Vec<GeneratedFile> {

@@ -13,7 +13,7 @@ const CREASE_DEGREES: f64 = 40.0;
 /// How an OBJ file is shaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Shading {
-    /// No normals in the file: for scenes that say `normals = "flat"`.
+    /// No normals in the file: for scenes that say `normals = "flat"`, or that leave smoothing to the crease angle of the loader.
     #[default]
     Flat,
     /// A normal per corner, smooth up to the crease angle.

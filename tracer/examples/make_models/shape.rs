@@ -105,6 +105,15 @@ impl Shape {
         self.mapped(|p| angle::turn_z(p, degrees))
     }
 
+    /// The same surface with its inside outside: the wall of a cavity.
+    pub(crate) fn inside_out(mut self) -> Self {
+        for [a, b, c, d] in &mut self.faces {
+            // A triangle repeats its last corner, before and after.
+            [*a, *b, *c, *d] = if *c == *d { [*b, *a, *c, *c] } else { [*d, *c, *b, *a] };
+        }
+        self
+    }
+
     /// Merges vertices that lie within a tenth of a micrometre, and drops faces that lose their area by it.
     pub(crate) fn welded(self) -> Self {
         let mut known = BTreeMap::new();

@@ -199,7 +199,7 @@ impl PreparedFrame {
     }
 
     /// Bounds of an item in eye space, padded.
-    fn item_bounds(&self, item: Item) -> (Vec3, Vec3) {
+    pub(crate) fn item_bounds(&self, item: Item) -> (Vec3, Vec3) {
         let (lo, hi) = match item {
             Item::Model(i) => {
                 let instance = &self.instances[i];
@@ -239,7 +239,11 @@ fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
 }
 
 fn lights(scene: &Scene, quality: &Quality, to_eye: &ToEye) -> Vec<EyeLight> {
-    let cast = |light: &Light| Light { shadows: light.shadows && quality.shadows, ..*light };
+    let cast = |light: &Light| Light {
+        shadows: light.shadows && quality.shadows,
+        shadow_samples: light.shadow_samples.or(Some(quality.shadow_samples)),
+        ..*light
+    };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
     scene.lights.iter().map(place).collect()
 }

@@ -42,6 +42,11 @@ impl PreparedFrame {
         self.slack_of(ray, &self.crossing(ray, primitive, t), t)
     }
 
+    /// Whether a ray hits the front of a primitive at `t`.
+    pub(super) fn is_front(&self, ray: &Ray, primitive: PrimitiveId, t: f64) -> bool {
+        self.crossing(ray, primitive, t).faces
+    }
+
     fn slack_of(&self, ray: &Ray, crossing: &Crossing, t: f64) -> f64 {
         let error = crossing.error + self.coarsest + point_error(ray, t);
         if crossing.speed > 0.0 { error / crossing.speed } else { f64::INFINITY }

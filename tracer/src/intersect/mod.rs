@@ -22,4 +22,5 @@ pub(crate) mod tile;
 mod world;
 
 pub(crate) use exact::Hit;
+pub(crate) use single::Crossings;
 pub use world::{Primitive, RayHit, RaySegment};

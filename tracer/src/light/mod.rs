@@ -1,17 +1,24 @@
 //! Lights in eye space: the unoccluded radiance I_j A_j B_j of the shading equation, sixteen points at a time.
+//!
+//! ```text
+//!   extent   the points on a light with a radius
+//! ```
+
+pub(crate) mod extent;
 
 use glam::{DVec3, Vec3};
 
-use crate::scene::{Attenuation, Light, LightKind};
+use crate::scene::{Attenuation, Light, LightKind, Quality};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, SimdBase, SimdFloat, bits, f32x16, select, splat, three};
+use extent::Extent;
 
 /// Upper end of a shadow ray, as a fraction of the distance to the light. A surface that contains the light does not
 /// occlude it: points are `f32`, so a surface within the last 2^-18 cannot be distinguished from the light's position.
 pub(crate) const SHADOW_T_MAX: f64 = 1.0 - 1.0 / (1 << 18) as f64;
 
 /// A light of one frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct EyeLight {
     pub(crate) emitter: Emitter,
     color: Vec3,
@@ -20,6 +27,8 @@ pub(crate) struct EyeLight {
     unit: f64,
     /// Whether shadow rays are traced to the light.
     pub(crate) shadows: bool,
+    /// The ball of a light whose shadows are soft. All other terms are those of its centre.
+    pub(crate) extent: Option<Extent>,
 }
 
 /// Kind and place of a light in eye space.
@@ -61,7 +70,15 @@ impl EyeLight {
                 Emitter::Directional { to_light: -direction.normalize_or_zero() }
             }
         };
-        Self { emitter, color: light.color, attenuation: light.attenuation, unit, shadows: light.shadows }
+        let extent = match emitter {
+            Emitter::Point { position } | Emitter::Spot { position, .. } if light.shadows => {
+                let samples = light.shadow_samples.unwrap_or(Quality::default().shadow_samples);
+                (light.radius > 0.0).then(|| Extent::new(position, light.radius / unit, samples))
+            }
+            _ => None,
+        };
+        let (color, attenuation, shadows) = (light.color, light.attenuation, light.shadows);
+        Self { emitter, color, attenuation, unit, shadows, extent }
     }
 
     /// The unoccluded light at sixteen points in eye space.

@@ -1,7 +1,8 @@
 //! The material slots of a compiled mesh as bytes.
 //!
-//! Per slot: diffuse, specular, exponent, emission (ten `f32`), flags (`u8`: 1 is unlit), the length of the name in
-//! bytes (`u8`), the name, and three textures: diffuse, cut-out, emission. A texture is the length of its file name
+//! Per slot: diffuse, specular, exponent, emission (ten `f32`), flags (`u8`: 1 is unlit, 2 bounces, 4 thin, 8 Fresnel
+//! shares), with bounces reflect, transmit and index of refraction (seven `f32`), the length of the name in bytes
+//! (`u8`), the name, and three textures: diffuse, cut-out, emission. A texture is the length of its file name
 //! in bytes (`u16`, 0 for none), the name, its wrap (`u8`), scale and offset (four `f32`). Version 3 has neither
 //! emission nor flags, and one texture without wrap, scale and offset.
 
@@ -15,6 +16,10 @@ use crate::texture::{Tiling, Wrap};
 const MAX_NAME: usize = 255;
 
 const UNLIT: u8 = 1;
+/// Reflection and transmission follow. Materials without them keep the bytes that they had before.
+const BOUNCES: u8 = 2;
+const THIN: u8 = 4;
+const FRESNEL: u8 = 8;
 
 pub(super) fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -22,7 +27,7 @@ pub(super) fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
         let colors = [material.diffuse, material.specular].map(|color| color.to_array()).concat();
         let numbers = colors.into_iter().chain([material.exponent]).chain(material.emission.to_array());
         numbers.for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
-        bytes.push(if material.unlit { UNLIT } else { 0 });
+        encode_flags(material, &mut bytes);
         let name = &name[..name.floor_char_boundary(MAX_NAME)];
         bytes.push(name.len() as u8);
         bytes.extend_from_slice(name.as_bytes());
@@ -31,6 +36,22 @@ pub(super) fn encode_materials(materials: &[NamedMaterial]) -> Vec<u8> {
             .for_each(|texture| encode_texture(texture.as_ref(), &mut bytes));
     }
     bytes
+}
+
+fn encode_flags(material: &Material, bytes: &mut Vec<u8>) {
+    let bounces = material.bounces();
+    let flags = [
+        (material.unlit, UNLIT),
+        (bounces, BOUNCES),
+        (bounces && material.thin, THIN),
+        (bounces && material.fresnel, FRESNEL),
+    ];
+    bytes.push(flags.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag).sum());
+    if bounces {
+        let shares = [material.reflect, material.transmit].map(|share| share.to_array()).concat();
+        let numbers = shares.into_iter().chain([material.ior]);
+        numbers.for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+    }
 }
 
 fn encode_texture(texture: Option<&TextureFile>, bytes: &mut Vec<u8>) {
@@ -89,10 +110,10 @@ impl<'b> Reader<'b> {
         let material = self.blinn_phong()?;
         let emission = Vec3::from_array(self.numbers()?);
         let flags = self.byte()?;
-        let unlit = flags & UNLIT != 0;
+        let material = Material { emission, unlit: flags & UNLIT != 0, ..material };
+        let material = if flags & BOUNCES == 0 { material } else { self.bounces(material, flags)? };
         let length = self.byte()?;
         let name = self.text(length.into())?;
-        let material = Material { emission, unlit, ..material };
         let [texture, cutout, emission_texture] = [self.texture()?, self.texture()?, self.texture()?];
         Ok(NamedMaterial { name, material, texture, cutout, emission_texture })
     }
@@ -109,6 +130,20 @@ impl<'b> Reader<'b> {
         let [dr, dg, db, sr, sg, sb, exponent] = self.numbers()?;
         let (diffuse, specular) = (Vec3::new(dr, dg, db), Vec3::new(sr, sg, sb));
         Ok(Material { diffuse, specular, exponent, ..Material::NEUTRAL })
+    }
+
+    fn bounces(&mut self, material: Material, flags: u8) -> Result<Material, MeshError> {
+        let shares: [f32; 6] = self.numbers()?;
+        let [ior] = self.numbers()?;
+        if shares.iter().any(|share| *share > 1.0) || ior == 0.0 {
+            let message =
+                "a material reflects or transmits more than all light, or has the index of refraction 0";
+            return Err(MeshError::Format(message.into()));
+        }
+        let [rr, rg, rb, tr, tg, tb] = shares;
+        let (reflect, transmit) = (Vec3::new(rr, rg, rb), Vec3::new(tr, tg, tb));
+        let (thin, fresnel) = (flags & THIN != 0, flags & FRESNEL != 0);
+        Ok(Material { reflect, transmit, ior, thin, fresnel, ..material })
     }
 
     fn texture(&mut self) -> Result<Option<TextureFile>, MeshError> {

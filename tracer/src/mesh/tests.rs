@@ -166,6 +166,28 @@ fn rich(n: u32) -> Mesh {
 }
 
 #[test]
+fn mirrors_and_glass_of_slots_round_trip() {
+    let (compiled, _) = CompiledMesh::compile(&textured(5)).unwrap();
+    let mut materials = compiled.materials();
+    let plain_length = compiled.bytes().len();
+    for (reflect, transmit, thin, fresnel) in [
+        (Vec3::new(0.5, 0.25, 1.0), Vec3::ZERO, false, false),
+        (Vec3::ZERO, Vec3::new(0.0, 0.75, 0.0), true, false),
+        (Vec3::ONE, Vec3::ONE, false, true),
+    ] {
+        let material = &mut materials[0].material;
+        *material = Material { reflect, transmit, ior: 1.25, thin, fresnel, ..*material };
+        let changed = compiled.with_materials(&materials).unwrap();
+        assert_eq!(CompiledMesh::from_bytes(changed.bytes()).unwrap().materials(), materials);
+        assert!(changed.bytes().len() >= plain_length + 28);
+    }
+    materials[0].material.reflect.x = 1.5;
+    let changed = compiled.with_materials(&materials);
+    let read = changed.and_then(|changed| CompiledMesh::from_bytes(changed.bytes()));
+    assert!(read.is_err_and(|error| error.to_string().contains("more than all light")));
+}
+
+#[test]
 fn repeats_colours_and_slots_round_trip() {
     let mut source = rich(9);
     source.triangles[5] = [0; 3];

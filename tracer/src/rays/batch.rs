@@ -1,10 +1,10 @@
 //! Batches: up to 256 rays of any origins and directions, as sixteen blocks, so that they are shaded as a tile is.
 
 use super::block::LocalBlock;
-use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays};
+use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Simd, each_bit};
 
 /// Most rays of a batch.
 pub(crate) const BATCH: usize = BLOCKS * LANES;
@@ -15,6 +15,12 @@ pub(crate) struct RayBatch<'a> {
     pub blocks: Box<[RayBlock<'a>; BLOCKS]>,
     /// Places of the rays in the camera's picture, in any unit and from any origin: shadow tiles follow their rows and columns.
     pub places: TileRays,
+    /// Lengths of the ways of light between the rays and the camera, in eye units.
+    pub ways: [[f64; LANES]; BLOCKS],
+    /// Places of the rays' samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    pub patterns: [[u8; LANES]; BLOCKS],
+    /// Whether most rays hit points near those of their neighbours.
+    pub neighbours: bool,
     /// Whether the rays are those of a camera.
     pub(super) of_camera: bool,
 }
@@ -23,12 +29,37 @@ impl<'a> RayBatch<'a> {
     /// A batch without live rays.
     pub(crate) fn new(frame: &'a PreparedFrame) -> Self {
         let blocks = Box::new(std::array::from_fn(|_| RayBlock::new(frame)));
-        Self { frame, blocks, places: TileRays::empty(), of_camera: false }
+        Self {
+            frame,
+            blocks,
+            places: TileRays::empty(),
+            ways: [[0.0; LANES]; BLOCKS],
+            patterns: [[0; LANES]; BLOCKS],
+            neighbours: true,
+            of_camera: false,
+        }
     }
 
     /// Removes all rays.
     pub(crate) fn clear(&mut self) {
         self.blocks.iter_mut().for_each(RayBlock::clear);
+    }
+
+    /// Replaces the rays by those of some samples of a camera; `ray` is that of a place of the picture, in pixels from its top left
+    /// corner, with its upper end.
+    pub(super) fn put_samples(&mut self, samples: &TileSamples<'_>, ray: impl Fn(f64, f64) -> (Ray, f64)) {
+        self.clear();
+        self.of_camera = true;
+        self.places.x = samples.rays.x;
+        self.places.y = samples.rays.y;
+        for block in 0..BLOCKS {
+            self.patterns[block] = samples.pattern(block);
+            for lane in each_bit(samples.live[block]) {
+                let [across, along] = samples.place(block, lane);
+                let (ray, t_max) = ray(across, along);
+                self.set(block * LANES + lane, ray, t_max, None);
+            }
+        }
     }
 
     /// Sets ray `index`, below [`BATCH`]: hits within 0 < t < `t_max` count, except on the primitive that it starts on.
@@ -79,8 +110,20 @@ impl SurfaceSource for RayBatch<'_> {
         self.of_camera
     }
 
+    fn are_neighbours(&self) -> bool {
+        self.neighbours
+    }
+
     fn places(&self) -> &TileRays {
         &self.places
+    }
+
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.patterns[block]
+    }
+
+    fn way_before(&self, block: usize, lane: usize) -> f64 {
+        self.ways[block][lane]
     }
 }
 

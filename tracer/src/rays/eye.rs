@@ -3,12 +3,12 @@
 use glam::DVec3;
 
 use super::{
-    BLOCKS, CameraTile, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource,
-    TileRays, TileSamples,
+    BLOCKS, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource, TileRays,
+    TileSamples,
 };
 use crate::frame::{Affine, Instance, PinholeRays, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, three};
+use crate::simd::{LANES, Simd, three};
 
 /// The rays of one tile of a frame with a pinhole camera.
 pub(crate) struct EyeTile<'a> {
@@ -111,6 +111,10 @@ impl SurfaceSource for EyeTile<'_> {
         Some(self)
     }
 
+    fn pattern(&self, block: usize) -> [u8; LANES] {
+        self.samples.pattern(block)
+    }
+
     fn local(&self, instance: Option<&Instance>) -> LocalTile {
         let single = |v: DVec3| v.as_vec3().to_array();
         match instance {
@@ -120,13 +124,6 @@ impl SurfaceSource for EyeTile<'_> {
                 steps: three!(i => single(instance.inverse * self.steps[i])),
             },
         }
-    }
-}
-
-impl CameraTile for EyeTile<'_> {
-    #[inline(always)]
-    fn samples(&self) -> &TileSamples<'_> {
-        &self.samples
     }
 }
 

@@ -38,6 +38,6 @@ pub(crate) use projection::{Frustum, Projection, ROUNDING};
 pub(crate) use ray::Ray;
 pub use ray::RayCounts;
 pub(crate) use shadow::{ShadowTarget, ShadowTile};
-pub(crate) use source::{CameraTile, LocalRays, PictureTile, RaySource, SurfaceSource};
+pub(crate) use source::{LocalRays, PictureTile, RaySource, SurfaceSource};
 pub(crate) use tile::{ALL_BLOCKS, BLOCKS, SIDE, TileColors, TileRays, TileSamples, place};
 pub use tile::{TILE_SIZE, tile_rows};

@@ -1,15 +1,8 @@
-//! Tiles of an orthographic camera: parallel rays that start on the plane through the origin of eye space.
+//! Tiles of an orthographic camera: parallel rays that start on the plane through the origin of eye space. Their hits are found
+//! as a tile, and shaded as a batch.
 
-use glam::DVec3;
-
-use super::eye::combine;
-use super::{
-    BLOCKS, CameraTile, LocalRays, PictureTile, PrimitiveId, Projection, Ray, RaySource, SurfaceSource,
-    TileRays, TileSamples,
-};
+use super::{PictureTile, PrimitiveId, Projection, Ray, RayBatch, RaySource, TileRays, TileSamples};
 use crate::frame::{Instance, ParallelRays, PreparedFrame};
-use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, three};
 
 /// The rays of one tile of a frame with an orthographic camera.
 pub(crate) struct ParallelTile<'a> {
@@ -22,26 +15,17 @@ pub(crate) struct ParallelTile<'a> {
     drift: [f32; 2],
     /// Size of the tile's picture relative to that of the frame.
     enlarged: f64,
-    /// Origin of the tile's centre, and the steps of origins to the right and down.
-    steps: [DVec3; 3],
-    rounded_steps: [[f32; 3]; 3],
-    direction: [f32; 3],
 }
 
 impl<'a> ParallelTile<'a> {
     /// The rays of some samples; `camera` is that of the frame.
     pub(crate) fn new(frame: &'a PreparedFrame, camera: &'a ParallelRays, samples: TileSamples<'a>) -> Self {
-        let [right, down] = camera.steps(samples.grid);
         let enlarged = samples.enlarged(camera.grid());
-        let [across, along] = samples.middle();
-        let steps = [camera.origin(across, along), right, down];
-        let rounded_steps = three!(i => steps[i].as_vec3().to_array());
         let [x, y] = samples.center;
         let picture = frame.to_picture.enlarged(enlarged).shifted(x, y);
         let drift = Projection::drift(&picture, frame.coarsest);
         let projection = Projection::new(picture, 1.0, true).drifting(drift, 2.0 * frame.coarsest);
-        let direction = camera.direction().as_vec3().to_array();
-        Self { frame, camera, samples, projection, drift, enlarged, steps, rounded_steps, direction }
+        Self { frame, camera, samples, projection, drift, enlarged }
     }
 }
 
@@ -66,68 +50,12 @@ impl RaySource for ParallelTile<'_> {
     }
 }
 
-impl SurfaceSource for ParallelTile<'_> {
-    const BLOCKS: usize = BLOCKS;
-    const COMMON_ORIGIN: bool = false;
-    type Local = LocalParallel;
-
-    #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, _: usize) -> Vec3x16<S> {
-        Vec3x16::splat(simd, self.direction)
-    }
-
-    #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S> {
-        combine(simd, &self.rounded_steps, self.samples.rays, block)
-    }
-
-    #[inline(always)]
-    fn are_of_camera(&self) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn places(&self) -> &TileRays {
-        self.samples.rays
-    }
-
-    fn local(&self, instance: Option<&Instance>) -> LocalParallel {
-        let single = |v: DVec3| v.as_vec3().to_array();
-        let direction = self.camera.direction();
-        let (direction, steps) = match instance {
-            None => (direction, self.steps),
-            Some(instance) => {
-                let [center, right, down] = self.steps;
-                let center = instance.inverse * (center - instance.translation);
-                (instance.inverse * direction, [center, instance.inverse * right, instance.inverse * down])
-            }
-        };
-        LocalParallel { direction: single(direction), steps: three!(i => single(steps[i])) }
-    }
-}
-
-/// A tile of an orthographic camera in the space of a mesh.
-pub(crate) struct LocalParallel {
-    direction: [f32; 3],
-    steps: [[f32; 3]; 3],
-}
-
-impl LocalRays<ParallelTile<'_>> for LocalParallel {
-    #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, tile: &ParallelTile<'_>, block: usize) -> Vec3x16<S> {
-        combine(simd, &self.steps, tile.samples.rays, block)
-    }
-
-    #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, _: &ParallelTile<'_>, _: usize) -> Vec3x16<S> {
-        Vec3x16::splat(simd, self.direction)
-    }
-}
-
-impl CameraTile for ParallelTile<'_> {
-    #[inline(always)]
-    fn samples(&self) -> &TileSamples<'_> {
-        &self.samples
+impl RayBatch<'_> {
+    /// Replaces the rays by those of some samples of an orthographic camera.
+    pub(crate) fn put_parallel(&mut self, camera: &ParallelRays, samples: &TileSamples<'_>) {
+        self.put_samples(samples, |across, along| {
+            (Ray { origin: camera.origin(across, along), direction: camera.direction() }, f64::INFINITY)
+        });
     }
 }
 

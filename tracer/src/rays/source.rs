@@ -3,10 +3,10 @@
 //! A source is blocks of sixteen rays. Its rays are compiled for each kind of source, so that a tile of the camera pays
 //! nothing for origins that differ.
 
-use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays, TileSamples};
+use super::{EyeTile, PrimitiveId, Projection, Ray, TileRays};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, f32x16};
+use crate::simd::{LANES, Simd, f32x16};
 
 /// Blocks of sixteen rays of one frame.
 pub(crate) trait RaySource {
@@ -43,6 +43,11 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     /// Origins of the rays of a block in eye space, rounded.
     fn origins<S: Simd>(&self, simd: S, block: usize) -> Vec3x16<S>;
 
+    /// Whether most rays hit points near those of their neighbours, so that their shadow rays are worth a tile.
+    fn are_neighbours(&self) -> bool {
+        true
+    }
+
     /// Places of the rays in the camera's picture.
     fn places(&self) -> &TileRays;
 
@@ -50,6 +55,9 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
     fn eye(&self) -> Option<&EyeTile<'_>> {
         None
     }
+
+    /// Places of the samples of a block's rays in the pattern of soft shadows: see [`crate::light::extent::place_in_pattern`].
+    fn pattern(&self, block: usize) -> [u8; LANES];
 
     /// The rays in the space of an instance's mesh, or in eye space.
     fn local(&self, instance: Option<&Instance>) -> Self::Local;
@@ -65,12 +73,6 @@ pub(crate) trait SurfaceSource: RaySource + Sized {
         let along = direction.scale(t);
         if Self::COMMON_ORIGIN { along } else { self.origins(simd, block).add(along) }
     }
-}
-
-/// Tiles of a camera with a projection.
-pub(crate) trait CameraTile: SurfaceSource + PictureTile {
-    /// The samples of the tile.
-    fn samples(&self) -> &TileSamples<'_>;
 }
 
 /// Tiles that are a picture of the scene: their closest hits are found together, see `intersect::tile`.

@@ -4,6 +4,7 @@
 //! they are wide.
 
 use crate::frame::PreparedFrame;
+use crate::light::extent::place_in_pattern;
 use crate::scene::FrameView;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, bits, mask_of, select, splat};
 
@@ -63,6 +64,14 @@ impl TileSamples<'_> {
         let x = self.center[0] + f64::from(self.rays.x[block].0[lane]);
         let y = self.center[1] + f64::from(self.rays.y[block].0[lane]);
         [x / grid, y / grid]
+    }
+
+    /// Places of the samples of a block in the pattern of soft shadows.
+    pub(crate) fn pattern(&self, block: usize) -> [u8; LANES] {
+        std::array::from_fn(|lane| {
+            let [column, row] = [self.rays.x[block].0[lane], self.rays.y[block].0[lane]];
+            place_in_pattern(self.center[0] + f64::from(column), self.center[1] + f64::from(row))
+        })
     }
 
     /// Place of the tile's centre, in pixels from the top left corner of the picture.

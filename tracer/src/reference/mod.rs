@@ -1,7 +1,8 @@
 //! The oracle: the shading equations in `f64`, every ray against every primitive, without trees, SIMD or shortcuts.
 //!
 //! Of a frame's quality it applies omitted terms (shadows, highlights) and the filter; it is exact where a setting trades
-//! precision for speed. It shares with the fast path only the scene, the cleaned triangles and the sRGB encoding; all else is
+//! precision for speed. It shares with the fast path only the scene, the cleaned triangles, the sRGB encoding and on request the
+//! points of lights; all else is
 //! computed from the equations of the model of light, to be compared with them.
 //!
 //! ```text
@@ -52,8 +53,9 @@ use glam::DVec3;
 
 use crate::image::RgbImage;
 use crate::intersect::{RayHit, RaySegment};
+use crate::light::extent::Sets;
 use crate::mesh::CompiledMesh;
-use crate::scene::{Filter, FrameView, Scene, TextureMap};
+use crate::scene::{Filter, FrameView, Light, Scene, TextureMap};
 use crate::srgb;
 use crate::texture::Texture;
 use pyramid::Level;
@@ -101,6 +103,17 @@ impl Oracle {
     #[must_use]
     pub fn with_light_points(self, light_points: Vec<Vec<Vec<DVec3>>>) -> Self {
         Self { light_points, ..self }
+    }
+
+    /// As [`Oracle::with_light_points`], with the points of the direct integrator: the noise of both pictures is then the same.
+    #[must_use]
+    pub fn with_points_of_integrator(self) -> Self {
+        let sets_of = |light: &Light| {
+            let sets = Sets::of(light.shadow_samples.unwrap_or(self.view.quality.shadow_samples).max(1));
+            (0..sets.count()).map(|set| sets.points(set).to_vec()).collect()
+        };
+        let light_points = self.scene.lights.iter().map(sets_of).collect();
+        self.with_light_points(light_points)
     }
 
     /// Linear RGB of a pixel: the mean over its samples.

@@ -51,7 +51,7 @@ impl Surfaces {
             let place = Place::of(rays, block, lane, hits.slot(lane));
             uvs[lane] = place.and_then(|place| place.uv()).unwrap_or_default();
         }
-        let uv = PointUvs::exact(uvs).with(footprint);
+        let uv = PointUvs::exact(uvs, footprint);
         texels.fill(rays.frame(), block, lanes, &self.blocks[block].material, &uv);
     }
 }

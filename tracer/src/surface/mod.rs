@@ -32,6 +32,8 @@ mod pattern;
 mod place;
 mod space;
 mod terminator;
+#[cfg(test)]
+mod tests;
 mod texel;
 mod triangles;
 mod uv;

@@ -62,8 +62,8 @@ impl Lifts {
         self.0[block] = Lanes::ZERO;
     }
 
-    /// Sets the lifts of some lanes.
-    #[inline(always)]
+    /// Sets the lifts of some lanes. Not inlined: the code of scenes without it stays dense.
+    #[inline(never)]
     pub(super) fn put<S: Simd, R: SurfaceSource>(
         &mut self,
         simd: S,
@@ -71,23 +71,37 @@ impl Lifts {
         space: &Space<R>,
         points: &SmoothPoints<'_, S>,
     ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let lift = points.lift(simd, &space.normals, space.normals_scale);
+                group.put_one(simd, lift, &mut self.0[group.block]);
+            },
+        );
+    }
+}
+
+impl<S: Simd> SmoothPoints<'_, S> {
+    /// The lifts; `normals` are the columns of the map of normals to eye space, divided by `scale`.
+    #[inline(always)]
+    fn lift(&self, simd: S, normals: &[[f32; 3]; 3], scale: f32) -> f32x16<S> {
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let [u, v] = points.weights;
-        let corners =
-            [(one - u - v, points.at), (u, points.at.sub(points.ab)), (v, points.at.sub(points.ac))];
+        let [u, v] = self.weights;
+        let weights = [one - u - v, u, v];
+        let from_corners = [self.at, self.at.sub(self.ab), self.at.sub(self.ac)];
         let mut lift = zero;
-        for (&normal, (weight, from_corner)) in points.normals.iter().zip(corners) {
+        for k in 0..3 {
             // n.d is the same in eye space and in mesh space, up to the scale of the normal.
-            let height = normal.dot(from_corner) * splat(simd, space.normals_scale);
-            let below = select(points.against, height, -height).max(zero);
-            let normal = normal.transform(simd, &space.normals);
-            let along = normal.dot(points.ng);
-            let along = select(points.against, -along, along);
-            lift += weight * below * along / normal.dot(normal);
+            let height = self.normals[k].dot(from_corners[k]) * splat(simd, scale);
+            let below = select(self.against, height, -height).max(zero);
+            let normal = self.normals[k].transform(simd, normals);
+            let along = normal.dot(self.ng);
+            let along = select(self.against, -along, along);
+            lift += weights[k] * below * along / normal.dot(normal);
         }
         // Not for NaN: a corner without a normal.
         let usable = lift.simd_gt(zero) & lift.simd_le(splat(simd, f32::MAX));
-        group.put_one(simd, select(usable, lift, zero), &mut self.0[group.block]);
+        select(usable, lift, zero)
     }
 }
 
@@ -104,136 +118,5 @@ impl Surfaces {
         let share = (splat(simd, UNLIFTED) - along) * splat(simd, FADE);
         let raised = bias + lift * share.min(splat(simd, 1.0)).max(zero);
         select(lift.simd_gt(zero), raised, side)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use glam::{DMat3, DVec3, Vec3};
-
-    use crate::compile::CompiledScene;
-    use crate::frame::PreparedFrame;
-    use crate::integrator::render_rows;
-    use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
-    use crate::scene::{
-        Attenuation, Background, Camera, CameraKind, FrameView, Light, LightKind, Material, Model,
-        NormalMode, Quality, RenderSettings, Scene,
-    };
-    use crate::simd;
-
-    const SIDE: u32 = 64;
-
-    /// A unit sphere of triangles, with 32 around and 16 from pole to pole.
-    fn ball() -> Mesh {
-        let (around, rows) = (32, 16);
-        let place = |i: u32, j: u32| {
-            let (across, down) = (f64::from(i) / f64::from(around), f64::from(j) / f64::from(rows));
-            let (s, c) = libm::sincos(across * std::f64::consts::TAU);
-            let (ring, height) = libm::sincos(down * std::f64::consts::PI);
-            DVec3::new(ring * c, height, ring * s)
-        };
-        let positions: Vec<DVec3> = (0..=rows).flat_map(|j| (0..around).map(move |i| place(i, j))).collect();
-        let at = |i: u32, j: u32| j * around + i % around;
-        let quad = |(i, j): (u32, u32)| {
-            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
-        };
-        let triangles: Vec<[u32; 3]> =
-            (0..rows).flat_map(|j| (0..around).map(move |i| (i, j))).flat_map(quad).collect();
-        Mesh {
-            normals: positions.iter().map(|position| position.as_vec3()).collect(),
-            positions,
-            triangle_materials: vec![0; triangles.len()],
-            triangles,
-            materials: vec![NamedMaterial::plain("m", Material::NEUTRAL)],
-            ..Mesh::default()
-        }
-    }
-
-    fn scene(mesh: &CompiledMesh, normals: NormalMode, scale: DVec3) -> Scene {
-        let model = Model {
-            mesh: mesh.id(),
-            materials: vec![0],
-            normals,
-            translate: DVec3::new(0.3, -0.2, 0.1),
-            rotate: DVec3::new(10.0, 20.0, 30.0),
-            scale,
-            group: DMat3::IDENTITY,
-        };
-        Scene {
-            ambient: Vec3::splat(0.05),
-            render: RenderSettings { width: SIDE, height: SIDE, ..RenderSettings::default() },
-            camera: Camera {
-                position: DVec3::new(0.0, 0.0, 6.0),
-                look_at: DVec3::ZERO,
-                up: DVec3::Y,
-                fov: 35.0,
-                zoom: 1.0,
-                kind: CameraKind::PINHOLE,
-            },
-            background: Background::Color(Vec3::ZERO),
-            background_visible: true,
-            lights: vec![Light {
-                kind: LightKind::Directional { direction: DVec3::new(-1.0, -0.3, 0.1).normalize() },
-                color: Vec3::ONE,
-                attenuation: Attenuation::None,
-                shadows: true,
-                radius: 0.0,
-                shadow_samples: None,
-            }],
-            materials: vec![Material::NEUTRAL],
-            textures: vec![],
-            models: vec![model],
-            spheres: vec![],
-            disks: vec![],
-            planes: vec![],
-            triangles: vec![],
-        }
-    }
-
-    fn rendered(scene: &Scene, mesh: &Arc<CompiledMesh>, quality: Quality) -> Vec<u8> {
-        let compiled = Arc::new(CompiledScene::new(scene.clone(), [Arc::clone(mesh)], []).unwrap());
-        let view = FrameView { quality, ..FrameView::of(scene) };
-        let mut frame = PreparedFrame::new(compiled, &view).unwrap();
-        let mut bytes_at = |level| {
-            frame.level = level;
-            let mut bytes = vec![0; (SIDE * SIDE * 3) as usize];
-            render_rows(&frame, 0..SIDE, &mut bytes, &|| false).unwrap();
-            bytes
-        };
-        let first = bytes_at(simd::best());
-        for level in simd::all() {
-            assert!(bytes_at(level) == first, "with {}", simd::name(level));
-        }
-        first
-    }
-
-    fn different(a: &[u8], b: &[u8]) -> usize {
-        a.chunks_exact(3).zip(b.chunks_exact(3)).filter(|(a, b)| a != b).count()
-    }
-
-    /// Nothing shades a convex body but itself, and N.L does that: a picture without shadows is the right one.
-    #[test]
-    fn a_convex_mesh_alone_has_no_shadow_on_its_lit_side() {
-        let mesh = Arc::new(CompiledMesh::compile(&ball()).unwrap().0);
-        for scale in [DVec3::ONE, DVec3::new(1.0, 1.4, 0.7), DVec3::new(-1.0, 1.0, 1.2)] {
-            let scene = scene(&mesh, NormalMode::Smooth, scale);
-            let quality = Quality::default();
-            let right = rendered(&scene, &mesh, Quality { shadows: false, ..quality });
-            let smooth = rendered(&scene, &mesh, quality);
-            assert_eq!(different(&smooth, &right), 0, "scale {scale}");
-            let sawtooth = rendered(&scene, &mesh, Quality { smooth_terminator: false, ..quality });
-            assert!(different(&sawtooth, &right) > 20, "the remedy is needed, scale {scale}");
-        }
-    }
-
-    #[test]
-    fn flat_normals_are_not_lifted() {
-        let mesh = Arc::new(CompiledMesh::compile(&ball()).unwrap().0);
-        let scene = scene(&mesh, NormalMode::Flat, DVec3::ONE);
-        let quality = Quality::default();
-        let off = rendered(&scene, &mesh, Quality { smooth_terminator: false, ..quality });
-        assert_eq!(different(&rendered(&scene, &mesh, quality), &off), 0);
     }
 }

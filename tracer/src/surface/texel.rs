@@ -70,7 +70,7 @@ impl Texels {
             let same = rest & materials.equal(simd, index);
             rest &= !same;
             let material = &frame.scene().materials[index as usize];
-            if let Some(map) = material.texture {
+            if let (Some(map), None) = (material.texture, &material.checker) {
                 look_up(simd, frame, map, uv, same, &mut self.diffuse[block]);
             }
             if let (Some(map), Some(emission)) = (material.emission_texture, &mut self.emission) {

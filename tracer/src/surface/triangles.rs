@@ -160,7 +160,7 @@ impl Surfaces {
             let weights = barycentric(simd, at, ab, ac);
             let materials = &surface.material;
             if let Some(uvs) = &corners.uvs {
-                let uv = uvs.at(simd, weights).with(footprint);
+                let uv = uvs.at(simd, weights, footprint);
                 texels.fill(frame, block, lanes, materials, &uv);
             }
             if let Some(colors) = &corners.colors {

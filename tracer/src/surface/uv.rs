@@ -21,6 +21,7 @@ pub(super) struct PointUvs {
     footprint: Option<Box<Footprint>>,
 }
 
+#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack; nearly all are interpolated")]
 enum Places {
     /// On triangles.
     Interpolated {
@@ -57,13 +58,18 @@ impl CornerUvs {
 
     /// Interpolates between the corners: `weights` are those of the second and the third.
     #[inline(always)]
-    pub(super) fn at<S: Simd>(&self, simd: S, weights: [f32x16<S>; 2]) -> PointUvs {
+    pub(super) fn at<S: Simd>(
+        &self,
+        simd: S,
+        weights: [f32x16<S>; 2],
+        footprint: Option<Box<Footprint>>,
+    ) -> PointUvs {
         let [a, b, c] = &self.corners;
         let mut near = [Lanes::ZERO; 2];
         for axis in 0..2 {
             near[axis].store(barycentric_mean(simd, [&a[axis], &b[axis], &c[axis]], weights));
         }
-        PointUvs { places: Places::Interpolated { near, repeats: self.repeats }, footprint: None }
+        PointUvs { places: Places::Interpolated { near, repeats: self.repeats }, footprint }
     }
 }
 
@@ -80,13 +86,8 @@ fn gather_repeats(mesh: &CompiledMesh, triangles: &[u32; LANES], lanes: u32) -> 
 
 impl PointUvs {
     /// Texture coordinates found exactly.
-    pub(super) fn exact(uvs: Box<[DVec2; LANES]>) -> Self {
-        Self { places: Places::Exact(uvs), footprint: None }
-    }
-
-    /// The same points, with footprints where a filter depends on them.
-    pub(super) fn with(self, footprint: Option<Box<Footprint>>) -> Self {
-        Self { footprint, ..self }
+    pub(super) fn exact(uvs: Box<[DVec2; LANES]>, footprint: Option<Box<Footprint>>) -> Self {
+        Self { places: Places::Exact(uvs), footprint }
     }
 
     /// Footprints of the points, where a filter depends on them.

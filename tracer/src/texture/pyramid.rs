@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_fine_board_of_black_and_white_is_grey_from_far_away() {
-        let board = texture(64, 64, |x, y| [if (x + y) % 2 == 0 { 255 } else { 0 }; 3]);
+        let board = texture(64, 64, |x, y| [if (x + y).is_multiple_of(2) { 255 } else { 0 }; 3]);
         assert_eq!(board.levels(), 7);
         for level in 1..7 {
             let [width, height] = board.size_of_level(level);

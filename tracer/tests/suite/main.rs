@@ -15,6 +15,7 @@ mod knobs;
 mod mutated_models;
 mod numerics;
 mod oracle;
+mod partial_shadows;
 mod physics;
 mod project_scenes;
 mod shadows;

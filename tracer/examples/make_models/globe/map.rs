@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayfarm_tracer::image::RgbImage;
 
 use crate::generator::angle::{cos, heading, sin};
-use crate::generator::random::uniform;
+use crate::generator::noise::noise;
 
 const WIDTH: u32 = 512;
 const HEIGHT: u32 = 256;
@@ -37,8 +37,9 @@ fn color(x: u32, y: u32) -> [u8; 3] {
     let longitude = 360.0 * (f64::from(x) + 0.5) / f64::from(WIDTH);
     let latitude = 90.0 - 180.0 * (f64::from(y) + 0.5) / f64::from(HEIGHT);
     let place = heading(longitude) * cos(latitude) + DVec3::Y * sin(latitude);
-    let height =
-        (0..6).map(|octave| noise(octave, place * f64::from(1 << octave) * 1.7) / f64::from(2 << octave));
+    let height = (0..6).map(|octave: u32| {
+        noise(900 + u64::from(octave), place * f64::from(1 << octave) * 1.7) / f64::from(2 << octave)
+    });
     let height: f64 = height.sum();
     let pixel_degrees = 360.0 / f64::from(WIDTH);
     let is_line = |degrees: f64| degrees.rem_euclid(30.0) < pixel_degrees;
@@ -49,20 +50,4 @@ fn color(x: u32, y: u32) -> [u8; 3] {
         return ICE;
     }
     COLORS.iter().find(|(top, _)| height < *top).map_or(COLORS[8].1, |(_, color)| *color)
-}
-
-/// Value noise: random numbers on a lattice, smoothly between them.
-fn noise(octave: u32, place: DVec3) -> f64 {
-    let cell = place.floor();
-    let t = place - cell;
-    let t = t * t * (DVec3::splat(3.0) - t * 2.0);
-    let corner = |dx: i64, dy: i64, dz: i64| {
-        let [x, y, z] =
-            [cell.x as i64 + dx, cell.y as i64 + dy, cell.z as i64 + dz].map(|c| (c + 4096) as u64);
-        uniform(900 + u64::from(octave), x << 40 | y << 20 | z)
-    };
-    let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-    let edge = |dy, dz| mix(corner(0, dy, dz), corner(1, dy, dz), t.x);
-    let face = |dz| mix(edge(0, dz), edge(1, dz), t.y);
-    mix(face(0), face(1), t.z)
 }

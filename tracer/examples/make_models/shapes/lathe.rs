@@ -10,7 +10,12 @@ use crate::generator::shape::Shape;
 /// back to the middle of the top gives a closed solid with its outside outside.
 /// Points between which the profile hardly turns are left out.
 pub(crate) fn lathe(profile: &[DVec2], segments: usize) -> Shape {
-    lathe_every(&thinned(profile), segments)
+    lathe_every(&thinned(profile, LEAST_TURN_DEGREES), segments)
+}
+
+/// As [`lathe`], with more points of the profile: for mirrors and glass, which show every corner.
+pub(crate) fn lathe_fine(profile: &[DVec2], segments: usize) -> Shape {
+    lathe_every(&thinned(profile, FINE_TURN_DEGREES), segments)
 }
 
 /// As [`lathe`], with every point of the profile: for shapes that are bent or carved afterwards.
@@ -21,11 +26,13 @@ pub(crate) fn lathe_every(profile: &[DVec2], segments: usize) -> Shape {
     })
 }
 
-/// The profile without the points at which it has turned by less than this since the last one kept.
+/// Turn of the profile from one kept point to the next.
 const LEAST_TURN_DEGREES: f64 = 18.0;
+const FINE_TURN_DEGREES: f64 = 9.0;
 
-fn thinned(profile: &[DVec2]) -> Vec<DVec2> {
-    let least_cosine = cos(LEAST_TURN_DEGREES);
+/// The profile without the points at which it has turned by less than an angle since the last one kept.
+fn thinned(profile: &[DVec2], degrees: f64) -> Vec<DVec2> {
+    let least_cosine = cos(degrees);
     let mut kept: Vec<DVec2> = profile.first().copied().into_iter().collect();
     let mut arrived = profile.get(1).map_or(DVec2::X, |second| (second - profile[0]).normalize_or(DVec2::X));
     for window in profile.windows(3) {

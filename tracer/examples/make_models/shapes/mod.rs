@@ -9,7 +9,7 @@ mod sweep;
 
 pub(crate) use boxes::{beveled_box, plain_box};
 pub(crate) use grid::{Ends, grid};
-pub(crate) use lathe::{lathe, lathe_every, spline};
+pub(crate) use lathe::{lathe, lathe_every, lathe_fine, spline};
 pub(crate) use moulding::{rectangle_moulding, straight_moulding};
 pub(crate) use soft::{Softness, cushion, pillow, rounded_box};
 pub(crate) use sweep::{Path, disc, sweep, tube};

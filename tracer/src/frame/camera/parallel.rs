@@ -58,12 +58,6 @@ impl ParallelRays {
         self.right * x + self.down * y
     }
 
-    /// Steps of origins from a sample to the next one of its row and to the next row of samples, with `grid` samples along a side
-    /// of a pixel.
-    pub(crate) fn steps(&self, grid: u32) -> [DVec3; 2] {
-        [self.right, self.down].map(|axis| axis * (self.step / f64::from(grid)))
-    }
-
     /// Map from eye space to (a, b, g): g is the depth behind the plane of the origins, (a, b) the place in samples from the top
     /// left corner.
     pub(crate) fn picture_map(&self) -> Affine {

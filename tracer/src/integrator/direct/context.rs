@@ -1,13 +1,13 @@
 //! The tiles of a band: what they share, and the way of each from rays to colours.
 
 use super::super::stage::{Stage, Watch};
-use super::bounce::{self, Bounces};
+use super::bounce::{BatchShader, Bounces, Shaded};
 use super::{Scratch, shade};
 use crate::cancel::Cancelled;
 use crate::frame::{CameraRays, FisheyeRays, ParallelRays, PreparedFrame};
 use crate::intersect::tile;
 use crate::rays::{
-    BLOCKS, CameraTile, EyeTile, HitBlock, ParallelTile, RayBatch, RayCounts, RaySource, TileSamples,
+    BLOCKS, EyeTile, HitBlock, ParallelTile, RayBatch, RayCounts, RaySource, SurfaceSource, TileSamples,
 };
 use crate::simd::Simd;
 use crate::surface::Surfaces;
@@ -29,8 +29,8 @@ pub(crate) struct TileContext<'a, W> {
     pub direct: Scratch,
     /// Only in scenes with materials that reflect or transmit.
     pub(super) bounces: Option<Box<Bounces<'a>>>,
-    /// Rays of a fisheye camera, from its first tile on.
-    fisheye: Option<Box<RayBatch<'a>>>,
+    /// Rays of a camera without an eye, from its first tile on.
+    batch: Option<Box<RayBatch<'a>>>,
 }
 
 impl<'a, W: Watch> TileContext<'a, W> {
@@ -46,13 +46,8 @@ impl<'a, W: Watch> TileContext<'a, W> {
             tile: tile::Scratch::new(),
             direct: Scratch::new(),
             bounces: Bounces::for_frame(frame),
-            fisheye: None,
+            batch: None,
         }
-    }
-
-    /// Whether the work is cancelled.
-    pub(super) fn is_cancelled(&self) -> bool {
-        (self.cancelled)()
     }
 
     /// Traces and shades the samples of a tile. The result is `direct.colors`.
@@ -63,28 +58,17 @@ impl<'a, W: Watch> TileContext<'a, W> {
     pub(crate) fn trace<S: Simd>(&mut self, simd: S, samples: TileSamples<'_>) -> Result<(), Cancelled> {
         let frame = self.frame;
         match &frame.rays {
-            CameraRays::Pinhole(camera) => self.trace_tile(simd, &EyeTile::new(frame, camera, samples)),
+            CameraRays::Pinhole(camera) => self.trace_eye(simd, &EyeTile::new(frame, camera, samples)),
             CameraRays::Parallel(camera) => self.trace_parallel(simd, camera, samples),
             CameraRays::Fisheye(camera) => self.trace_fisheye(simd, camera, &samples),
         }
     }
 
-    /// Traces and shades samples of an orthographic camera.
+    /// Traces and shades the rays of a tile of a pinhole camera. A function of its own on each level: all kinds of bands call the
+    /// same one, because it takes long to compile.
     #[inline(never)]
-    fn trace_parallel<S: Simd>(
-        &mut self,
-        simd: S,
-        camera: &ParallelRays,
-        samples: TileSamples<'_>,
-    ) -> Result<(), Cancelled> {
-        self.trace_tile(simd, &ParallelTile::new(self.frame, camera, samples))
-    }
-
-    /// Traces and shades the rays of a tile of a camera with a projection. A function of its own on each level: all kinds of bands
-    /// call the same one, because it takes long to compile.
-    #[inline(never)]
-    fn trace_tile<S: Simd, T: CameraTile>(&mut self, simd: S, tile: &T) -> Result<(), Cancelled> {
-        self.begin_tile(&tile.samples().live)?;
+    fn trace_eye<S: Simd>(&mut self, simd: S, tile: &EyeTile<'_>) -> Result<(), Cancelled> {
+        self.begin_tile(tile)?;
         simd.vectorize(
             #[inline(always)]
             || {
@@ -95,7 +79,29 @@ impl<'a, W: Watch> TileContext<'a, W> {
                 shade(simd, tile, self);
             },
         );
-        if self.bounces.is_some() { bounce::add(simd, tile, self) } else { Ok(()) }
+        self.add_bounces(simd, tile)
+    }
+
+    /// Traces and shades samples of an orthographic camera: their hits are found as a tile, and shaded as a batch.
+    #[inline(never)]
+    fn trace_parallel<S: Simd>(
+        &mut self,
+        simd: S,
+        camera: &ParallelRays,
+        samples: TileSamples<'_>,
+    ) -> Result<(), Cancelled> {
+        let tile = ParallelTile::new(self.frame, camera, samples);
+        self.begin_tile(&tile)?;
+        simd.vectorize(
+            #[inline(always)]
+            || tile::find_closest(simd, &tile, &mut self.hits, &mut self.tile),
+        );
+        let mut batch = self.batch.take().unwrap_or_else(|| Box::new(RayBatch::new(self.frame)));
+        batch.put_parallel(camera, &samples);
+        self.shade_batch(simd, &batch);
+        let result = self.add_bounces(simd, &*batch);
+        self.batch = Some(batch);
+        result
     }
 
     /// Traces and shades samples of a fisheye camera, ray by ray.
@@ -106,39 +112,55 @@ impl<'a, W: Watch> TileContext<'a, W> {
         camera: &FisheyeRays,
         samples: &TileSamples<'_>,
     ) -> Result<(), Cancelled> {
-        self.begin_tile(&samples.live)?;
-        let mut batch = self.fisheye.take().unwrap_or_else(|| Box::new(RayBatch::new(self.frame)));
+        let mut batch = self.batch.take().unwrap_or_else(|| Box::new(RayBatch::new(self.frame)));
         batch.put_fisheye(camera, samples);
-        self.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
-        self.trace_batch(simd, &batch, [0; BLOCKS]);
-        let result = if self.bounces.is_some() { bounce::add(simd, &*batch, self) } else { Ok(()) };
-        self.fisheye = Some(batch);
+        let mut result = self.begin_tile(&*batch);
+        if result.is_ok() {
+            self.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
+            self.trace_batch(simd, &batch, [0; BLOCKS]);
+            result = self.add_bounces(simd, &*batch);
+        }
+        self.batch = Some(batch);
         result
     }
 
-    /// Begins a tile with these live rays of the camera.
+    /// Adds what the surfaces of a shaded tile reflect and transmit.
     #[inline(always)]
-    fn begin_tile(&mut self, live: &[u32; BLOCKS]) -> Result<(), Cancelled> {
+    fn add_bounces<S: Simd, R: SurfaceSource>(&mut self, simd: S, tile: &R) -> Result<(), Cancelled> {
+        let Some(mut bounces) = self.bounces.take() else { return Ok(()) };
+        let result = bounces.add(simd, tile, self);
+        self.bounces = Some(bounces);
+        result
+    }
+
+    /// Begins a tile of the camera.
+    #[inline(always)]
+    fn begin_tile(&mut self, rays: &impl RaySource) -> Result<(), Cancelled> {
         if (self.cancelled)() {
             return Err(Cancelled);
         }
         self.watch.enter(Stage::Visible);
-        for lanes in live {
-            self.counts.primary += u64::from(lanes.count_ones());
+        for block in 0..BLOCKS {
+            self.counts.primary += u64::from(rays.live(block).count_ones());
         }
         Ok(())
     }
 
     /// Traces and shades a batch of rays. The result is `direct.colors`. `hits` already has the hits of the rays in `known`, and none
-    /// of the others. A function of its own on each level, as [`TileContext::trace_tile`].
-    #[inline(never)]
-    pub(super) fn trace_batch<S: Simd>(&mut self, simd: S, batch: &RayBatch<'_>, known: [u32; BLOCKS]) {
+    /// of the others.
+    fn trace_batch<S: Simd>(&mut self, simd: S, batch: &RayBatch<'_>, known: [u32; BLOCKS]) {
         for (block, hits) in self.hits.iter_mut().enumerate() {
             let lanes = batch.live(block) & !known[block];
             if lanes != 0 {
                 self.frame.closest_hits_of(&batch.blocks[block], lanes, hits);
             }
         }
+        self.shade_batch(simd, batch);
+    }
+
+    /// Shades the hits of a batch of rays. A function of its own on each level, as [`TileContext::trace_eye`].
+    #[inline(never)]
+    fn shade_batch<S: Simd>(&mut self, simd: S, batch: &RayBatch<'_>) {
         self.watch.enter(Stage::Surfaces);
         simd.vectorize(
             #[inline(always)]
@@ -148,5 +170,35 @@ impl<'a, W: Watch> TileContext<'a, W> {
                 shade(simd, batch, self);
             },
         );
+    }
+}
+
+impl<'a, W: Watch> BatchShader<'a> for TileContext<'a, W> {
+    fn frame(&self) -> &'a PreparedFrame {
+        self.frame
+    }
+
+    fn shaded(&mut self) -> Shaded<'_> {
+        Shaded { hits: &mut self.hits, surfaces: &self.surfaces, colors: &mut self.direct.colors }
+    }
+
+    fn scratch(&mut self) -> &mut tile::Scratch {
+        &mut self.tile
+    }
+
+    fn shade<S: Simd>(
+        &mut self,
+        simd: S,
+        batch: &RayBatch<'_>,
+        known: [u32; BLOCKS],
+    ) -> Result<(), Cancelled> {
+        if (self.cancelled)() {
+            return Err(Cancelled);
+        }
+        self.watch.enter(Stage::Secondary);
+        let live: u32 = (0..BLOCKS).map(|block| batch.live(block).count_ones()).sum();
+        self.counts.secondary += u64::from(live);
+        self.trace_batch(simd, batch, known);
+        Ok(())
     }
 }

@@ -120,6 +120,9 @@ fn add_light<S: Simd, R: SurfaceSource, W: Watch>(
     if lit == [0; BLOCKS] {
         return;
     }
+    if light.shadows && shadow::is_partial(context.frame, light) {
+        return shadow::add_partly_occluded(simd, rays, light, lit, context);
+    }
     if light.shadows {
         context.counts.shadow += lit.iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
         context.watch.enter(Stage::Shadows);

@@ -4,11 +4,12 @@
 //! are certain (`traversal`, `filter`); the exact test decides all others, and computes the distance of the result.
 //!
 //! ```text
-//!   near_ray    a ray in f32, with error bounds
-//!   traversal   one ray down a tree
-//!   filter      one ray against sixteen triangles
-//!   query       closest hit, any hit
-//!   leaves      the leaves of the scene's tree and of a mesh's tree
+//!   near_ray        a ray in f32, with error bounds
+//!   traversal       one ray down a tree
+//!   filter          one ray against sixteen triangles
+//!   query           closest hit, any hit
+//!   transmittance   share of light that passes all surfaces
+//!   leaves          the leaves of the scene's tree and of a mesh's tree
 //! ```
 
 mod filter;
@@ -17,10 +18,12 @@ mod near_ray;
 mod query;
 #[cfg(test)]
 mod tests;
+mod transmittance;
 mod traversal;
 
 use query::{Any, Closest};
 pub(super) use query::{Candidate, RayQuery};
+pub(crate) use transmittance::Crossings;
 pub(super) use traversal::{Stack, with_stack};
 
 use super::Hit;

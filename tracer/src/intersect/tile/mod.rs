@@ -13,7 +13,8 @@
 //!   TileQuery            the remaining triangles against blocks of sixteen rays                         query.rs
 //! ```
 //!
-//! [`closest`] finds the closest hits of a tile of a camera, [`shadow`] the points of a tile that a light does not reach.
+//! [`closest`] finds the closest hits of a tile of a camera, [`shadow`] the points of a tile that a light does not reach,
+//! [`shaft`] the tiles without anything between their points and a light with an extent.
 //!
 //! **Certain or exact.** All of this is `f32`, with an error bound of every number. A ray that is inside all lines, and
 //! nearer, by more than the bounds is decided. All others are tested exactly, in `f64`. So rounding never decides a hit, and
@@ -27,6 +28,7 @@ mod projected_boxes;
 mod projected_triangles;
 mod query;
 mod shadow;
+mod shaft;
 #[cfg(test)]
 mod tests;
 mod traversal;
@@ -36,6 +38,7 @@ use closest::Closeness;
 pub(crate) use closest::find_closest;
 use points::Points;
 use projected_triangles::ProjectedTriangles;
+pub(crate) use shaft::Shaft;
 use traversal::{Frontier, TraversalStack};
 
 /// The rays of a tile in the picture of a projection.

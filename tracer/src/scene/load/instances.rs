@@ -34,6 +34,28 @@ pub(super) struct Models {
     pub(super) warnings: Vec<String>,
 }
 
+/// The materials of a scene file whose textures have not been loaded.
+#[derive(Clone, Copy)]
+pub(super) struct MaterialsText<'t> {
+    pub(super) materials: &'t [Material],
+    /// By the index of the material.
+    pub(super) textures: &'t BTreeMap<u32, TexturesText>,
+}
+
+impl MaterialsText<'_> {
+    /// The texture coordinates that a model with this material needs.
+    fn uvs(&self, material: u32) -> Uvs {
+        let in_uvs = |material: &Material| material.needs_uvs();
+        let texts = self.textures.get(&material);
+        if self.materials.get(material as usize).is_some_and(in_uvs)
+            || texts.is_some_and(TexturesText::distinguish_repeats)
+        {
+            return Uvs::Whole;
+        }
+        if texts.is_some() { Uvs::Always } else { Uvs::Never }
+    }
+}
+
 /// A compiled model of a scene file.
 struct LoadedModel {
     /// Path for messages.
@@ -48,7 +70,7 @@ impl Models {
     pub(super) fn open(
         scene: &Path,
         models: &[ModelText],
-        textures: &BTreeMap<u32, TexturesText>,
+        materials: MaterialsText<'_>,
         options: LoadOptions,
         limits: LoadLimits,
     ) -> Result<Self, Fault> {
@@ -77,12 +99,7 @@ impl Models {
             if model.normals == NormalMode::Smooth {
                 all.smooth.insert(real.clone());
             }
-            let wanted = match model.material.map(|material| textures.get(&material)) {
-                None => Uvs::Textured,
-                Some(Some(texts)) if texts.distinguish_repeats() => Uvs::Whole,
-                Some(Some(_)) => Uvs::Always,
-                Some(None) => Uvs::Never,
-            };
+            let wanted = model.material.map_or(Uvs::Textured, |material| materials.uvs(material));
             let most = all.uvs.entry(real.clone()).or_insert(wanted);
             *most = wanted.max(*most);
             all.paths.insert(model.file.clone(), real);
@@ -136,8 +153,12 @@ impl Models {
                 ),
             }));
         }
+        let needs_uvs = |material: u32, materials: &[Material]| {
+            textures.contains_key(&material)
+                || materials.get(material as usize).is_some_and(Material::needs_uvs)
+        };
         let slots = match text.material {
-            Some(material) if textures.contains_key(&material) && !loaded.mesh.has_uvs() => {
+            Some(material) if needs_uvs(material, materials) && !loaded.mesh.has_uvs() => {
                 return Err(locate(without_uvs(text)));
             }
             Some(material) => vec![material; loaded.mesh.material_count()],
@@ -156,7 +177,7 @@ impl Models {
             translate: text.translate,
             rotate: text.rotate,
             scale: text.scale,
-            group: glam::DMat3::IDENTITY,
+            group: text.group,
         })
     }
 
@@ -200,7 +221,7 @@ pub(super) fn named(folder: &Path, file: &Path) -> PathBuf {
 /// The fault of a textured material on a model without texture coordinates.
 fn without_uvs(text: &ModelText) -> Fault {
     let message = format!(
-        "`material` in [[model]] has a texture, but {} has no texture coordinates (`vt`); \
+        "`material` in [[model]] has a texture or a pattern laid in texture coordinates, but {} has no texture coordinates (`vt`); \
          write it with them, or use a material with a colour",
         text.file.display()
     );

@@ -1,5 +1,6 @@
 //! Loading of complete scenes: files are read, models compiled, and everything that a file leaves open is decided.
 
+mod background;
 mod framing;
 mod instances;
 mod limits;

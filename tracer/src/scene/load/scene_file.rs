@@ -4,13 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::Vec3;
+
 use super::LoadedScene;
+use super::background::background;
 use super::framing;
-use super::instances::{Models, named};
+use super::instances::{MaterialsText, Models, named};
 use super::limits::LoadLimits;
 use super::textures::Textures;
 use crate::mesh::CompiledMesh;
-use crate::scene::data::{Camera, Scene};
+use crate::scene::NormalMap;
+use crate::scene::data::{Background, Camera, Scene};
 use crate::scene::import::{LoadOptions, MAX_SCENE_BYTES, SceneError, bytes};
 use crate::scene::toml::{self, Aim, CameraText, Fault, SceneText, TextureText, TexturesText};
 
@@ -25,7 +29,8 @@ pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Res
     };
     let read = toml::read(text).map_err(locate)?;
     let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| locate(w).to_string()).collect();
-    let mut models = Models::open(path, &read.models, &read.textures, options, limits).map_err(locate)?;
+    let materials = MaterialsText { materials: &read.materials, textures: &read.textures };
+    let mut models = Models::open(path, &read.models, materials, options, limits).map_err(locate)?;
     let mut loaded = assemble(path, read, &mut models, &locate)?;
     warnings.append(&mut models.warnings);
     loaded.warnings = warnings;
@@ -70,7 +75,7 @@ fn assemble(
         ambient: text.ambient,
         render: text.render,
         camera: framing::camera_showing(None, models.options.size.unwrap_or(size)),
-        background: text.background,
+        background: Background::Color(Vec3::ZERO),
         lights: text.lights,
         materials: text.materials,
         textures: Vec::new(),
@@ -78,14 +83,16 @@ fn assemble(
         spheres: text.spheres,
         planes: text.planes,
         triangles: text.triangles,
-        disks: Vec::new(),
-        background_visible: true,
+        disks: text.disks,
+        background_visible: text.background.visible,
     };
     for model in &text.models {
         let instance = models.instance(model, &mut scene.materials, &text.textures, locate)?;
         scene.models.push(instance);
     }
     load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(locate)?;
+    scene.background =
+        background(&models.folder, &text.background.radiance, &mut models.textures).map_err(locate)?;
     let (maps, textures, notes) = models.textures.take_parts();
     scene.textures = maps;
     models.warnings.extend(notes);
@@ -118,8 +125,11 @@ fn load_textures(
     textures: &mut Textures,
 ) -> Result<(), Fault> {
     let of_models = scene.models.iter().flat_map(|model| model.materials.iter().copied());
-    let used: BTreeSet<u32> =
-        of_models.chain(scene.triangles.iter().map(|triangle| triangle.material)).collect();
+    let used: BTreeSet<u32> = of_models
+        .chain(scene.triangles.iter().map(|triangle| triangle.material))
+        .chain(scene.spheres.iter().map(|sphere| sphere.material))
+        .chain(scene.planes.iter().map(|plane| plane.material))
+        .collect();
     let mut list = |text: &TextureText| {
         let listed = textures.add(&named(folder, &text.file), text.filter, text.tiling);
         listed.map_err(|reason| Fault {
@@ -134,16 +144,20 @@ fn load_textures(
         material.cutout = texture.filter(|listed| listed.cuts).map(|listed| listed.index);
         material.emission_texture =
             text.emission.as_ref().map(&mut list).transpose()?.map(|listed| listed.index);
+        if let Some(map) = &text.normal_map {
+            let texture = list(&map.texture)?.index;
+            material.normal_map = Some(NormalMap { texture, strength: map.strength });
+        }
     }
     Ok(())
 }
 
 /// The camera of the file with its look-at point.
 fn aimed(text: CameraText, bounds: Option<framing::Bounds>) -> Camera {
-    let CameraText { position, aim, up, fov, zoom } = text;
+    let CameraText { kind, position, aim, up, fov, zoom } = text;
     let look_at = match aim {
         Aim::Point(point) => point,
         Aim::Direction(direction) => framing::point_on_axis(position, direction, bounds),
     };
-    Camera { position, look_at, up, fov, zoom, kind: crate::scene::CameraKind::PINHOLE }
+    Camera { kind, position, look_at, up, fov, zoom }
 }

@@ -45,6 +45,11 @@ impl FirstFault {
         }
     }
 
+    /// Whether no fault is recorded.
+    pub(super) fn is_none(&self) -> bool {
+        self.0.is_none()
+    }
+
     pub(super) fn into_result(self) -> Read<()> {
         self.0.map_or(Ok(()), Err)
     }

@@ -7,7 +7,7 @@ use super::fault::Read;
 use super::table::Table;
 use super::value::{Value, unit};
 use crate::scene::data::{Attenuation, Light, LightKind};
-use crate::scene::validate::MAX_LIGHT;
+use crate::scene::validate::{MAX_COORDINATE, MAX_LIGHT, MAX_SHADOW_SAMPLES};
 
 pub(super) const LIGHT_KEYS: &[&str] = &[
     "kind",
@@ -20,6 +20,7 @@ pub(super) const LIGHT_KEYS: &[&str] = &[
     "beam_angle",
     "penumbra",
     "radius",
+    "shadow_samples",
     "shadows",
 ];
 
@@ -33,7 +34,10 @@ enum Kind {
 pub(super) fn light(table: Table<'_>, reading: &mut Reading) -> Read<Light> {
     let kinds = [("point", Kind::Point), ("spot", Kind::Spot), ("directional", Kind::Directional)];
     let kind = table.read("kind", |value| value.word(&kinds))?.unwrap_or(Kind::Point);
-    refuse_extent(table)?;
+    let radius = |value: Value<'_>| value.number("from 0 to 1e30", |n| (0.0..=MAX_COORDINATE).contains(&n));
+    let radius = table.read("radius", radius)?.unwrap_or(0.0);
+    let samples = |value: Value<'_>| value.whole("from 1 to 1024", 1..=u32::from(MAX_SHADOW_SAMPLES));
+    let shadow_samples = table.read("shadow_samples", samples)?.map(|samples| samples as u16);
     let light = Light {
         kind: match kind {
             Kind::Point => LightKind::Point { position: table.required("position")?.vector()? },
@@ -45,10 +49,11 @@ pub(super) fn light(table: Table<'_>, reading: &mut Reading) -> Read<Light> {
         color: color(table)?,
         attenuation: table.read("attenuation", attenuation)?.unwrap_or(Attenuation::None),
         shadows: table.read("shadows", |value| value.boolean())?.unwrap_or(true),
-        radius: 0.0,
-        shadow_samples: None,
+        radius: if kind == Kind::Directional { 0.0 } else { radius },
+        shadow_samples,
     };
     warn_about_unused_keys(table, kind, light.attenuation, reading)?;
+    warn_about_extent(table, kind, radius, &light, reading);
     Ok(light)
 }
 
@@ -102,12 +107,16 @@ fn attenuation(value: Value<'_>) -> Read<Attenuation> {
     Ok(Attenuation::Polynomial { constant, linear, quadratic })
 }
 
-fn refuse_extent(table: Table<'_>) -> Read<()> {
-    let Some(radius) = table.get("radius") else { return Ok(()) };
-    if radius.number("from 0", |n| n >= 0.0)? > 0.0 {
-        return Err(radius.not_yet("a light with an extent", "use 0"));
+/// Warns about a radius and a number of points that change no shadow.
+fn warn_about_extent(table: Table<'_>, kind: Kind, radius: f64, light: &Light, reading: &mut Reading) {
+    if radius > 0.0 && kind == Kind::Directional {
+        reading.idle(table, "radius", "on a directional light");
+    } else if radius > 0.0 && !light.shadows {
+        reading.idle(table, "radius", "on a light without shadows");
     }
-    Ok(())
+    if light.radius == 0.0 || !light.shadows {
+        reading.idle(table, "shadow_samples", "without a `radius` and shadows");
+    }
 }
 
 /// Warns about keys of other kinds of light: they have no effect, and are probably a mistake.
@@ -122,18 +131,15 @@ fn warn_about_unused_keys(
         Kind::Spot => ("spot", &[]),
         Kind::Directional => ("directional", &["position", "look_at", "beam_angle", "penumbra"]),
     };
-    for value in idle.iter().filter_map(|key| table.get(key)) {
+    for (key, value) in idle.iter().filter_map(|key| Some((key, table.get(key)?))) {
         match value.name {
             "beam_angle" | "penumbra" => value.number("of degrees", |_| true).map(drop)?,
             _ => value.vector().map(drop)?,
         }
-        reading.warn(value.start(), format!("{value} has no effect on a {name} light"));
+        reading.idle(table, *key, &format!("on a {name} light"));
     }
-    if let Some(value) = table.get("attenuation")
-        && kind == Kind::Directional
-        && attenuation != Attenuation::None
-    {
-        reading.warn(value.start(), format!("{value} has no effect on a {name} light"));
+    if kind == Kind::Directional && attenuation != Attenuation::None {
+        reading.idle(table, "attenuation", &format!("on a {name} light"));
     }
     Ok(())
 }

@@ -3,39 +3,45 @@
 //! The text is parsed into tables whose values have positions, and each table is read with the list of its keys. So
 //! every unknown key is a fault, and every fault has a line and a column.
 
+mod background;
+mod camera;
 mod fault;
+mod groups;
 mod knobs;
 mod light;
 mod material;
 mod objects;
 mod table;
+mod unbuilt;
 mod value;
 mod view;
 
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use fault::{FirstFault, Read};
+use groups::{Objects, with_name};
 use material::Materials;
 use table::{Table, tables_of};
 use value::Value;
 
 use crate::material::Material;
-use crate::scene::data::{Background, Light, Plane, RenderSettings, Sphere, Triangle};
+use crate::scene::data::{Disk, Light, Plane, RenderSettings, Sphere, Triangle};
 use crate::scene::validate::{
-    MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
+    MAX_DISKS, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
 };
 
+pub(super) use background::{BackgroundText, PictureText, RadianceText, SkyPictureText};
+pub(super) use camera::{Aim, CameraText};
 pub(super) use fault::{Fault, place};
 pub(super) use material::{TextureText, TexturesText};
 pub(super) use objects::ModelText;
-pub(super) use view::{Aim, CameraText};
 
 const KEYS: &[&str] = &[
     "ambient",
@@ -47,8 +53,16 @@ const KEYS: &[&str] = &[
     "model",
     "sphere",
     "plane",
+    "disk",
     "triangle",
+    "rectangle",
+    "box",
+    "group",
 ];
+
+/// Number of triangles of a rectangle and of a box.
+const RECTANGLE_TRIANGLES: usize = 2;
+const BOX_TRIANGLES: usize = 12;
 
 /// The content of a scene file. Models are not loaded; what the file leaves open is left to the loader.
 #[derive(Clone, Debug)]
@@ -58,7 +72,7 @@ pub(super) struct SceneText {
     pub(super) render: RenderSettings,
     pub(super) camera: Option<CameraText>,
     /// Background; black if absent.
-    pub(super) background: Background,
+    pub(super) background: BackgroundText,
     pub(super) lights: Vec<Light>,
     pub(super) materials: Vec<Material>,
     /// Textures by the index of their material.
@@ -66,6 +80,8 @@ pub(super) struct SceneText {
     pub(super) models: Vec<ModelText>,
     pub(super) spheres: Vec<Sphere>,
     pub(super) planes: Vec<Plane>,
+    pub(super) disks: Vec<Disk>,
+    /// Single triangles, then those of rectangles and boxes.
     pub(super) triangles: Vec<Triangle>,
     /// Accepted input that is probably a mistake.
     pub(super) warnings: Vec<Fault>,
@@ -75,11 +91,23 @@ pub(super) struct SceneText {
 #[derive(Default)]
 struct Reading {
     warnings: Vec<Fault>,
+    /// Messages about keys without an effect, each reported once.
+    idle: BTreeSet<String>,
 }
 
 impl Reading {
     fn warn(&mut self, at: usize, message: String) {
         self.warnings.push(Fault { at, message });
+    }
+
+    /// Warns about a key, if the table has it: "`ior` in [material.a] has no effect" with a reason. Further tables with
+    /// the same message are not reported.
+    fn idle(&mut self, table: Table<'_>, key: &'static str, reason: &str) {
+        let Some(value) = table.get(key) else { return };
+        let message = format!("{value} has no effect {reason}");
+        if self.idle.insert(message.clone()) {
+            self.warn(value.start(), message);
+        }
     }
 }
 
@@ -144,38 +172,70 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let reading = &mut reading;
     let ambient = first.keep(top.read("ambient", |value| value.color(MAX_LIGHT)));
     let render = section(top, "render", "[render]", &view::render_keys(), view::render, first);
-    let camera = |table: Table<'_>| view::camera(table, reading);
-    let camera = section(top, "camera", "[camera]", view::CAMERA_KEYS, camera, first);
+    let camera = |table: Table<'_>| camera::camera(table, reading);
+    let camera = section(top, "camera", "[camera]", camera::CAMERA_KEYS, camera, first);
+    let background = |table: Table<'_>| background::background(table, reading);
     let background =
-        section(top, "background", "[background]", view::BACKGROUND_KEYS, view::background, first);
+        section(top, "background", "[background]", background::BACKGROUND_KEYS, background, first);
     let light = |table: Table<'_>| light::light(table, reading);
     let lights = list(top, "light", "[[light]]", (light::LIGHT_KEYS, MAX_LIGHTS), light, first);
-    let mut materials = read_materials(top, first);
-    let model = |table: Table<'_>| objects::model(table, &materials, reading);
-    let models = list(top, "model", "[[model]]", (objects::MODEL_KEYS, MAX_MODELS), model, first);
-    let sphere = |table: Table<'_>| objects::sphere(table, &mut materials);
-    let spheres = list(top, "sphere", "[[sphere]]", (objects::SPHERE_KEYS, MAX_SPHERES), sphere, first);
-    let plane = |table: Table<'_>| objects::plane(table, &mut materials);
+    let mut materials = read_materials(top, reading, first);
+    let plane = |table: Table<'_>| objects::plane(table, &mut materials, reading);
     let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
-    let triangle = |table: Table<'_>| objects::triangle(table, &mut materials, reading);
-    let triangles =
-        list(top, "triangle", "[[triangle]]", (objects::TRIANGLE_KEYS, MAX_TRIANGLES), triangle, first);
+    let objects = read_objects(top, &mut materials, reading, first);
     reading.warnings.sort_by_key(|warning| warning.at);
     let (materials, textures) = materials.into_parts();
     Some(SceneText {
         ambient: ambient?.unwrap_or(Vec3::ZERO),
         render: render?.unwrap_or_default(),
         camera: camera?,
-        background: background?.unwrap_or(Background::Color(Vec3::ZERO)),
+        background: background?.unwrap_or_default(),
         lights,
         materials,
         textures,
-        models,
-        spheres,
+        models: objects.models,
+        spheres: objects.spheres,
         planes,
-        triangles: triangles.into_iter().flatten().collect(),
+        disks: objects.disks,
+        triangles: objects.triangles,
         warnings: std::mem::take(&mut reading.warnings),
     })
+}
+
+/// Reads the objects that may have names, and places those in groups.
+fn read_objects(
+    top: Table<'_>,
+    materials: &mut Materials,
+    reading: &mut Reading,
+    first: &mut FirstFault,
+) -> Objects {
+    let mut objects = Objects::default();
+    let model = |table: Table<'_>| with_name(table, objects::model(table, materials, reading)?);
+    let models = (objects::MODEL_KEYS, MAX_MODELS);
+    objects.add_models(list(top, "model", "[[model]]", models, model, first));
+    let sphere = |table: Table<'_>| with_name(table, objects::sphere(table, materials, reading)?);
+    let spheres = (objects::SPHERE_KEYS, MAX_SPHERES);
+    objects.add_spheres(list(top, "sphere", "[[sphere]]", spheres, sphere, first));
+    let disk = |table: Table<'_>| with_name(table, objects::disk(table, materials)?);
+    let disks = (objects::DISK_KEYS, MAX_DISKS);
+    objects.add_disks(list(top, "disk", "[[disk]]", disks, disk, first));
+    let triangle = |table: Table<'_>| with_name(table, objects::triangle(table, materials, reading)?);
+    let triangles = (objects::TRIANGLE_KEYS, MAX_TRIANGLES);
+    objects.add_triangles(list(top, "triangle", "[[triangle]]", triangles, triangle, first));
+    let rectangle = |table: Table<'_>| with_name(table, objects::rectangle(table, materials)?);
+    let rectangles = (objects::RECTANGLE_KEYS, MAX_TRIANGLES / RECTANGLE_TRIANGLES);
+    objects.add_triangles(list(top, "rectangle", "[[rectangle]]", rectangles, rectangle, first));
+    let cuboid = |table: Table<'_>| with_name(table, objects::cuboid(table, materials)?);
+    let boxes = (objects::BOX_KEYS, MAX_TRIANGLES / BOX_TRIANGLES);
+    objects.add_triangles(list(top, "box", "[[box]]", boxes, cuboid, first));
+    let group = |table: Table<'_>| with_name(table, groups::group(table, reading)?);
+    let groups = (groups::GROUP_KEYS, groups::MAX_GROUPS);
+    let groups = list(top, "group", "[[group]]", groups, group, first);
+    // With another fault a child may seem unknown.
+    if first.is_none() {
+        first.keep(objects.place(groups, materials));
+    }
+    objects
 }
 
 /// Reads an optional table; the outer `None` means a fault.
@@ -223,15 +283,26 @@ fn within<'t>(
 }
 
 /// Reads all materials. All names are collected first, so that a fault in one material hides none in its users.
-fn read_materials(top: Table<'_>, first: &mut FirstFault) -> Materials {
+fn read_materials(top: Table<'_>, reading: &mut Reading, first: &mut FirstFault) -> Materials {
     let Some(value) = top.get("material") else { return Materials::default() };
     let Some(entries) = first.keep(material_tables(value)) else { return Materials::default() };
     let mut materials = Materials::named(entries.iter().map(|(name, _)| name.to_string()).collect());
+    let mut patterns = Vec::new();
     for (index, (name, value)) in entries.into_iter().enumerate() {
         let name = format!("[material.{}]", fault::shortened(name));
-        let read = || material::material(Table::open(&name, value, material::MATERIAL_KEYS)?);
-        if let Some(material) = first.keep(read()) {
-            materials.define(index, material);
+        let read = Table::open(&name, value, material::MATERIAL_KEYS)
+            .and_then(|table| material::material(table, reading));
+        if let Some(mut text) = first.keep(read) {
+            patterns.extend(text.checker.take().map(|pattern| (index, pattern)));
+            materials.define(index, text);
+        }
+    }
+    // The colours of patterns may be those of materials further down.
+    let patterns: Vec<_> =
+        patterns.iter().map(|(index, pattern)| (*index, pattern.resolved(&materials))).collect();
+    for (index, pattern) in patterns {
+        if let Some(checker) = first.keep(pattern) {
+            materials.set_checker(index, checker);
         }
     }
     materials

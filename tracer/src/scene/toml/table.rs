@@ -4,6 +4,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::fault::{Fault, Read, shortened, suggestion};
+use super::unbuilt;
 use super::value::Value;
 
 /// Table of a scene file whose keys are all known.
@@ -46,6 +47,11 @@ impl<'t> Table<'t> {
         self.get(key).ok_or_else(|| self.fault(format!("`{key}` is missing in {}", self.name)))
     }
 
+    /// Offset of the table in the text.
+    pub(super) fn start(&self) -> usize {
+        self.at
+    }
+
     /// A fault of the table as a whole.
     pub(super) fn fault(&self, message: impl Into<String>) -> Fault {
         Fault::at(self.at, message)
@@ -78,6 +84,9 @@ fn unknown_key(owner: &str, key: &str, known: &[&str]) -> String {
     let key = shortened(key);
     if key == "ambient" {
         return format!("`ambient` does not belong into {owner}; move it to the top, before the first table");
+    }
+    if let Some(refusal) = unbuilt::refusal(owner, &key) {
+        return refusal;
     }
     let hint = suggestion(&key, known.iter().copied(), |list| format!("; known here: {list}"));
     format!("unknown key `{key}` in {owner}{hint}")

@@ -169,6 +169,38 @@ impl<'t> Value<'t> {
         unit(self.vector()?).ok_or_else(|| self.must_be("a direction, not zero"))
     }
 
+    /// The entries of an array, each as a value of the same key.
+    pub(super) fn items(&self, expected: &str) -> Read<Vec<Value<'t>>> {
+        match self.value.get_ref() {
+            DeValue::Array(items) => Ok(items.iter().map(|value| Value { value, ..*self }).collect()),
+            _ => Err(self.must_be(expected)),
+        }
+    }
+
+    /// The entries of an array of a fixed length.
+    pub(super) fn array<const N: usize>(&self, expected: &str) -> Read<[Value<'t>; N]> {
+        <[Value<'t>; N]>::try_from(self.items(expected)?).map_err(|_| self.must_be(expected))
+    }
+
+    /// A finite number up to 1e30 in magnitude.
+    pub(super) fn coordinate(&self) -> Read<f64> {
+        self.number("that is finite and up to 1e30", |n| n.abs() <= MAX_COORDINATE)
+    }
+
+    /// A number above 0 and up to 1e30.
+    pub(super) fn positive(&self) -> Read<f64> {
+        self.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)
+    }
+
+    /// A share of light: a colour with channels from 0 to 1, or one number for all three.
+    pub(super) fn share(&self) -> Read<Vec3> {
+        if self.value.get_ref().is_array() {
+            return self.color(1.0);
+        }
+        let fits = |n: f64| (0.0..=1.0).contains(&n);
+        self.number("from 0 to 1, or a colour", fits).map(|n| Vec3::splat(n as f32))
+    }
+
     /// Three numbers from 0 to `limit`, linear RGB.
     pub(super) fn color(&self, limit: f32) -> Read<Vec3> {
         let color = self.vector()?;

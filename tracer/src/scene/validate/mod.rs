@@ -203,8 +203,9 @@ impl Scene {
     /// Checks the material of an object without texture coordinates.
     fn check_plain_material(&self, index: u32, name: &str) -> Check {
         self.check_material_index(index, name)?;
-        let plain = self.materials[index as usize].textures().next().is_none();
-        require(plain, || format!("{name}.material"), "without a texture: there are no texture coordinates")
+        let plain = self.materials.get(index as usize).is_none_or(|material| !material.needs_uvs());
+        let expected = "without a texture or a pattern laid in them: there are no texture coordinates";
+        require(plain, || format!("{name}.material"), expected)
     }
 
     fn check_material_index(&self, index: u32, name: &str) -> Check {

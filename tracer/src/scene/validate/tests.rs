@@ -1,7 +1,8 @@
 use glam::Vec2;
 
 use super::*;
-use crate::scene::data::{NormalMode, Plane, Sphere};
+use crate::material::CheckerSpace;
+use crate::scene::data::{Disk, NormalMode, Plane, Sky, Sphere};
 use crate::texture::Filter;
 
 fn scene() -> Scene {
@@ -52,7 +53,7 @@ fn scene() -> Scene {
         }],
         planes: vec![Plane { point: DVec3::ZERO, normal: DVec3::Y, material: 1, size: 1.0 }],
         triangles: vec![Triangle { vertices: [DVec3::X, DVec3::Y, DVec3::Z], uvs: None, material: 1 }],
-        disks: Vec::new(),
+        disks: vec![Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 2.0, material: 0 }],
         background_visible: true,
     }
 }
@@ -93,7 +94,7 @@ fn numbers_out_of_bounds_are_found_by_name() {
         (|s| s.camera.zoom = 0.0, "camera.zoom"),
         (|s| s.camera.look_at = s.camera.position, "somewhere else"),
         (|s| s.camera.up = DVec3::Z * 5.0, "parallel"),
-        (|s| s.background = Background::Color(Vec3::splat(2.0)), "background"),
+        (|s| s.background = Background::Color(Vec3::splat(-2.0)), "background"),
         (|s| s.lights[0].color.y = -1.0, "lights[0].color"),
         (|s| s.lights[1].kind = LightKind::Directional { direction: DVec3::ONE }, "lights[1].direction"),
         (|s| s.lights[2].kind = LightKind::Point { position: DVec3::NAN }, "lights[2].position"),
@@ -138,10 +139,12 @@ fn textures_are_listed_and_laid_on_what_has_coordinates() {
         s.textures[0].tiling.offset.x = f32::NAN;
     });
     assert_eq!(message, "textures[0].tiling must be made of finite numbers up to 1e6");
+    // Spheres and planes have texture coordinates of their own.
+    (sound.spheres[0].material, sound.planes[0].material) = (2, 2);
+    assert_eq!(sound.validate(), Ok(()));
     type Spoil = fn(&mut Scene);
-    let cases: [(Spoil, &str); 4] = [
-        (|s| s.spheres[0].material = 2, "spheres[0].material must be without a texture"),
-        (|s| s.planes[0].material = 2, "planes[0].material must be without a texture"),
+    let cases: [(Spoil, &str); 3] = [
+        (|s| s.disks[0].material = 2, "disks[0].material must be without a texture"),
         (|s| s.triangles[0].material = 2, "triangles[0].material must be without a texture"),
         (|s| s.triangles[0].uvs = Some([Vec2::NAN; 3]), "triangles[0].uvs must be finite"),
     ];
@@ -152,6 +155,71 @@ fn textures_are_listed_and_laid_on_what_has_coordinates() {
         });
         assert!(message.starts_with(expected), "{message}");
     }
+}
+
+#[test]
+fn numbers_of_bounces_skies_and_shapes_are_bounded() {
+    type Spoil = fn(&mut Scene);
+    let cases: [(Spoil, &str); 17] = [
+        (|s| s.materials[0].reflect.x = 1.5, "materials[0].reflect must be from 0 to 1"),
+        (|s| s.materials[0].transmit.y = -0.5, "materials[0].transmit must be from 0 to 1"),
+        (|s| s.materials[0].ior = 0.0, "materials[0].ior must be from 0.01 to 100"),
+        (|s| s.materials[0].ior = f32::NAN, "materials[0].ior"),
+        (|s| s.materials[0].absorption.z = 0.0, "materials[0].absorption must be above 0 and at most 1"),
+        (|s| s.lights[0].radius = -1.0, "lights[0].radius must be not negative"),
+        (|s| s.lights[0].radius = f64::INFINITY, "lights[0].radius"),
+        (|s| s.lights[1].shadow_samples = Some(0), "lights[1].shadow_samples must be from 1 to 1024"),
+        (|s| s.lights[1].shadow_samples = Some(1025), "lights[1].shadow_samples"),
+        (|s| s.render.quality.shadow_samples = 0, "shadow_samples must be from 1 to 1024"),
+        (
+            |s| s.camera.kind = CameraKind::Orthographic { view_height: 0.0 },
+            "camera.view_height must be above zero",
+        ),
+        (
+            |s| (s.camera.kind, s.camera.fov) = (CameraKind::Fisheye, 361.0),
+            "camera.fov must be above 0 and at most 360",
+        ),
+        (|s| s.disks[0].radius = 0.0, "disks[0].radius"),
+        (|s| s.disks[0].normal = DVec3::ONE, "disks[0].normal must be of unit length"),
+        (|s| s.planes[0].size = 0.0, "planes[0].size"),
+        (|s| s.spheres[0].uv_rotate.x = f64::NAN, "spheres[0].uv_rotate"),
+        (|s| s.models[0].group.x_axis = DVec3::ZERO, "models[0].group must be finite and invertible"),
+    ];
+    for (spoil, expected) in cases {
+        let message = spoiled(spoil);
+        assert!(message.starts_with(expected), "{message} / {expected}");
+    }
+    let sky = |picture, rotate, strength| Background::Sky(Sky { picture, rotate, strength });
+    for (background, expected) in [
+        (sky(SkyPicture::Panorama(0), 0.0, 1.0), "background.picture must be made of the scene's textures"),
+        (sky(SkyPicture::Cubemap([0; 6]), 0.0, 1.0), "background.picture"),
+        (sky(SkyPicture::Panorama(0), f64::NAN, 1.0), "background.rotate"),
+        (sky(SkyPicture::Panorama(0), 0.0, -1.0), "background.strength"),
+    ] {
+        assert!(spoiled(|s| s.background = background).starts_with(expected), "{expected}");
+    }
+}
+
+#[test]
+fn patterns_are_bounded_and_laid_on_what_has_coordinates() {
+    let checker = |space| Checker { colors: [Vec3::ZERO, Vec3::ONE], size: 0.5, space };
+    let laid = |s: &mut Scene, space| s.materials[0].checker = Some(checker(space));
+    for space in [CheckerSpace::Object, CheckerSpace::World] {
+        let mut sound = scene();
+        laid(&mut sound, space);
+        assert_eq!(sound.validate(), Ok(()));
+    }
+    let message = spoiled(|s| laid(s, CheckerSpace::Uv));
+    assert!(message.starts_with("disks[0].material must be without a texture or a pattern"), "{message}");
+    for (size, color) in [(0.0, 1.0), (f32::NAN, 1.0), (f32::INFINITY, 1.0), (1.0, 1.5), (1.0, f32::NAN)] {
+        let pattern = Checker { size, colors: [Vec3::ZERO, Vec3::splat(color)], space: CheckerSpace::World };
+        let message = spoiled(|s| s.materials[1].checker = Some(pattern));
+        assert!(message.starts_with("materials[1].checker"), "{message}");
+    }
+    let message = spoiled(|s| s.materials[1].normal_map = Some(NormalMap { texture: 0, strength: 1.0 }));
+    assert_eq!(message, "materials[1].texture must be one of the scene's textures");
+    let message = spoiled(|s| s.materials[1].normal_map = Some(NormalMap { texture: 0, strength: 101.0 }));
+    assert_eq!(message, "materials[1].normal_map.strength must be from 0 to 100");
 }
 
 #[test]

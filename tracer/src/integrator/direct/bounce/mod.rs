@@ -19,13 +19,12 @@ mod tests;
 
 use glam::DVec3;
 
-use super::super::stage::{Stage, Watch};
-use super::TileContext;
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
+use crate::intersect::tile::Scratch;
 use crate::rays::{BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, SurfaceSource, TileColors, TileRays};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
-use crate::surface::SurfaceBlock;
+use crate::surface::{SurfaceBlock, Surfaces};
 use media::Media;
 use mirrors::Mirrors;
 use secondary::{Arrival, Secondary};
@@ -33,6 +32,36 @@ use secondary::{Arrival, Secondary};
 /// Most secondary rays of one sample: what two mirrors of glass in each other would send on for ever ends here. Rays with less than
 /// 0.004 of the light, the default of `min_contribution`, end before.
 const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
+
+/// Traces and shades batches of rays, in the memory of the current tile.
+pub(super) trait BatchShader<'a> {
+    /// The frame.
+    fn frame(&self) -> &'a PreparedFrame;
+
+    /// What the last tile or batch hits.
+    fn shaded(&mut self) -> Shaded<'_>;
+
+    /// Memory of intersections.
+    fn scratch(&mut self) -> &mut Scratch;
+
+    /// Traces and shades a batch of secondary rays. The hits already have those of the rays in `known`, and none of the others.
+    ///
+    /// # Errors
+    /// [`Cancelled`], polled before the batch is traced.
+    fn shade<S: Simd>(
+        &mut self,
+        simd: S,
+        batch: &RayBatch<'_>,
+        known: [u32; BLOCKS],
+    ) -> Result<(), Cancelled>;
+}
+
+/// Hits, surface points and colours of a tile or batch that is shaded.
+pub(super) struct Shaded<'b> {
+    pub hits: &'b mut [HitBlock; BLOCKS],
+    pub surfaces: &'b Surfaces,
+    pub colors: &'b mut TileColors,
+}
 
 /// Queues and memory of the secondary rays of a tile, kept from tile to tile.
 pub(super) struct Bounces<'a> {
@@ -42,6 +71,8 @@ pub(super) struct Bounces<'a> {
     queue: Vec<Secondary>,
     reflected: Vec<Secondary>,
     transmitted: Vec<Secondary>,
+    /// Places of the tile's samples in the pattern of soft shadows. Only set in scenes with such shadows.
+    patterns: [[u8; LANES]; BLOCKS],
     /// Rays of each sample so far.
     counts: [u16; BATCH],
     batch: RayBatch<'a>,
@@ -57,6 +88,7 @@ impl<'a> Bounces<'a> {
                 queue: Vec::new(),
                 reflected: Vec::new(),
                 transmitted: Vec::new(),
+                patterns: [[0; LANES]; BLOCKS],
                 counts: [0; BATCH],
                 batch: RayBatch::new(frame),
                 mirrors: Mirrors::new(),
@@ -65,80 +97,81 @@ impl<'a> Bounces<'a> {
     }
 }
 
-/// Adds what the surfaces of a traced and shaded tile reflect and transmit to its colours.
-///
-/// # Errors
-/// [`Cancelled`], polled before each batch.
-#[inline(never)]
-pub(super) fn add<S: Simd, R: SurfaceSource, W: Watch>(
-    simd: S,
-    tile: &R,
-    context: &mut TileContext<'_, W>,
-) -> Result<(), Cancelled> {
-    let Some(mut bounces) = context.bounces.take() else { return Ok(()) };
-    bounces.begin(tile, context);
-    if let Some(eye) = tile.eye() {
-        bounces.mirrors.find(simd, eye, &bounces.reflected, &mut context.tile);
-    } else {
-        bounces.mirrors.clear();
-    }
-    let result = bounces.trace(simd, tile.places(), context);
-    context.bounces = Some(bounces);
-    result
-}
-
 impl<'a> Bounces<'a> {
-    fn trace<S: Simd, W: Watch>(
+    /// Adds what the surfaces of a shaded tile reflect and transmit to its colours.
+    ///
+    /// # Errors
+    /// [`Cancelled`], polled before each batch.
+    #[inline(never)]
+    pub(super) fn add<S: Simd, R: SurfaceSource>(
         &mut self,
         simd: S,
-        places: &TileRays,
-        context: &mut TileContext<'a, W>,
+        tile: &R,
+        shader: &mut impl BatchShader<'a>,
     ) -> Result<(), Cancelled> {
+        self.begin(tile, shader);
         if self.reflected.is_empty() && self.transmitted.is_empty() {
             return Ok(());
         }
-        self.sums = context.direct.colors;
-        let max_depth = context.frame.view().quality.max_depth;
+        match tile.eye() {
+            Some(eye) => self.mirrors.find(simd, eye, &self.reflected, shader.scratch()),
+            None => self.mirrors.clear(),
+        }
+        self.trace(simd, tile.places(), shader)
+    }
+
+    fn trace<S: Simd>(
+        &mut self,
+        simd: S,
+        places: &TileRays,
+        shader: &mut impl BatchShader<'a>,
+    ) -> Result<(), Cancelled> {
+        self.sums = *shader.shaded().colors;
+        let max_depth = shader.frame().view().quality.max_depth;
         for depth in 1..=max_depth {
             self.queue.clear();
             self.queue.append(&mut self.reflected);
             self.queue.append(&mut self.transmitted);
             let queue = std::mem::take(&mut self.queue);
             for rays in queue.chunks(BATCH) {
-                self.trace_batch(simd, places, rays, depth, context)?;
-                self.collect(rays, depth < max_depth, context);
+                self.trace_batch(simd, places, rays, depth, shader)?;
+                self.collect(rays, depth < max_depth, shader.frame(), &shader.shaded());
             }
             self.queue = queue;
         }
-        context.direct.colors = self.sums;
+        *shader.shaded().colors = self.sums;
         Ok(())
     }
 
     /// Starts the first generation from the hits of a tile.
-    fn begin<R: SurfaceSource, W>(&mut self, tile: &R, context: &mut TileContext<'_, W>) {
+    fn begin<R: SurfaceSource>(&mut self, tile: &R, shader: &mut impl BatchShader<'a>) {
         self.reflected.clear();
         self.transmitted.clear();
         self.counts = [0; BATCH];
-        let materials = &context.frame.scene().materials;
+        let frame = shader.frame();
+        if frame.features.soft_shadows {
+            self.patterns = std::array::from_fn(|block| tile.pattern(block));
+        }
+        let materials = &frame.scene().materials;
+        let Shaded { hits, surfaces, colors } = shader.shaded();
         for block in 0..BLOCKS {
-            let surface = &context.surfaces.blocks[block];
+            let surface = &surfaces.blocks[block];
             for lane in each_bit(bouncing(surface, materials)) {
                 let ray = tile.ray(block, lane);
-                let primitive = context.hits[block].slot(lane);
-                let hit = Hit { ray: &ray, surface, hits: &context.hits[block], lane };
+                let primitive = hits[block].slot(lane);
+                let hit = Hit { ray: &ray, surface, hits: &hits[block], lane };
                 let incoming = Incoming {
                     starts_on: tile.starts_on(block, lane),
                     weight: DVec3::ONE,
+                    way: 0.0,
                     media: Media::default(),
                     sample: (block * LANES + lane) as u16,
                 };
-                let Some((arrival, left)) = hit.arrival(context.frame, primitive, &incoming) else {
-                    continue;
-                };
+                let Some((arrival, left)) = hit.arrival(frame, primitive, &incoming) else { continue };
                 if let Some(left) = left {
-                    absorb(&mut context.direct.colors[block], lane, left);
+                    absorb(&mut colors[block], lane, left);
                 }
-                self.leave(&arrival, context.frame);
+                self.leave(&arrival, frame);
             }
         }
     }
@@ -157,21 +190,16 @@ impl<'a> Bounces<'a> {
         }
     }
 
-    /// Traces and shades a batch, into `context.direct.colors`.
-    fn trace_batch<S: Simd, W: Watch>(
+    /// Traces and shades a batch.
+    fn trace_batch<S: Simd>(
         &mut self,
         simd: S,
         places: &TileRays,
         rays: &[Secondary],
         depth: u8,
-        context: &mut TileContext<'a, W>,
+        shader: &mut impl BatchShader<'a>,
     ) -> Result<(), Cancelled> {
-        if context.is_cancelled() {
-            return Err(Cancelled);
-        }
-        context.watch.enter(Stage::Secondary);
-        context.counts.secondary += rays.len() as u64;
-        context.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);
+        let soft_shadows = shader.frame().features.soft_shadows;
         let mut known = [0; BLOCKS];
         let batch = &mut self.batch;
         batch.clear();
@@ -179,32 +207,38 @@ impl<'a> Bounces<'a> {
             batch.set(index, secondary.ray, f64::INFINITY, Some(secondary.starts_on));
             let (block, lane) = place_of(usize::from(secondary.sample));
             let (to_block, to_lane) = place_of(index);
+            batch.ways[to_block][to_lane] = secondary.way;
             batch.places.x[to_block].0[to_lane] = places.x[block].0[lane];
             batch.places.y[to_block].0[to_lane] = places.y[block].0[lane];
+            if soft_shadows {
+                batch.patterns[to_block][to_lane] = self.patterns[block][lane];
+            }
         }
-        for (block, hits) in context.hits.iter_mut().enumerate() {
+        for (block, hits) in shader.shaded().hits.iter_mut().enumerate() {
+            *hits = HitBlock::NONE;
             let start = (block * LANES).min(rays.len());
             let of_block = &rays[start..rays.len().min(start + LANES)];
             // Only the first generation leaves a tile of the camera.
             known[block] = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
         }
-        context.trace_batch(simd, batch, known);
-        Ok(())
+        let together: u32 = known.iter().map(|lanes| lanes.count_ones()).sum();
+        batch.neighbours = 2 * together as usize >= rays.len();
+        shader.shade(simd, batch, known)
     }
 
     /// Adds the colours of a batch to the samples, and collects the rays that leave its surfaces.
-    fn collect<W>(&mut self, rays: &[Secondary], goes_on: bool, context: &TileContext<'_, W>) {
-        let frame = context.frame;
+    fn collect(&mut self, rays: &[Secondary], goes_on: bool, frame: &PreparedFrame, shaded: &Shaded<'_>) {
         let materials = &frame.scene().materials;
         for (index, secondary) in rays.iter().enumerate() {
             let (block, lane) = place_of(index);
-            let surface = &context.surfaces.blocks[block];
+            let surface = &shaded.surfaces.blocks[block];
             let mut weight = secondary.weight;
-            if let Some(primitive) = context.hits[block].primitive(lane) {
-                let hit = Hit { ray: &secondary.ray, surface, hits: &context.hits[block], lane };
+            if let Some(primitive) = shaded.hits[block].primitive(lane) {
+                let hit = Hit { ray: &secondary.ray, surface, hits: &shaded.hits[block], lane };
                 let incoming = Incoming {
                     starts_on: Some(secondary.starts_on),
                     weight,
+                    way: secondary.way,
                     media: secondary.media,
                     sample: secondary.sample,
                 };
@@ -222,7 +256,7 @@ impl<'a> Bounces<'a> {
             }
             let (of_block, of_lane) = place_of(usize::from(secondary.sample));
             for channel in 0..3 {
-                let color = f64::from(context.direct.colors[block][channel].0[lane]);
+                let color = f64::from(shaded.colors[block][channel].0[lane]);
                 let sum = &mut self.sums[of_block][channel].0[of_lane];
                 *sum += (weight[channel] * color) as f32;
             }
@@ -254,6 +288,8 @@ struct Incoming {
     starts_on: Option<PrimitiveId>,
     /// Its weight where it starts.
     weight: DVec3,
+    /// Length of the way between it and the camera, in eye units.
+    way: f64,
     media: Media,
     sample: u16,
 }
@@ -313,6 +349,7 @@ impl Hit<'_> {
             material,
             coincidence: if coincides { 4.0 * frame.coarsest } else { 0.0 },
             weight: left.map_or(incoming.weight, |left| incoming.weight * left),
+            way: incoming.way + t * length,
             media: incoming.media,
             sample: incoming.sample,
         };

@@ -16,6 +16,8 @@ pub(super) struct Secondary {
     pub starts_on: PrimitiveId,
     /// Factor of what it sees, in the colour of its sample.
     pub weight: DVec3,
+    /// Length of the way between it and the camera, in eye units.
+    pub way: f64,
     /// The bodies that it is inside of.
     pub media: Media,
     /// The sample of the tile that it contributes to.
@@ -48,6 +50,8 @@ pub(super) struct Arrival<'a> {
     pub coincidence: f64,
     /// Weight of the ray where it arrives.
     pub weight: DVec3,
+    /// Length of the way to the camera, in eye units.
+    pub way: f64,
     pub media: Media,
     pub sample: u16,
 }
@@ -88,6 +92,7 @@ impl Arrival<'_> {
                 ray: Ray { origin, direction: direction.normalize() },
                 starts_on: self.primitive,
                 weight,
+                way: self.way,
                 media,
                 sample: self.sample,
                 arrived: self.t,

@@ -24,7 +24,7 @@ use crate::scene::{
 use crate::simd::{self, LANES, Lanes, Simd, dispatch};
 
 /// Pseudorandom numbers (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
     fn bits(&mut self) -> u64 {
@@ -48,7 +48,7 @@ impl Random {
     }
 
     /// Components in [-1, 1).
-    fn vector(&mut self) -> DVec3 {
+    pub(super) fn vector(&mut self) -> DVec3 {
         DVec3::new(self.share(), self.share(), self.share()) * 2.0 - 1.0
     }
 

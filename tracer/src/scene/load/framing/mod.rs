@@ -11,7 +11,7 @@ use crate::material::Material;
 use crate::mesh::{CompiledMesh, MeshId, TriangleBlock};
 use crate::rotation;
 use crate::scene::data::{
-    Attenuation, Background, Camera, Light, LightKind, Model, NormalMode, RenderSettings, Scene,
+    Attenuation, Background, Camera, Disk, Light, LightKind, Model, NormalMode, RenderSettings, Scene,
 };
 use crate::scene::import::Up;
 
@@ -210,13 +210,21 @@ pub(super) fn bounds(scene: &Scene, meshes: &[Arc<CompiledMesh>]) -> Option<Boun
     let of_mesh = |id: MeshId| meshes.iter().find(|mesh| mesh.id() == id).map(|mesh| mesh.bounds());
     let models = scene.models.iter().filter_map(|model| Some(of_model(model, of_mesh(model.mesh)?)));
     let spheres = scene.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
+    let disks = scene.disks.iter().map(of_disk);
     let triangles = scene.triangles.iter().map(|t| around(t.vertices));
-    models.chain(spheres).chain(triangles).reduce(union)
+    models.chain(spheres).chain(disks).chain(triangles).reduce(union)
 }
 
 fn of_model(model: &Model, bounds: Bounds) -> Bounds {
-    let matrix = rotation::of_model(model.rotate) * DMat3::from_diagonal(model.scale);
+    let matrix = model.group * rotation::of_model(model.rotate) * DMat3::from_diagonal(model.scale);
     around(corners_of(bounds).map(|corner| matrix * corner + model.translate))
+}
+
+fn of_disk(disk: &Disk) -> Bounds {
+    // Along an axis a circle reaches as far as the sine of the angle between the axis and the normal.
+    let sines = (DVec3::ONE - disk.normal * disk.normal).max(DVec3::ZERO).to_array().map(f64::sqrt);
+    let reach = DVec3::from_array(sines) * disk.radius;
+    (disk.center - reach, disk.center + reach)
 }
 
 fn corners_of((lower, upper): Bounds) -> impl Iterator<Item = DVec3> {

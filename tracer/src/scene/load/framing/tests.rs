@@ -153,3 +153,22 @@ fn bounds_follow_scale_rotation_and_translation() {
     assert_eq!(bounds(&scene, &[mesh]), Some(expected));
     assert_eq!(bounds(&Scene { models: Vec::new(), ..scene }, &[]), None);
 }
+
+#[test]
+fn bounds_follow_groups_and_disks() {
+    let mesh = Arc::new(box_mesh(DVec3::ZERO, DVec3::new(1.0, 2.0, 4.0)));
+    let mut scene = bare_model(&mesh, Up::Y, None);
+    // A shear in its group: x grows by y.
+    scene.models[0].group = DMat3::from_cols(DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Z);
+    let meshes = [mesh];
+    assert_eq!(bounds(&scene, &meshes), Some((DVec3::ZERO, DVec3::new(3.0, 2.0, 4.0))));
+    scene.models.clear();
+    let disk = |normal: DVec3| Disk { center: DVec3::ONE, normal, radius: 2.0, material: 0 };
+    scene.disks = vec![disk(DVec3::Y)];
+    assert_eq!(bounds(&scene, &meshes), Some((DVec3::new(-1.0, 1.0, -1.0), DVec3::new(3.0, 1.0, 3.0))));
+    // Tilted by 3 : 4 : 5.
+    scene.disks = vec![disk(DVec3::new(0.6, 0.8, 0.0))];
+    let (lower, upper) = bounds(&scene, &meshes).unwrap();
+    assert!((lower - DVec3::new(-0.6, -0.2, -1.0)).length() < 1e-12, "{lower}");
+    assert!((upper - DVec3::new(2.6, 2.2, 3.0)).length() < 1e-12, "{upper}");
+}

@@ -134,14 +134,29 @@ fn unknown_words_and_materials_are_refused_with_the_nearest() {
 fn unsupported_features_are_refused_by_name() {
     let yet = "not supported yet";
     assert_faults(&[
-        ("[camera]\nkind = \"orthographic\"", "2:8", &["camera", yet, "pinhole"]),
-        ("[camera]\nkind = \"fisheye\"", "2:8", &["camera", yet]),
-        ("[background]\ncubemap = [\"a.png\"]", "2:11", &["`cubemap`", yet]),
-        ("[background]\npanorama = \"sky.hdr\"", "2:12", &["`panorama`", yet]),
-        ("[[light]]\nposition=[0,0,0]\nradius = 0.5", "3:10", &["`radius`", yet]),
-        ("[material.a]\nreflect = 0.1", "2:11", &["`reflect`", yet]),
-        ("[material.a]\ntransmit = 1", "2:12", &["`transmit`", yet]),
+        (
+            "[render]\nintegrator = \"path\"",
+            "2:14",
+            &["the path integrator", "`integrator`", yet, "use \"direct\""],
+        ),
+        ("[render]\nseed = 1", "2:1", &["the path integrator (`seed` in [render])", yet, "leave it out"]),
+        ("[render]\nmax_noise = 0", "2:1", &["`max_noise` in [render]", yet]),
+        ("[render]\nclamp_indirect = 0", "2:1", &["`clamp_indirect` in [render]", yet]),
+        ("[render]\nexposure = 1", "2:1", &["tone mapping (`exposure` in [render])", yet]),
+        ("[render]\ntone = \"agx\"", "2:1", &["`tone` in [render]", yet]),
+        ("[camera]\naperture = 0.1", "2:1", &["a lens with an aperture (`aperture` in [camera])", yet]),
+        ("[camera]\nfocus_distance = 1", "2:1", &["`focus_distance`", yet]),
+        ("[camera]\nshutter = [0, 1]", "2:1", &["motion blur (`shutter` in [camera])", yet]),
+        ("[material.a]\nmetallic = 1", "2:1", &["metallic-roughness", "`metallic` in [material.a]", yet]),
+        ("[material.a]\nroughness = 1", "2:1", &["`roughness` in [material.a]", yet]),
+        ("[material.a]\ntransmission = 1", "2:1", &["`transmission`", yet]),
+        ("[material.a]\nspecular_factor = 1", "2:1", &["`specular_factor`", yet]),
+        ("[[model]]\nfile = \"a.obj\"\ntranslate_end = [0,0,0]", "3:1", &["`translate_end`", yet]),
+        ("[[model]]\nfile = \"a.obj\"\nrotate_end = [0,0,0]", "3:1", &["`rotate_end`", yet]),
+        ("[[sphere]]\ncenter_end = [0,0,0]", "2:1", &["`center_end` in [[sphere]]", yet]),
+        ("[[volume]]\ndensity = 1", "1:3", &["a volume (`volume` in the scene file)", yet]),
     ]);
+    assert_eq!(warnings("[render]\nintegrator = \"direct\""), [""; 0]);
 }
 
 #[test]

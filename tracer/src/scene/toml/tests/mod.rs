@@ -1,13 +1,18 @@
 //! Complete scenes, defaults, warnings, and arbitrary texts.
 
+mod bounces;
+mod checkers;
 mod faults;
+mod groups;
+mod shapes;
 mod textures;
+mod views;
 
 use glam::{DVec3, Vec2};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::{Attenuation, Filter, LightKind, NormalMode, Tiling, Wrap};
+use crate::scene::{Attenuation, Background, Filter, LightKind, NormalMode, Tiling, Wrap};
 
 /// A scene with one object of every kind, as on the format's page.
 const WHOLE: &str = r#"
@@ -47,7 +52,6 @@ specular = [0.3, 0.3, 0.3]
 exponent = 20
 reflect = 0.0
 transmit = 0
-ior = 1.5
 [[model]]
 file = "bust.obj"
 material = "marble"
@@ -98,7 +102,8 @@ fn a_whole_scene_is_read() {
     let camera = scene.camera.unwrap();
     assert_eq!(camera.aim, Aim::Point(DVec3::Y));
     assert_eq!((camera.fov, camera.zoom), (35.0, 2.0));
-    assert_eq!(scene.background, Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::ONE });
+    let gradient = Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::ONE };
+    assert_eq!(scene.background.radiance, RadianceText::Plain(gradient));
     let spot = &scene.lights[0];
     assert_eq!(spot.color, Vec3::new(4.0, 2.0, 1.0));
     assert!(!spot.shadows);
@@ -125,7 +130,8 @@ fn absent_keys_have_defaults() {
         read("[[light]]\nposition = [1, 2, 3]\n[camera]\nposition = [0,0,0]\ndirection = [0,0,-2]").unwrap();
     assert_eq!(scene.render, RenderSettings::default());
     assert_eq!(scene.ambient, Vec3::ZERO);
-    assert_eq!(scene.background, Background::Color(Vec3::ZERO));
+    let black = RadianceText::Plain(Background::Color(Vec3::ZERO));
+    assert_eq!(scene.background, BackgroundText { radiance: black, visible: true });
     let camera = scene.camera.unwrap();
     assert_eq!((camera.aim, camera.up), (Aim::Direction(DVec3::NEG_Z), DVec3::Y));
     assert_eq!((camera.fov, camera.zoom), (40.0, 1.0));
@@ -140,6 +146,16 @@ fn fault(text: &str) -> String {
     let fault = read(text).expect_err(text);
     let (line, column) = place(text, fault.at);
     format!("{line}:{column}: {}", fault.message)
+}
+
+/// The warnings of a text: "line:column message" each.
+fn warnings(text: &str) -> Vec<String> {
+    let scene = read(text).unwrap_or_else(|fault| panic!("{text}: {}", fault.message));
+    let shown = |warning: &Fault| {
+        let (line, column) = place(text, warning.at);
+        format!("{line}:{column} {}", warning.message)
+    };
+    scene.warnings.iter().map(shown).collect()
 }
 
 /// Asserts the position of the fault and that its message contains all words.
@@ -203,7 +219,7 @@ fn piece() -> impl Strategy<Value = String> {
         prop::sample::select(KEYS).prop_map(|key| format!("[{key}]\n")),
         prop::sample::select(KEYS).prop_map(|key| format!("[[{key}]]\n")),
         prop::sample::select(light::LIGHT_KEYS).prop_map(str::to_owned),
-        prop::sample::select(view::CAMERA_KEYS).prop_map(str::to_owned),
+        prop::sample::select(camera::CAMERA_KEYS).prop_map(str::to_owned),
         prop::sample::select(objects::MODEL_KEYS).prop_map(str::to_owned),
         prop::sample::select(vec![
             "=",

@@ -105,14 +105,25 @@ fn faults_of_textures_name_their_place() {
             &["`emission_strength` in [material.a]", "up to 1e30"],
         ),
         (
-            with("[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial=\"wood\""),
-            "6:10",
-            &["`material` in [[sphere]] has a texture", plain, "with a colour"],
+            with("[[disk]]\ncenter=[0,0,0]\nnormal=[0,1,0]\nradius=1\nmaterial=\"wood\""),
+            "7:10",
+            &["`material` in [[disk]] has a texture", plain, "with a colour, or a rectangle"],
         ),
         (
-            with("[[plane]]\npoint=[0,0,0]\nnormal=[0,1,0]\nmaterial=\"wood\""),
-            "6:10",
-            &["[[plane]]", plain, "triangles"],
+            "[material.a]\nnormal_map = { strength = 1 }".to_owned(),
+            "2:14",
+            &["`texture` is missing in `normal_map` in [material.a]"],
+        ),
+        (
+            "[material.a]\nnormal_map = { texture = \"a.png\", strength = 101 }".to_owned(),
+            "2:46",
+            &["`strength` in `normal_map` in [material.a]", "from 0 to 100"],
+        ),
+        ("[material.a]\nnormal_map = \"a.png\"".to_owned(), "2:14", &["must be a table"]),
+        (
+            "[material.a]\ndiffuse = { texture = \"a.png\", strength = 1 }".to_owned(),
+            "2:32",
+            &["unknown key `strength`"],
         ),
         (
             with(&format!("[[triangle]]\n{CORNERS}material=\"wood\"")),
@@ -127,4 +138,40 @@ fn faults_of_textures_name_their_place() {
     ] {
         assert_faults(&[(&text, place, words)]);
     }
+}
+
+#[test]
+fn spheres_planes_and_boxes_may_have_textures() {
+    let text = format!(
+        "{WOODEN}[[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial=\"wood\"\nuv_rotate=[0,90,0]\n\
+         [[plane]]\npoint=[0,0,0]\nnormal=[0,1,0]\nmaterial=\"wood\"\nsize=2.5\n\
+         [[rectangle]]\naxis=\"y\"\nat=0\nranges=[[0,1],[0,1]]\nmaterial=\"wood\"\n\
+         [[box]]\nmin=[0,0,0]\nmax=[1,1,1]\nmaterial=\"wood\"\n"
+    );
+    let scene = read(&text).unwrap();
+    assert_eq!(scene.warnings, []);
+    assert_eq!(scene.spheres[0].uv_rotate, DVec3::Y * 90.0);
+    assert_eq!(scene.planes[0].size, 2.5);
+    assert!(scene.triangles.len() == 14 && scene.triangles.iter().all(|triangle| triangle.uvs.is_some()));
+    let plain = "[[sphere]]\ncenter=[0,0,0]\nradius=1\nuv_rotate=[0,90,0]\n[[plane]]\npoint=[0,0,0]\nnormal=[0,1,0]\nsize=2\n";
+    assert_eq!(
+        warnings(plain),
+        [
+            "4:11 `uv_rotate` in [[sphere]] has no effect without a texture",
+            "8:6 `size` in [[plane]] has no effect without a texture",
+        ]
+    );
+}
+
+#[test]
+fn normal_maps_are_read() {
+    let text = "[material.a]\nnormal_map = { texture = \"n.png\", strength = 0.5, wrap = \"mirror\", scale = [2, 2] }\n\
+                [material.b]\nnormal_map = { texture = \"n.png\" }\n";
+    let scene = read(text).unwrap();
+    let [a, b] = [0, 1].map(|index: u32| scene.textures[&index].normal_map.clone().unwrap());
+    assert_eq!((a.strength, b.strength), (0.5, 1.0));
+    assert_eq!((a.texture.tiling.wrap, a.texture.tiling.scale), (Wrap::Mirror, Vec2::splat(2.0)));
+    assert_eq!((a.texture.filter, place(text, a.texture.at)), (Filter::Bilinear, (2, 26)));
+    // The tiling of a normal map counts as that of any texture.
+    assert!(scene.textures[&0].distinguish_repeats() && !scene.textures[&1].distinguish_repeats());
 }

@@ -1,6 +1,7 @@
 //! The text of a material library (MTL). Faults and unsupported statements are reported once per kind as warnings, and never
 //! make the model fail.
 
+mod optics;
 mod statements;
 mod surface;
 #[cfg(test)]
@@ -20,6 +21,7 @@ use super::lines::lines;
 use super::picture::Place;
 use crate::material::Material;
 use crate::mesh::NamedMaterial;
+use optics::{Optics, Rest};
 use statements::{spelled, statement};
 use values::{MAX_SHOWN, SMALLEST_EXPONENT};
 
@@ -47,6 +49,7 @@ struct Head {
     name: String,
     /// Emission, pictures and flags, which `tobj` does not read.
     surface: NamedMaterial,
+    optics: Optics,
 }
 
 /// The materials of a library's text.
@@ -82,9 +85,11 @@ fn clean(text: &str, place: &Place<'_>, warnings: &mut Warnings) -> (String, Vec
             // Numbers in place of names: `tobj` would change some names.
             let _ = writeln!(clean, "newmtl {}", heads.len());
             let surface = NamedMaterial::plain("", Material::NEUTRAL);
-            heads.push(Head { line: line.number, name: plain_name(line.rest()).into_owned(), surface });
+            let name = plain_name(line.rest()).into_owned();
+            heads.push(Head { line: line.number, name, surface, optics: Optics::default() });
         } else if let Some(head) = heads.last_mut() {
-            let read = surface::read(&line, place, &mut head.surface, warnings);
+            let read = surface::read(&line, place, &mut head.surface, warnings)
+                .and_then(|()| head.optics.read(keyword, &line, warnings));
             match read.and_then(|()| statement(keyword, &line, warnings)) {
                 Ok(statement) => clean.push_str(&statement),
                 Err(message) => warnings.at_line(line.number, format!("{message}; the line is left out")),
@@ -117,7 +122,7 @@ fn define(library: &mut Library, head: &Head, material: tobj::Material, warnings
     if material.ambient_texture.is_some() && head.surface.texture.is_none() {
         warnings.once("map_Ka", head.line, "`map_Ka` without `map_Kd` is left out: ambient light takes `Kd`");
     }
-    let named = convert(material, head);
+    let named = convert(material, head, warnings);
     let name = excerpt(&head.name, MAX_SHOWN);
     if library.insert(head.name.clone(), named.clone()).is_some_and(|before| before != named) {
         warnings.at_line(
@@ -134,7 +139,7 @@ fn has_ambient_color(material: &tobj::Material) -> bool {
 }
 
 /// The material of the finished statements.
-fn convert(material: tobj::Material, head: &Head) -> NamedMaterial {
+fn convert(material: tobj::Material, head: &Head, warnings: &mut Warnings) -> NamedMaterial {
     let mut surface = head.surface.clone();
     surface::finish(&mut surface);
     let color = |[r, g, b]: [f64; 3]| Vec3::new(r as f32, g as f32, b as f32);
@@ -152,5 +157,8 @@ fn convert(material: tobj::Material, head: &Head) -> NamedMaterial {
         exponent: material.shininess.map_or(Material::NEUTRAL.exponent, |ns| ns as f32),
         ..surface.material
     };
-    NamedMaterial { name: head.name.clone(), material: converted, ..surface }
+    let exponent = material.shininess;
+    let rest = Rest { matt, exponent, cut_out: surface.cutout.is_some(), line: head.line };
+    let material = head.optics.applied(converted, rest, warnings);
+    NamedMaterial { name: head.name.clone(), material, ..surface }
 }

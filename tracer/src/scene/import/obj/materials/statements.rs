@@ -71,8 +71,8 @@ const LEFT_OUT: &[(&[&str], &str)] = &[
     ),
 ];
 
-/// Statements without an effect where neither mirrors nor glass are drawn.
-const WITHOUT_EFFECT: &[&str] = &["Ni", "map_Ni", "Km", "sharpness", "map_aat"];
+/// Statements that are left out without a warning: programs write them by default, or they describe how to render.
+const WITHOUT_EFFECT: &[&str] = &["map_Ni", "Km", "sharpness", "map_aat"];
 
 /// The keyword in the spelling of the format.
 pub(super) fn spelled(keyword: &str) -> &str {
@@ -103,23 +103,11 @@ pub(super) fn statement(keyword: &str, line: &Line<'_>, warnings: &mut Warnings)
         }
         "illum" => {
             let model = number(line)?;
-            if model > 2.0 {
-                let message =
-                    format!("`{}`: mirrors and glass of `illum` 3 and above are not drawn", shortened(line));
-                warnings.at_line(line.number, message);
-            }
-            Ok(format!("illum {}\n", model.clamp(0.0, 255.0) as u8))
-        }
-        "d" | "Tr" => {
-            let opaque = if keyword == "d" { 1.0 } else { 0.0 };
-            if number(line).is_ok_and(|share| share != opaque) {
-                warnings.at_line(line.number, "transparency is not supported yet: drawn opaque");
-            }
-            Ok(String::new())
+            Ok(format!("illum {}\n", if (0.0..=9.0).contains(&model) { model as u8 } else { 2 }))
         }
         // Usually the picture of `map_Kd` again: only its presence matters.
         "map_Ka" => Ok("map_Ka given\n".into()),
-        "map_Kd" | "map_d" | "Ke" | "map_Ke" => Ok(String::new()),
+        "map_Kd" | "map_d" | "Ke" | "map_Ke" | "d" | "Tr" | "Tf" | "Ni" => Ok(String::new()),
         _ => {
             leave_out(keyword, line, warnings);
             Ok(String::new())
@@ -132,16 +120,8 @@ fn leave_out(keyword: &str, line: &Line<'_>, warnings: &mut Warnings) {
     if let Some((_, reason)) = LEFT_OUT.iter().find(|(keywords, _)| keywords.contains(&keyword)) {
         return warnings.once(keyword, line.number, format!("`{keyword}` is left out: {reason}"));
     }
-    let values = |plain: f64| color(line).is_ok_and(|color| color != [plain; 3]);
-    match keyword {
-        "Tf" if values(1.0) => {
-            warnings.once(keyword, line.number, "`Tf` is left out: materials let no light through");
-        }
-        "Tf" => {}
-        _ if WITHOUT_EFFECT.contains(&keyword) => {}
-        _ => {
-            let name = excerpt(keyword, 20);
-            warnings.once(&name, line.number, format!("unknown statement `{name}` is left out"));
-        }
+    if !WITHOUT_EFFECT.contains(&keyword) {
+        let name = excerpt(keyword, 20);
+        warnings.once(&name, line.number, format!("unknown statement `{name}` is left out"));
     }
 }

@@ -1,24 +1,20 @@
-//! The tables `[[model]]`, `[[sphere]]`, `[[plane]]` and `[[triangle]]`.
+//! The tables `[[model]]`.
 
 use std::path::PathBuf;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-use super::Reading;
-use super::fault::Read;
-use super::material::Materials;
-use super::table::Table;
-use super::value::Value;
-use crate::scene::data::{NormalMode, Plane, Sphere, Triangle};
+use super::super::Reading;
+use super::super::fault::Read;
+use super::super::material::Materials;
+use super::super::table::Table;
+use super::super::value::Value;
+use crate::scene::data::NormalMode;
 use crate::scene::import::Up;
 use crate::scene::validate::MAX_COORDINATE;
-use crate::texture::without_repeats;
 
-pub(super) const MODEL_KEYS: &[&str] =
-    &["file", "material", "normals", "translate", "rotate", "scale", "up", "crease_angle"];
-pub(super) const SPHERE_KEYS: &[&str] = &["center", "radius", "material"];
-pub(super) const PLANE_KEYS: &[&str] = &["point", "normal", "material"];
-pub(super) const TRIANGLE_KEYS: &[&str] = &["vertices", "uvs", "material"];
+pub(in crate::scene::toml) const MODEL_KEYS: &[&str] =
+    &["name", "file", "material", "normals", "translate", "rotate", "scale", "up", "crease_angle"];
 
 /// A model whose file has not been loaded.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,14 +30,21 @@ pub(crate) struct ModelText {
     pub(crate) normals: NormalMode,
     /// Crease angle in degrees, and the offset of its value in the text.
     pub(crate) crease_angle: Option<(f64, usize)>,
+    /// World position of the file's origin, after the transforms of its groups.
     pub(crate) translate: DVec3,
     /// Rotation in degrees, including the one that rotates the file upright.
     pub(crate) rotate: DVec3,
     /// Scale along the axes of the file.
     pub(crate) scale: DVec3,
+    /// Linear part of the transforms of its groups.
+    pub(crate) group: DMat3,
 }
 
-pub(super) fn model(table: Table<'_>, materials: &Materials, reading: &mut Reading) -> Read<ModelText> {
+pub(in crate::scene::toml) fn model(
+    table: Table<'_>,
+    materials: &Materials,
+    reading: &mut Reading,
+) -> Read<ModelText> {
     let file = table.required("file")?;
     let name = file.file_name("the name of a model file")?;
     let modes = [("smooth", NormalMode::Smooth), ("flat", NormalMode::Flat)];
@@ -67,10 +70,12 @@ pub(super) fn model(table: Table<'_>, materials: &Materials, reading: &mut Readi
         translate: table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
         rotate,
         scale,
+        group: DMat3::IDENTITY,
     })
 }
 
-fn scale(value: Value<'_>) -> Read<DVec3> {
+/// Factors along three axes, none of them zero.
+pub(in crate::scene::toml) fn scale(value: Value<'_>) -> Read<DVec3> {
     let expected = "one number, or three in an array, none of them 0";
     let scale = if value.value.get_ref().is_array() {
         value.vector()?
@@ -80,50 +85,4 @@ fn scale(value: Value<'_>) -> Read<DVec3> {
     };
     let flat = scale.to_array().contains(&0.0);
     if flat { Err(value.must_be(expected)) } else { Ok(scale) }
-}
-
-pub(super) fn sphere(table: Table<'_>, materials: &mut Materials) -> Read<Sphere> {
-    Ok(Sphere {
-        center: table.required("center")?.vector()?,
-        radius: table.required("radius")?.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)?,
-        material: materials.referred_plain(table, "use a material with a colour")?,
-        inside_out: false,
-        uv_rotate: DVec3::ZERO,
-    })
-}
-
-pub(super) fn plane(table: Table<'_>, materials: &mut Materials) -> Read<Plane> {
-    Ok(Plane {
-        point: table.required("point")?.vector()?,
-        normal: table.required("normal")?.direction()?,
-        material: materials
-            .referred_plain(table, "use a material with a colour, or two triangles with `uvs`")?,
-        size: 1.0,
-    })
-}
-
-/// Reads a triangle; `None` for one without an area, which is invisible.
-pub(super) fn triangle(
-    table: Table<'_>,
-    materials: &mut Materials,
-    reading: &mut Reading,
-) -> Read<Option<Triangle>> {
-    let value = table.required("vertices")?;
-    let vertices = value.three_points()?;
-    let uvs = table.read("uvs", |value| value.three_uvs())?;
-    let material = match uvs {
-        Some(_) => materials.referred_or_neutral(table)?,
-        None => materials.referred_plain(table, "add `uvs`, or use a material with a colour")?,
-    };
-    // Checked above: a triangle with a texture has coordinates.
-    let uvs = uvs.filter(|_| materials.has_texture(material)).map(|uvs| {
-        let near = without_repeats(uvs).filter(|_| !materials.distinguishes_repeats(material));
-        near.unwrap_or(uvs.map(|uv| uv.as_vec2()))
-    });
-    let [a, b, c] = vertices;
-    if a == b || b == c || c == a {
-        reading.warn(value.start(), format!("{value} has no area: the triangle is left out"));
-        return Ok(None);
-    }
-    Ok(Some(Triangle { vertices, uvs, material }))
 }

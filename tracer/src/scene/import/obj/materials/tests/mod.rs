@@ -1,5 +1,7 @@
 //! Statements of material libraries, and the warnings about them.
 
+mod optics;
+
 use std::path::Path;
 
 use glam::Vec2;
@@ -35,13 +37,13 @@ fn unsupported_statements_are_reported_with_their_lines() {
         "newmtl a\nKd red\nmap_Kd ../wood.png\nd 0.5\nKs 2 0 0\nNs 1e9\nKs 0.1 nan 0.3\nnewmtl\nKd 1 0 1";
     let (library, warnings) = parsed(text);
     let a = library["a"].material;
-    assert_eq!(a.diffuse, Material::NEUTRAL.diffuse);
+    assert_eq!(a.diffuse, Material::NEUTRAL.diffuse * 0.5);
+    assert_eq!((a.transmit, a.thin), (Vec3::splat(0.5), true));
     assert_eq!((a.specular, a.exponent), (Vec3::X, 1e6));
     let expected = [
         "a.mtl:2: `Kd red`: three numbers were expected; the line is left out (2 lines of this kind)",
         "a.mtl:3: the picture `../wood.png` is outside the model's folder and is not read; put it there, or allow it \
          with --allow-parent-textures",
-        "a.mtl:4: transparency is not supported yet",
         "a.mtl:5: `Ks 2 0 0`: colours from 0 to 1 were expected",
         "a.mtl:6: `Ns 1e9`: taken",
         "a.mtl:8: `newmtl` without a name",
@@ -88,7 +90,6 @@ fn emission_cut_outs_and_tiling_are_read() {
     assert_eq!(library["screen"].material.emission, Vec3::ONE);
     assert_eq!(library["screen"].emission_texture, Some(TextureFile::new("c.png")));
     let expected = [
-        "a.mtl:10: transparency is not supported yet: drawn opaque (2 lines of this kind)",
         "a.mtl:12: the option `-mm` of textures is left out",
         "a.mtl:17: `map_bump` is left out: relief from pictures is not drawn",
         "a.mtl:18: `lamp` is defined again, in another way: the last definition counts",
@@ -181,7 +182,6 @@ fn ignored_statements_are_reported_once_per_kind_if_they_matter() {
         "a.mtl:14: `Pr` is left out",
         "a.mtl:15: `map_Tr` is left out",
         "a.mtl:16: `Tf` is left out",
-        "a.mtl:17: `illum 3`: mirrors and glass",
         "a.mtl:19: unknown statement `hello`",
         "a.mtl:1: `Ka`: ambient light takes the colour of `Kd`",
     ] {
@@ -191,7 +191,7 @@ fn ignored_statements_are_reported_once_per_kind_if_they_matter() {
             "{words}: {warnings:#?}"
         );
     }
-    assert_eq!(warnings.len(), 9, "{warnings:#?}");
+    assert_eq!(warnings.len(), 8, "{warnings:#?}");
     let warnings = parsed("Kd 1 0 0\nNs 2\nnewmtl a\nmap_Ka a.png\n").1;
     assert_eq!(warnings.len(), 2, "{warnings:?}");
     assert!(warnings[0].starts_with("a.mtl:1: statements before the first `newmtl`"), "{warnings:?}");

@@ -1,0 +1,60 @@
+//! The tables `[[sphere]]`, `[[plane]]` and `[[disk]]`.
+
+use glam::DVec3;
+
+use super::super::Reading;
+use super::super::fault::Read;
+use super::super::material::Materials;
+use super::super::table::Table;
+use crate::scene::data::{Disk, Plane, Sphere};
+
+pub(in crate::scene::toml) const SPHERE_KEYS: &[&str] =
+    &["name", "center", "radius", "material", "inside_out", "uv_rotate"];
+pub(in crate::scene::toml) const PLANE_KEYS: &[&str] = &["point", "normal", "material", "size"];
+pub(in crate::scene::toml) const DISK_KEYS: &[&str] = &["name", "center", "normal", "radius", "material"];
+
+pub(in crate::scene::toml) fn sphere(
+    table: Table<'_>,
+    materials: &mut Materials,
+    reading: &mut Reading,
+) -> Read<Sphere> {
+    let material = materials.referred_or_neutral(table)?;
+    let sphere = Sphere {
+        center: table.required("center")?.vector()?,
+        radius: table.required("radius")?.positive()?,
+        material,
+        inside_out: table.read("inside_out", |value| value.boolean())?.unwrap_or(false),
+        uv_rotate: table.read("uv_rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
+    };
+    if !materials.needs_uvs(material) {
+        reading.idle(table, "uv_rotate", "without a texture");
+    }
+    Ok(sphere)
+}
+
+pub(in crate::scene::toml) fn plane(
+    table: Table<'_>,
+    materials: &mut Materials,
+    reading: &mut Reading,
+) -> Read<Plane> {
+    let material = materials.referred_or_neutral(table)?;
+    let plane = Plane {
+        point: table.required("point")?.vector()?,
+        normal: table.required("normal")?.direction()?,
+        material,
+        size: table.read("size", |value| value.positive())?.unwrap_or(1.0),
+    };
+    if !materials.needs_uvs(material) {
+        reading.idle(table, "size", "without a texture");
+    }
+    Ok(plane)
+}
+
+pub(in crate::scene::toml) fn disk(table: Table<'_>, materials: &mut Materials) -> Read<Disk> {
+    Ok(Disk {
+        center: table.required("center")?.vector()?,
+        normal: table.required("normal")?.direction()?,
+        radius: table.required("radius")?.positive()?,
+        material: materials.referred_plain(table, "use a material with a colour, or a rectangle")?,
+    })
+}
