@@ -2,8 +2,7 @@
 //!
 //! Of a frame's quality it applies omitted terms (shadows, highlights) and the filter; it is exact where a setting trades
 //! precision for speed. It shares with the fast path only the scene, the cleaned triangles, the sRGB encoding and on request the
-//! points of lights; all else is
-//! computed from the equations of the model of light, to be compared with them.
+//! points of lights; all else is computed from the equations of the model of light, to be compared with them.
 //!
 //! ```text
 //!   flatten      the scene as a list of primitives
