@@ -37,7 +37,7 @@ impl Oracle {
             let (mut reflected, mut transmitted) = (Vec::new(), Vec::new());
             for mut traveller in generation {
                 let Some(surface) = self.surface(traveller.ray, traveller.starts_on) else {
-                    sum += self.from_infinity(&traveller, depth > 0);
+                    sum += self.seen_without_hit(&traveller, depth > 0);
                     continue;
                 };
                 traveller.weight *= self.remaining(&traveller, &surface);
@@ -60,7 +60,7 @@ impl Oracle {
     }
 
     /// What a ray sees of the background.
-    fn from_infinity(&self, traveller: &Traveller, bounced: bool) -> DVec3 {
+    fn seen_without_hit(&self, traveller: &Traveller, bounced: bool) -> DVec3 {
         let direction = traveller.ray.direction;
         let seen = if bounced { self.background(direction) } else { self.background_of_camera(direction) };
         traveller.weight * traveller.bodies.remaining_at_infinity(&self.scene.materials) * seen
@@ -101,7 +101,8 @@ impl Oracle {
         let leave = |direction: DVec3, share: DVec3, bodies: Bodies| {
             let weight = traveller.weight * share;
             let origin = surface.clear_origin();
-            let ray = Ray { origin, direction: direction.normalize(), place: surface.place };
+            let before = surface.before + surface.way;
+            let ray = Ray { origin, direction: direction.normalize(), place: surface.place, before };
             let contributes = weight.max_element() >= least && weight.max_element() > 0.0;
             contributes.then_some(Traveller { ray, starts_on: Some(surface.primitive), weight, bodies })
         };

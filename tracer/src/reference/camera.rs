@@ -15,6 +15,8 @@ pub(super) struct Ray {
     pub direction: DVec3,
     /// Place of its sample in a pattern of 2 x 2 samples of the picture: 0 and 1 in even rows, 2 and 3 in odd ones.
     pub place: usize,
+    /// Length of the way from the camera to the origin, over all bounces.
+    pub before: f64,
 }
 
 /// A ray of the camera.
@@ -38,7 +40,7 @@ impl Oracle {
         let grid = f64::from(self.view.samples.isqrt());
         let [column, row] = [sx, sy].map(|along| (along * grid).floor().rem_euclid(2.0) as usize);
         let seen = |origin: DVec3, direction: DVec3| CameraRay {
-            ray: Ray { origin, direction: direction.normalize(), place: column + 2 * row },
+            ray: Ray { origin, direction: direction.normalize(), place: column + 2 * row, before: 0.0 },
             in_picture: true,
         };
         match camera.kind {

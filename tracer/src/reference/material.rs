@@ -22,7 +22,7 @@ impl Oracle {
         if let Some(pattern) = &material.checker {
             diffuse = self.pattern_color(pattern, surface);
         } else if let Some(index) = material.texture {
-            diffuse *= self.texel(self.scene.textures[index as usize], surface.uv).truncate();
+            diffuse *= self.texture_color(self.scene.textures[index as usize], surface);
         }
         if material.vertex_colors { diffuse * surface.vertex_color } else { diffuse }
     }
@@ -33,9 +33,9 @@ impl Oracle {
         if !surface.front {
             return DVec3::ZERO;
         }
-        let factor = material.emission_texture.map_or(DVec3::ONE, |index| {
-            self.texel(self.scene.textures[index as usize], surface.uv).truncate()
-        });
+        let factor = material
+            .emission_texture
+            .map_or(DVec3::ONE, |index| self.texture_color(self.scene.textures[index as usize], surface));
         material.emission.as_dvec3() * factor
     }
 
@@ -60,18 +60,19 @@ impl Oracle {
     }
 
     /// The shading normal, tilted by the normal map of the material: x along u, y across it on the side of v, z along the normal of
-    /// the front. A normal behind the surface is mirrored at it. `tangents` are the derivatives of the point by u and v.
-    pub(super) fn mapped_normal(&self, surface: &SurfacePoint, tangents: [DVec3; 2]) -> DVec3 {
-        self.tilted(surface, tangents).unwrap_or(surface.ns)
+    /// the front. A normal behind the surface is mirrored at it.
+    pub(super) fn mapped_normal(&self, surface: &SurfacePoint) -> DVec3 {
+        self.tilted(surface).unwrap_or(surface.ns)
     }
 
-    fn tilted(&self, surface: &SurfacePoint, tangents: [DVec3; 2]) -> Option<DVec3> {
+    fn tilted(&self, surface: &SurfacePoint) -> Option<DVec3> {
         let map = self.material(surface).normal_map?;
         let lookup = self.scene.textures[map.texture as usize];
         let tilt = self.shares(lookup, surface.uv)? * 2.0 - 1.0;
         let signs = axis_signs(&lookup, surface.uv) * f64::from(map.strength);
         let side = if surface.front { 1.0 } else { -1.0 };
         let normal = surface.ns * side;
+        let tangents = surface.tangents;
         let along_u = (tangents[0] - normal * tangents[0].dot(normal)).try_normalize()?;
         let along_v = tangents[1] - normal * tangents[1].dot(normal);
         let across = (along_v - along_u * along_v.dot(along_u)).try_normalize()?;

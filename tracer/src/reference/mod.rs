@@ -1,8 +1,8 @@
 //! The oracle: the shading equations in `f64`, every ray against every primitive, without trees, SIMD or shortcuts.
 //!
 //! Of a frame's quality it applies omitted terms (shadows, highlights) and the filter; it is exact where a setting trades
-//! precision for speed. It shares with the fast path only the scene, the cleaned triangles and the sRGB encoding; all else is
-//! computed from the equations of the model of light, to be compared with them.
+//! precision for speed. It shares with the fast path only the scene, the cleaned triangles, the sRGB encoding and on request the
+//! points of lights; all else is computed from the equations of the model of light, to be compared with them.
 //!
 //! ```text
 //!   flatten      the scene as a list of primitives
@@ -12,6 +12,8 @@
 //!   visibility   closest hits, and the light that passes between two points
 //!   surface      the point that a ray hits
 //!   texture      texture lookups
+//!   pyramid      textures in ever smaller sizes
+//!   footprint    texture lookups over the part of a surface that a sample shows
 //!   material     colours and tilted normals of a surface point
 //!   terminator   where shadow rays start
 //!   extent       the share of a light that arrives, also of one with a radius
@@ -30,8 +32,10 @@ mod bounce;
 mod camera;
 mod extent;
 mod flatten;
+mod footprint;
 mod material;
 mod optics;
+mod pyramid;
 mod shading;
 mod shape;
 mod sky;
@@ -48,10 +52,12 @@ use glam::DVec3;
 
 use crate::image::RgbImage;
 use crate::intersect::{RayHit, RaySegment};
+use crate::light::extent::Sets;
 use crate::mesh::CompiledMesh;
-use crate::scene::{FrameView, Scene};
+use crate::scene::{Filter, FrameView, Light, Scene, TextureMap};
 use crate::srgb;
 use crate::texture::Texture;
+use pyramid::Level;
 use shape::Primitive;
 use visibility::Found;
 
@@ -66,6 +72,8 @@ pub struct Oracle {
     primitives: Vec<Primitive>,
     /// Points on each light: see [`Oracle::with_light_points`].
     light_points: Vec<Vec<Vec<DVec3>>>,
+    /// The levels of each texture; none if no texture is filtered by them.
+    pyramids: Vec<Vec<Level>>,
     size: f64,
 }
 
@@ -80,8 +88,12 @@ impl Oracle {
     ) -> Self {
         let primitives = flatten::flatten(scene, meshes, view);
         let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
+        let filter_of = |map: &TextureMap| view.quality.filter.unwrap_or(map.filter);
+        let trilinear = scene.textures.iter().any(|map| filter_of(map) == Filter::Trilinear);
+        let pyramids =
+            textures.iter().filter(|_| trilinear).map(|texture| pyramid::levels(texture)).collect();
         let (scene, textures) = (scene.clone(), textures.to_vec());
-        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), size }
+        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), pyramids, size }
     }
 
     /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,
@@ -90,6 +102,17 @@ impl Oracle {
     #[must_use]
     pub fn with_light_points(self, light_points: Vec<Vec<Vec<DVec3>>>) -> Self {
         Self { light_points, ..self }
+    }
+
+    /// As [`Oracle::with_light_points`], with the points of the direct integrator: the noise of both pictures is then the same.
+    #[must_use]
+    pub fn with_points_of_integrator(self) -> Self {
+        let sets_of = |light: &Light| {
+            let sets = Sets::of(light.shadow_samples.unwrap_or(self.view.quality.shadow_samples).max(1));
+            (0..sets.count()).map(|set| sets.points(set).to_vec()).collect()
+        };
+        let light_points = self.scene.lights.iter().map(sets_of).collect();
+        self.with_light_points(light_points)
     }
 
     /// Linear RGB of a pixel: the mean over its samples.

@@ -33,7 +33,7 @@ impl Oracle {
             SkyPicture::Panorama(texture) => {
                 let u = 0.5 + libm::atan2(d.x, -d.z) / (2.0 * PI);
                 let from_top = libm::acos(d.y.clamp(-1.0, 1.0)) / PI;
-                self.sky_texel(texture, DVec2::new(u, from_top), Border::Repeated)
+                self.sky_texel(texture, DVec2::new(u, from_top), Border::Cyclic)
             }
             SkyPicture::Cubemap(faces) => {
                 let (face, place) = cube_face(d);

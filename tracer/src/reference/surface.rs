@@ -14,6 +14,8 @@ pub(super) struct SurfacePoint {
     pub direction: DVec3,
     /// Length of the ray.
     pub way: f64,
+    /// Length of the way before the ray: see [`Ray::before`].
+    pub before: f64,
     /// Place of the ray's sample: see [`Ray::place`].
     pub place: usize,
     /// Geometric unit normal on the side of the ray.
@@ -30,6 +32,8 @@ pub(super) struct SurfacePoint {
     pub material_index: u32,
     /// Texture coordinates.
     pub uv: DVec2,
+    /// Derivatives of the point by u and by v.
+    pub tangents: [DVec3; 2],
     /// Interpolated vertex colour.
     pub vertex_color: DVec3,
     /// Distance from the point within which other surfaces coincide with this one; 0 if there are none.
@@ -39,7 +43,7 @@ pub(super) struct SurfacePoint {
 impl Oracle {
     /// The point that a ray hits.
     pub(super) fn surface(&self, ray: Ray, starts_on: Option<usize>) -> Option<SurfacePoint> {
-        let Ray { origin, direction, place } = ray;
+        let Ray { origin, direction, place, before } = ray;
         let found = self.closest(origin, direction, f64::INFINITY, starts_on)?;
         let primitive = &self.primitives[found.primitive];
         let hit = &found.crossing;
@@ -52,6 +56,7 @@ impl Oracle {
             position,
             direction,
             way: hit.t,
+            before,
             place,
             ng,
             ns,
@@ -60,10 +65,11 @@ impl Oracle {
             front: behind == hit.mirrored,
             material_index: primitive.material,
             uv: hit.uv,
+            tangents: hit.tangents,
             vertex_color: hit.color,
             coincidence: found.coincidence,
         };
-        Some(SurfacePoint { ns: self.mapped_normal(&surface, hit.tangents), ..surface })
+        Some(SurfacePoint { ns: self.mapped_normal(&surface), ..surface })
     }
 }
 

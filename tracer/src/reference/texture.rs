@@ -11,7 +11,7 @@ use crate::texture::Texture;
 #[derive(Clone, Copy)]
 pub(super) enum Border {
     /// The picture repeated.
-    Repeated,
+    Cyclic,
     /// The outermost texel.
     Clamped,
     /// The picture repeated, every second time reflected.
@@ -22,7 +22,7 @@ impl Border {
     /// The texel at an index inside or outside of a picture with `size` texels.
     pub(super) fn index(self, index: f64, size: f64) -> f64 {
         match self {
-            Border::Repeated => index.rem_euclid(size),
+            Border::Cyclic => index.rem_euclid(size),
             Border::Clamped => index.clamp(0.0, size - 1.0),
             Border::Reflected => {
                 let pair = index.rem_euclid(2.0 * size);
@@ -49,8 +49,7 @@ impl Oracle {
         self.look_up(map, uv, shares).map(DVec4::truncate)
     }
 
-    /// The filtered values of a texture's texels. Texel (i, j), counted from the bottom left, has its centre at
-    /// ((i + 1/2) / width, (j + 1/2) / height).
+    /// The filtered values of a texture's texels. The trilinear filter is the bilinear one.
     fn look_up(
         &self,
         map: TextureMap,
@@ -58,35 +57,61 @@ impl Oracle {
         value: impl Fn(&Texture, u32, u32) -> DVec4,
     ) -> Option<DVec4> {
         let texture = self.textures.iter().find(|texture| texture.id() == map.texture)?;
-        let (width, height) = (f64::from(texture.width()), f64::from(texture.height()));
-        let border = match map.tiling.wrap {
-            Wrap::Repeat => Border::Repeated,
+        let size = [texture.width(), texture.height()];
+        let value = |i, j| value(texture, i, j);
+        Some(match self.view.quality.filter.unwrap_or(map.filter) {
+            Filter::Nearest => nearest(&map, size, uv, value),
+            Filter::Bilinear | Filter::Trilinear => bilinear(&map, size, uv, value),
+        })
+    }
+}
+
+impl Border {
+    fn of(map: &TextureMap) -> Self {
+        match map.tiling.wrap {
+            Wrap::Repeat => Border::Cyclic,
             Wrap::Clamp => Border::Clamped,
             Wrap::Mirror => Border::Reflected,
-        };
-        let value_of =
-            |i: f64, j: f64| value(texture, border.index(i, width) as u32, border.index(j, height) as u32);
-        let uv = uv * map.tiling.scale.as_dvec2() + map.tiling.offset.as_dvec2();
-        let (x, y) = (uv.x * width, uv.y * height);
-        if self.view.quality.filter.unwrap_or(map.filter) == Filter::Nearest {
-            return Some(value_of(x.floor(), y.floor()));
         }
-        let (left, bottom) = ((x - 0.5).floor(), (y - 0.5).floor());
-        let mut sum = DVec4::ZERO;
-        for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            let (i, j) = (left + i, bottom + j);
-            let weight = (1.0 - (x - 0.5 - i).abs()) * (1.0 - (y - 0.5 - j).abs());
-            sum += value_of(i, j) * weight;
-        }
-        Some(sum)
     }
+}
+
+/// The place of texture coordinates in a picture, in texels from its bottom left corner.
+fn place(map: &TextureMap, [width, height]: [u32; 2], uv: DVec2) -> DVec2 {
+    let uv = uv * map.tiling.scale.as_dvec2() + map.tiling.offset.as_dvec2();
+    uv * DVec2::new(f64::from(width), f64::from(height))
+}
+
+/// The value of the texel that contains a place.
+fn nearest(map: &TextureMap, size: [u32; 2], uv: DVec2, value: impl Fn(u32, u32) -> DVec4) -> DVec4 {
+    let (at, border, [width, height]) = (place(map, size, uv).floor(), Border::of(map), size.map(f64::from));
+    value(border.index(at.x, width) as u32, border.index(at.y, height) as u32)
+}
+
+/// The mean of the four texels around a place. Texel (i, j), counted from the bottom left, has its centre at
+/// ((i + 1/2) / width, (j + 1/2) / height).
+pub(super) fn bilinear(
+    map: &TextureMap,
+    size: [u32; 2],
+    uv: DVec2,
+    value: impl Fn(u32, u32) -> DVec4,
+) -> DVec4 {
+    let (border, [width, height]) = (Border::of(map), size.map(f64::from));
+    let from_centers = place(map, size, uv) - 0.5;
+    let first = from_centers.floor();
+    let mut sum = DVec4::ZERO;
+    for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+        let (i, j) = (first.x + i, first.y + j);
+        let weight = (1.0 - (from_centers.x - i).abs()) * (1.0 - (from_centers.y - j).abs());
+        sum += value(border.index(i, width) as u32, border.index(j, height) as u32) * weight;
+    }
+    sum
 }
 
 /// Linear RGB of the texel in column `i`, from the left, of row `j`, from the bottom.
 pub(super) fn linear_texel(texture: &Texture, i: u32, j: u32) -> DVec3 {
     if texture.is_linear() {
-        DVec3::from_array(texture.linear_texel(i, j).map(f64::from))
-    } else {
-        DVec3::from_array(texture.texel(i, j).map(srgb::decode))
+        return DVec3::from_array(texture.linear_texel(i, j).map(f64::from));
     }
+    DVec3::from_array(texture.texel(i, j).map(srgb::decode))
 }

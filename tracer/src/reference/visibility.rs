@@ -49,7 +49,7 @@ impl Oracle {
         for other in hits.iter().filter(|other| other.0 != nearest.0) {
             let error = self.error_of(origin, direction, [nearest, other]);
             let speed = [nearest, other].map(|(_, hit)| hit.normal.dot(direction).abs());
-            // As near as rounding may have moved them apart, across the surface that the ray crosses faster.
+            // Apart by at most what rounding may move them, across the surface that the ray crosses faster.
             if (nearest.1.t - other.1.t).abs() * speed[0].max(speed[1]) <= error {
                 coincidence = coincidence.max(error);
                 seen = if key(other) < key(seen) { other } else { seen };

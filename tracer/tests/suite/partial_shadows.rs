@@ -112,7 +112,8 @@ fn a_penumbra_has_the_width_and_the_profile_of_similar_triangles() {
                 sums[column] += share[0] / f64::from(SIDE);
             }
             if samples == 4 {
-                assert!(sums.is_sorted_by(|a, b| *a <= b + 1e-9), "not ascending: {sums:?}");
+                // Up to the rounding to bytes.
+                assert!(sums.is_sorted_by(|a, b| *a <= b + 0.005), "not ascending: {sums:?}");
             }
         }
     }

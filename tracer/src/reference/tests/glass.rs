@@ -101,6 +101,40 @@ fn bodies_in_bodies_absorb_each_on_its_own_part() {
     assert_near(seen(&scene, DVec3::Z * -0.75, DVec3::NEG_Z), DVec3::splat(expected), 1e-9, "from inside");
 }
 
+/// Bodies that touch: their surfaces coincide, and rays enter the one as they leave the other.
+#[test]
+fn light_passes_from_body_to_body_where_they_touch() {
+    let absorption = [0.5_f32, 0.25];
+    let body = |ior, absorption| Material { absorption: Vec3::splat(absorption), ..glass(ior) };
+    for indices in [[1.5, 1.25], [1.25, 1.5], [1.5, 1.5]] {
+        let mut scene = empty();
+        scene.materials =
+            vec![body(indices[0], absorption[0]), body(indices[1], absorption[1]), marker(COLOR)];
+        let at = |y: f64, normal: DVec3, material| plane(DVec3::Y * y, normal, material);
+        scene.planes = vec![
+            at(0.0, DVec3::Y, 0),
+            at(-1.0, DVec3::NEG_Y, 0),
+            at(-1.0, DVec3::Y, 1),
+            at(-2.0, DVec3::NEG_Y, 1),
+        ];
+        let direction = DVec3::new(0.6, -0.8, 0.0);
+        let (mut aside, mut left) = (0.0, 1.0);
+        for (ior, share) in indices.into_iter().zip(absorption) {
+            let (s, c) = inside(0.6, ior);
+            aside += s / c;
+            left *= libm::pow(f64::from(share), 1.0 / c);
+        }
+        scene.spheres = vec![sphere(DVec3::new(aside, -2.0, 0.0) + direction, 1e-6, 2)];
+        for turned in [false, true] {
+            if turned {
+                scene.planes.reverse();
+            }
+            let found = seen(&scene, -direction, direction);
+            assert_near(found, COLOR.as_dvec3() * left, 1e-9, &format!("{indices:?}, turned {turned}"));
+        }
+    }
+}
+
 /// A ray at 60 degrees in glass never leaves it: each of its hits adds the ambient light once.
 #[test]
 fn total_internal_reflection_ends_at_max_depth() {

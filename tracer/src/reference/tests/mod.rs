@@ -6,10 +6,12 @@
 //!   shadows   penumbrae, transparent occluders, smooth surfaces
 //!   cameras   rays of the camera
 //!   skies     pictures all around
+//!   filters   textures of far surfaces
 //!   patterns  texture coordinates, checkers, normal maps, pictures without light
 //! ```
 
 mod cameras;
+mod filters;
 mod glass;
 mod mirrors;
 mod patterns;
