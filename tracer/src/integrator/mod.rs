@@ -1,7 +1,7 @@
 //! Rendering: rows of a frame as pixels.
 //!
 //! ```text
-//!   direct     a tile of rays, from its hits to its colours: direct light, shadows, emission
+//!   direct     a tile of rays, from its hits to its colours: direct light, shadows, emission, bounces, background
 //!   regular    bands of tiles with the same samples in every pixel
 //!   adaptive   bands of tiles with few samples where the picture is smooth, all of them elsewhere
 //!   stage      the stages of a tile, for benchmarks

@@ -8,6 +8,8 @@
 //!   alpha             what alpha cuts out and hides
 //!   shared_exponent   linear RGB in four bytes, for high dynamic range
 //!   map               filter, wrap, scale and offset of a lookup
+//!   lookup            single lookups in f64, of alpha and normals
+//!   pyramid           smaller and smaller sizes, for surfaces far away
 //!   uv                texture coordinates with and without whole repeats
 //! ```
 

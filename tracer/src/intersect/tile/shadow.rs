@@ -26,8 +26,8 @@ pub(crate) struct Occlusion {
 }
 
 impl ShadowTile<'_> {
-    /// Bits of the live points that are occluded, and of others with a surface in their way that light may pass. A function of its own on each level: all kinds of shadows call the same one,
-    /// because it takes long to compile.
+    /// Bits of the live points that are occluded, and of others with a surface in their way that light may pass. A function of its
+    /// own on each level: all kinds of shadows call the same one, because it takes long to compile.
     #[inline(never)]
     pub(crate) fn occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Occlusion {
         simd.vectorize(
