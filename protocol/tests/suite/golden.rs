@@ -26,8 +26,8 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 }
 
 #[test]
-fn the_golden_bytes_are_those_of_version_4() {
-    assert_eq!(PROTOCOL_VERSION, 4);
+fn the_golden_bytes_are_those_of_version_5() {
+    assert_eq!(PROTOCOL_VERSION, 5);
 }
 
 #[tokio::test]

@@ -157,7 +157,7 @@ fn knobs_of_the_scene_and_of_the_command_line_have_the_same_effect() {
         assert_eq!(report["rays_per_frame"]["shadow"], 0);
         let quality = serde_json::json!({
             "adaptive": false, "shadows": false, "shading": "diffuse", "filter": null, "exponent": "fast", "colors": "exact", "scale": 1.0,
-            "dither": false
+            "dither": false, "depth": 5, "min_contribution": 0.004, "shadow_samples": 16, "terminator": true
         });
         assert_eq!(report["quality"], quality);
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{Effort, Subject};
 use crate::reference::Oracle;
-use crate::scene::FrameView;
+use crate::scene::{FrameView, Light, SceneFeatures};
 
 /// Distance in pixels within which a pixel counts as being at an edge: the oracle's colours there bracket the
 /// compared colour. The fast path shades points that are rounded to `f32`, to 2^-24 of their distance: in a picture
@@ -48,7 +48,8 @@ pub(super) struct Comparison {
 
 /// Compares pixels of a scene's picture with the oracle's. A channel may differ by one step of the encoding.
 pub(super) fn compare(subject: &Subject, view: &FrameView, picture: &[u8], pixels: &[usize]) -> Comparison {
-    let oracle = Oracle::new(&subject.scene, &subject.meshes, &subject.textures, view);
+    let oracle =
+        Oracle::new(&subject.scene, &subject.meshes, &subject.textures, view).with_points_of_integrator();
     let compared = |&pixel: &usize| {
         let found = [0, 1, 2].map(|channel| picture[pixel * 3 + channel]);
         let (x, y) = (pixel as u32 % view.width, pixel as u32 / view.width);
@@ -87,8 +88,18 @@ pub(super) fn affordable(subject: &Subject, effort: &Effort) -> usize {
     let triangles_of =
         |id| subject.meshes.iter().find(|mesh| mesh.id() == id).map_or(0, |mesh| mesh.triangle_count());
     let in_models: usize = scene.models.iter().map(|model| triangles_of(model.mesh)).sum();
-    let primitives = in_models + scene.spheres.len() + scene.planes.len() + scene.triangles.len();
-    let rays = 1 + scene.lights.len();
+    let primitives =
+        in_models + scene.spheres.len() + scene.disks.len() + scene.planes.len() + scene.triangles.len();
+    let quality = scene.render.quality;
+    let points = |light: &Light| match light.shadow_samples {
+        _ if light.radius == 0.0 => 1,
+        Some(samples) => usize::from(samples),
+        None => usize::from(quality.shadow_samples),
+    };
+    let of_surface = 1 + scene.lights.iter().map(points).sum::<usize>();
+    // Few samples have more surfaces along their ways, unless nearly all materials bounce.
+    let surfaces = if SceneFeatures::of(scene).bounces { 1 + usize::from(quality.max_depth) } else { 1 };
+    let rays = of_surface * surfaces;
     (effort.oracle_work / (primitives.max(1) * rays) as u64).clamp(16, 4096) as usize
 }
 

@@ -29,7 +29,7 @@ fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
     let frame = PreparedFrame::new(compiled, &view).unwrap();
     let mut pixels = vec![0; (WIDTH * HEIGHT * 3) as usize];
     render_rows(&frame, 0..HEIGHT, &mut pixels, &|| false).unwrap();
-    let oracle = Oracle::new(scene, &loaded.meshes, &loaded.textures, &view);
+    let oracle = Oracle::new(scene, &loaded.meshes, &loaded.textures, &view).with_points_of_integrator();
     let differs = |&i: &u32| {
         let expected = oracle.encoded_pixel(i % WIDTH, i / WIDTH);
         pixels[i as usize * 3..][..3].iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 1)
@@ -131,4 +131,19 @@ fn the_instances_match_the_oracle() {
 #[test]
 fn the_product_matches_the_oracle() {
     check("product.toml", 199);
+}
+
+#[test]
+fn the_table_matches_the_oracle() {
+    check("table.toml", 701);
+}
+
+#[test]
+fn the_showroom_matches_the_oracle() {
+    check("showroom.toml", 701);
+}
+
+#[test]
+fn the_room_with_soft_shadows_matches_the_oracle() {
+    check("room-soft.toml", 1201);
 }
