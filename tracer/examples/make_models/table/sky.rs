@@ -50,9 +50,9 @@ fn color(azimuth: f64, elevation: f64) -> DVec3 {
     let sky = sky(azimuth, elevation.max(0.0), ahead);
     let sea = sea(azimuth, elevation.min(0.0), ahead);
     let open = sea.lerp(sky, smooth_step(-0.25, 0.25, elevation));
-    LAND.iter().fold(open, |behind, &(middle, half, height, color)| {
+    LAND.iter().zip(0..).fold(open, |behind, (&(middle, half, height, color), index)| {
         let place = (azimuth - middle) / half;
-        let rough = octaves(1700 + height.to_bits() % 97, 4, DVec3::new(azimuth * 0.22 + 40.0, 0.5, 0.5));
+        let rough = octaves(1700 + 10 * index, 4, DVec3::new(azimuth * 0.22 + 40.0, 0.5, 0.5));
         let top = height * (1.0 - place * place).max(0.0) * (0.45 + 1.1 * rough);
         let covered = smooth_step(top + 0.35, top - 0.35, elevation) * smooth_step(-0.4, 0.1, elevation);
         // Mist at the foot.
