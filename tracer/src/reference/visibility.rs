@@ -111,6 +111,9 @@ impl Oracle {
 
     /// Whether a primitive is present at a hit: not cut out by alpha.
     fn is_present(&self, primitive: &Primitive, hit: &Crossing) -> bool {
+        if !matches!(primitive.shape, Shape::Triangle { .. }) {
+            return true;
+        }
         let cutout = self.scene.materials[primitive.material as usize].cutout;
         // Half of 255 is between two bytes.
         cutout.is_none_or(|index| self.texel(self.scene.textures[index as usize], hit.uv).w >= 0.5)

@@ -35,7 +35,8 @@ pub(crate) struct TileContext<'a, W> {
 }
 
 impl<'a, W: Watch> TileContext<'a, W> {
-    /// A context without a tile. `cancelled` is polled once a tile.
+    /// A context without a tile. `cancelled` is polled once a tile. Inlined: it is too large to be copied for each band.
+    #[inline(always)]
     pub(crate) fn new(frame: &'a PreparedFrame, cancelled: &'a dyn Fn() -> bool, watch: &'a mut W) -> Self {
         Self {
             frame,

@@ -96,6 +96,7 @@ fn assemble(
     let (maps, textures, notes) = models.textures.take_parts();
     scene.textures = maps;
     models.warnings.extend(notes);
+    models.warnings.extend(uncut(&scene));
     let meshes = models.take_meshes();
     let file_of = |mesh: &Arc<CompiledMesh>| {
         let mut files = scene.models.iter().zip(&text.models);
@@ -115,6 +116,19 @@ fn assemble(
         scene.lights.push(framing::default_light(&scene.camera));
     }
     Ok(LoadedScene { scene, meshes, mesh_files, textures, warnings: Vec::new() })
+}
+
+/// A warning if alpha cuts out a material of a sphere or a plane, which have no holes.
+fn uncut(scene: &Scene) -> Option<String> {
+    let of_spheres = scene.spheres.iter().map(|sphere| sphere.material);
+    let of_planes = scene.planes.iter().map(|plane| plane.material);
+    let is_cut = |index: u32| scene.materials.get(index as usize).is_some_and(|m| m.cutout.is_some());
+    let count = of_spheres.chain(of_planes).filter(|&index| is_cut(index)).count();
+    (count > 0).then(|| {
+        format!(
+            "{count} spheres and planes have a texture with transparent texels, which cut out triangles only"
+        )
+    })
 }
 
 /// Loads the textures of the scene file's own materials, as far as these are assigned to geometry.

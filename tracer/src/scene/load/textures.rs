@@ -58,14 +58,12 @@ impl Textures {
 
     /// Adds the picture file of a panorama, or of a face of a cube map, to the scene's list of textures. The error is a message that
     /// names the picture.
-    #[allow(dead_code)]
     pub(super) fn add_sky(&mut self, picture: &Path) -> Result<u32, String> {
         let texture = self.load(picture, Use::Sky)?;
         Ok(self.list(&texture, Filter::Bilinear, Tiling::default()))
     }
 
     /// Width and height of a texture in the scene's list; `None` if the index is out of range.
-    #[allow(dead_code)]
     pub(super) fn size(&self, index: u32) -> Option<(u32, u32)> {
         let id = self.maps.get(index as usize)?.texture;
         let texture = self.loaded.values().flatten().find(|texture| texture.id() == id)?;
