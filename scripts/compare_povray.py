@@ -25,7 +25,8 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from povray import pictures, scenes  # noqa: E402  (in the folder of this file)
 
 COLUMNS = (
-    "scene", "mean", "RMSE", "above 1", "above 2", "above 8", "smooth", "mean there", "largest there", "worst region",
+    "scene", "mean", "RMSE", "above 0", "above 1", "above 2", "above 8", "smooth", "mean there", "largest there",
+    "worst region",
 )  # fmt: skip
 
 
@@ -93,12 +94,12 @@ def render(scene, folder, rayfarm, povray, width, height):
 
 def row(name, difference):
     """A line of the table."""
-    one, two, eight = (f"{100 * share:.2f} %" for share in difference.above)
+    above = (f"{100 * share:.4f} %" for share in difference.above)
     x, y = difference.smooth_place
     left, top = difference.region
     cells = (
-        name, f"{difference.mean:.3f}", f"{difference.rmse:.2f}", one, two, eight, f"{100 * difference.smooth_share:.1f} %",
-        f"{difference.smooth_mean:+.3f}", f"{difference.smooth_largest} at ({x}, {y})",
+        name, f"{difference.mean:.4f}", f"{difference.rmse:.3f}", *above, f"{100 * difference.smooth_share:.1f} %",
+        f"{difference.smooth_mean:+.4f}", f"{difference.smooth_largest} at ({x}, {y})",
         f"{difference.region_mean:.2f} at ({left}, {top})",
     )  # fmt: skip
     return "| " + " | ".join(cells) + " |"

@@ -67,7 +67,7 @@ class Difference:
 
     mean: float  # of the channels, absolute
     rmse: float
-    # Share of the pixels that differ by more than 1, 2 and 8 steps.
+    # Share of the pixels that differ by more than 0, 1, 2 and 8 steps.
     above: tuple
     # Of pixels that are at no edge in either picture: their share, their signed mean, the largest difference, and its place.
     smooth_share: float
@@ -120,7 +120,7 @@ def compare(one, other, factor=16):
     return Difference(
         mean=sum(steps) / len(steps),
         rmse=math.sqrt(sum(step * step for step in steps) / len(steps)),
-        above=tuple(sum(step > limit for step in largest) / count for limit in (1, 2, 8)),
+        above=tuple(sum(step > limit for step in largest) / count for limit in (0, 1, 2, 8)),
         smooth_share=len(smooth) / count,
         smooth_mean=sum(sum(signed[3 * index : 3 * index + 3]) for index in smooth) / max(3 * len(smooth), 1),
         smooth_largest=largest[place] if smooth else 0,

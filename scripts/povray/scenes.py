@@ -44,8 +44,8 @@ class Scene:
         return "\n".join(tables)
 
     def pov(self, width, height):
-        # Colours are linear. A surface has its ambient, diffuse, reflected and transmitted light, and no highlight.
-        finish = f"ambient rgb {pov_vector(self.ambient)} diffuse 1 phong 0 specular 0"
+        # Colours are linear. Without `specular`, a surface has no highlight.
+        finish = f"ambient rgb {pov_vector(self.ambient)} diffuse 1"
         trace = f"max_trace_level {MAX_DEPTH + 1} adc_bailout {MIN_CONTRIBUTION:g}"
         gradient = f"gradient y color_map {{ [0 color rgb {pov_vector(self.bottom)}] [1 color rgb {pov_vector(self.top)}] }}"
         lines = [
@@ -60,11 +60,11 @@ class Scene:
 
 
 def mirror():
-    """Two coloured balls between a mirror floor and a tilted, coloured mirror that reflect each other."""
+    """Two coloured balls with highlights between a mirror floor and a tilted, coloured mirror that reflect each other."""
     floor = Material("floor", diffuse=Checker(((0.30, 0.30, 0.28), (0.04, 0.06, 0.09)), 0.9), reflect=(0.5, 0.5, 0.5))
     silver = Material("silver", diffuse=(0.02, 0.02, 0.03), reflect=(0.85, 0.80, 0.70))
-    red = Material("red", diffuse=(0.75, 0.12, 0.08))
-    blue = Material("blue", diffuse=(0.08, 0.20, 0.60), reflect=(0.15, 0.15, 0.15))
+    red = Material("red", diffuse=(0.75, 0.12, 0.08), specular=0.4, exponent=40.0)
+    blue = Material("blue", diffuse=(0.08, 0.20, 0.60), specular=0.4, exponent=150.0, reflect=(0.15, 0.15, 0.15))
     return Scene(
         name="mirror",
         camera=Camera(position=(0.3, 1.9, 5.2), look_at=(0.0, 0.9, 0.0), fov=46.0),
@@ -85,16 +85,18 @@ def mirror():
 
 
 def glass():
-    """A glass ball that also reflects, a glass box and a ball with a bubble, in front of checkers and a bar.
+    """Glass in front of checkers and a bar: a grey ball that reflects a constant share, a box that reflects by Fresnel's
+    equations, and a green ball with a bubble.
 
-    The box and the bubble reflect totally. Their glass transmits all light, because the programs differ in the weight of a total
+    The box and the bubble reflect totally. Their glass has `transmit` = 1, because the programs differ in the weight of a total
     reflection: `transmit` in rayfarm, 1 in POV-Ray.
     """
     floor = Material("floor", diffuse=Checker(((0.75, 0.72, 0.65), (0.12, 0.16, 0.20)), 0.6))
     wall = Material("wall", diffuse=Checker(((0.70, 0.30, 0.15), (0.80, 0.78, 0.70)), 0.75))
     bar = Material("bar", diffuse=(0.10, 0.45, 0.20))
     polished = Material("polished", reflect=(0.08, 0.08, 0.08), transmit=0.9)
-    clear = Material("clear", transmit=1.0)
+    clear = Material("clear", reflect=(1.0, 1.0, 1.0), transmit=1.0, fresnel=True)
+    green = Material("green", transmit=1.0, absorption=(0.45, 0.85, 0.60))
     return Scene(
         name="glass",
         camera=Camera(position=(0.2, 1.7, 5.5), look_at=(0.0, 0.85, 0.0), fov=46.0),
@@ -105,7 +107,7 @@ def glass():
             Box((-2.6, 0.0, -1.9), (2.6, 0.35, -1.5), bar, rotate=(0.0, 6.0, 0.0)),
             Sphere((-1.15, 1.0, 0.3), 0.95, polished),
             Box((0.75, 0.1, -0.35), (1.75, 1.3, 0.65), clear, rotate=(0.0, 33.0, 0.0)),
-            Sphere((0.35, 0.52, 1.5), 0.5, clear, bubble=((0.40, 0.55, 1.55), 0.25)),
+            Sphere((0.35, 0.52, 1.5), 0.5, green, bubble=((0.40, 0.55, 1.55), 0.25)),
         ),
         ambient=(0.15, 0.15, 0.15),
         bottom=(0.20, 0.20, 0.20),

@@ -4,6 +4,7 @@ Both have the same coordinates: POV-Ray's vector `right` of the camera is negati
 Rotations are by the same matrices in both.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Optional, Tuple, Union
 
@@ -12,11 +13,11 @@ Color = Tuple[float, float, float]
 
 
 def toml_vector(numbers):
-    return "[" + ", ".join(f"{number:g}" for number in numbers) + "]"
+    return "[" + ", ".join(f"{number:.9g}" for number in numbers) + "]"
 
 
 def pov_vector(numbers):
-    return "<" + ", ".join(f"{number:g}" for number in numbers) + ">"
+    return "<" + ", ".join(f"{number:.9g}" for number in numbers) + ">"
 
 
 def toml_table(name, keys):
@@ -42,36 +43,70 @@ class Checker:
 
 @dataclass(frozen=True)
 class Material:
-    """Shares of light: scattered, reflected, transmitted. Glass casts no shadow: the programs differ in its colour."""
+    """Shares of light: scattered, reflected, transmitted. Highlights are (N.H)^exponent times `specular` in both programs.
+
+    Glass with `absorption` casts no shadow: POV-Ray tints the shadow by both shares, rayfarm by `transmit` alone.
+    """
 
     name: str
     diffuse: Union[Color, Checker] = (0.0, 0.0, 0.0)
+    specular: float = 0.0
+    exponent: float = 50.0
     reflect: Color = (0.0, 0.0, 0.0)
     transmit: float = 0.0
     ior: float = 1.5
+    # Exact shares of reflection and refraction; both are given as 1.
+    fresnel: bool = False
+    # Share that is left after one unit inside.
+    absorption: Optional[Color] = None
+
+    def casts_shadow(self):
+        return self.absorption is None
 
     def toml(self):
         diffuse = self.diffuse.toml() if isinstance(self.diffuse, Checker) else toml_vector(self.diffuse)
         glass = self.transmit > 0.0
         keys = {
             "diffuse": diffuse,
+            "specular": toml_vector([self.specular] * 3) if self.specular else None,
+            "exponent": f"{self.exponent:g}" if self.specular else None,
             "reflect": toml_vector(self.reflect) if any(self.reflect) else None,
             "transmit": f"{self.transmit:g}" if glass else None,
             "ior": f"{self.ior:g}" if glass else None,
-            "casts_shadow": "false" if glass else None,
+            "fresnel": "true" if self.fresnel else None,
+            "absorption": toml_vector(self.absorption) if self.absorption else None,
+            "casts_shadow": None if self.casts_shadow() else "false",
         }
         return toml_table(f"[material.{self.name}]", keys)
 
     def pov(self):
-        """Modifiers of an object. `finish` has the diffuse factor 1 by default, and no highlight: see `Scene.pov`."""
+        """Modifiers of an object. The default `finish` is in `Scene.pov`."""
+        return f"pigment {{ {self.pov_pigment()} }}{self.pov_finish()}{self.pov_interior()}"
+
+    def pov_pigment(self):
         if self.transmit > 0.0:
-            # The pigment's colour does not tint what is transmitted (unlike with `filter`), and 1 - transmit scales its diffuse light.
-            pigment = f"rgbt <0, 0, 0, {self.transmit:g}>"
-        else:
-            pigment = self.diffuse.pov() if isinstance(self.diffuse, Checker) else f"color rgb {pov_vector(self.diffuse)}"
-        reflection = f" finish {{ reflection {{ rgb {pov_vector(self.reflect)} }} }}" if any(self.reflect) else ""
-        glass = f" interior {{ ior {self.ior:g} }} no_shadow" if self.transmit > 0.0 else ""
-        return f"pigment {{ {pigment} }}{reflection}{glass}"
+            # The colour of the pigment does not tint what `transmit` lets through: that is for `filter`.
+            return f"color rgbt <0, 0, 0, {self.transmit:g}>"
+        return self.diffuse.pov() if isinstance(self.diffuse, Checker) else f"color rgb {pov_vector(self.diffuse)}"
+
+    def pov_finish(self):
+        parts = []
+        if self.specular:
+            parts.append(f"specular {self.specular:g} roughness {1.0 / self.exponent:.9g}")
+        if self.fresnel:
+            # `conserve_energy` multiplies the transmitted light by 1 - the reflected share.
+            parts.append("reflection { 0, 1 fresnel on } conserve_energy")
+        elif any(self.reflect):
+            parts.append(f"reflection {{ rgb {pov_vector(self.reflect)} }}")
+        return f" finish {{ {' '.join(parts)} }}" if parts else ""
+
+    def pov_interior(self):
+        if self.transmit == 0.0:
+            return ""
+        # A fade_power from 1000 is exponential: exp((c - 1) d) of a colour c is left after the distance d.
+        color = [1.0 + math.log(share) for share in self.absorption or ()]
+        fade = f" fade_distance 1 fade_power 1001 fade_color rgb {pov_vector(color)}" if color else ""
+        return f" interior {{ ior {self.ior:g}{fade} }}{'' if self.casts_shadow() else ' no_shadow'}"
 
 
 @dataclass(frozen=True)
