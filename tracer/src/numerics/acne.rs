@@ -1,6 +1,5 @@
 //! Shadow acne and light leaks at surfaces: pixels compared with the oracle's, under the scene's own lights and under
 //! grazing light.
-//! under light that grazes.
 
 use glam::{DVec3, Vec3};
 

@@ -14,6 +14,9 @@ use crate::scene::{FrameView, Light, SceneFeatures};
 /// of 16384 pixels that is 2^-10 of one.
 const NEXT_TO: f64 = 1.0 / 1024.0;
 
+/// The same distance where curved mirrors or glass magnify the rounding.
+const NEXT_TO_BENT: f64 = 1.0 / 128.0;
+
 /// The same distance at the edge of a shadow, where grazing light magnifies the rounding of the point.
 const NEXT_TO_SHADOW: f64 = 1.0 / 16.0;
 
@@ -132,5 +135,5 @@ pub(super) fn is_between(found: [u8; 3], around: [[u8; 3]; 8], center: [u8; 3]) 
 fn around(center: DVec2) -> impl Iterator<Item = [DVec2; 8]> {
     let steps = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)];
     let ring = move |away: f64| steps.map(|(x, y)| center + DVec2::new(f64::from(x), f64::from(y)) * away);
-    [NEXT_TO, NEXT_TO_SHADOW].into_iter().map(ring)
+    [NEXT_TO, NEXT_TO_BENT, NEXT_TO_SHADOW].into_iter().map(ring)
 }
