@@ -49,7 +49,7 @@ fn shares_out_of_range_are_refused_with_their_place() {
         ("fresnel = 1", "2:11", &["true or false"]),
         ("thin = 0", "2:8", &["true or false"]),
         ("casts_shadow = \"no\"", "2:16", &["true or false"]),
-        ("transmitt = 1", "2:1", &["did you mean `transmit`?"]),
+        ("transmits = 1", "2:1", &["did you mean `transmit`?"]),
     ] {
         assert_faults(&[(&format!("{head}{key}"), place, words)]);
     }
