@@ -42,7 +42,11 @@ fn mistakes_in_a_scene_are_reported_with_line_and_remedy() {
         ("fov = 45.0", "kind = \"fish\"", &["changed.toml:", "fisheye"]),
         ("exponent = 30.0", "reflect = 1.5", &["changed.toml:", "reflect"]),
         ("exponent = 30.0", "roughness = 0.5", &["changed.toml:", "roughness"]),
-        ("diffuse = [0.7, 0.4, 0.3]", "diffuse = { texture = \"clay.png\" }", &["changed.toml:", "clay.png"]),
+        (
+            "diffuse = [0.7, 0.4, 0.3]",
+            "diffuse = { texture = \"clay.png\" }",
+            &["changed.toml:", "[[model]]", "texture"],
+        ),
         ("bumps.obj", "hills.obj", &["hills.obj"]),
         ("[render]", "[render", &["changed.toml:"]),
     ] {
