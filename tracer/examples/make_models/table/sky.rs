@@ -16,8 +16,8 @@ const ZENITH: DVec3 = DVec3::new(0.12, 0.29, 0.62);
 const HORIZON: DVec3 = DVec3::new(0.98, 0.86, 0.70);
 const GLOW: DVec3 = DVec3::new(1.0, 0.72, 0.42);
 const CLOUD: DVec3 = DVec3::new(0.98, 0.93, 0.88);
-const SEA_FAR: DVec3 = DVec3::new(0.30, 0.46, 0.55);
-const SEA_NEAR: DVec3 = DVec3::new(0.020, 0.13, 0.20);
+const SEA_FAR: DVec3 = DVec3::new(0.20, 0.39, 0.52);
+const SEA_NEAR: DVec3 = DVec3::new(0.012, 0.105, 0.175);
 
 /// The direction to the sun, as the scene file has it, not of unit length.
 const SUN: DVec3 = DVec3::new(-0.52, 0.61, -0.60);
@@ -64,7 +64,7 @@ fn color(azimuth: f64, elevation: f64) -> DVec3 {
 fn sky(azimuth: f64, elevation: f64, ahead: f64) -> DVec3 {
     let direction = towards(azimuth, elevation);
     let haze = 1.0 - direction.y;
-    let clear = ZENITH.lerp(HORIZON, haze * haze * haze * haze * haze);
+    let clear = ZENITH.lerp(HORIZON, haze * haze * haze * haze * haze * haze);
     let from_sun = libm::acos(direction.dot(SUN.normalize()).clamp(-1.0, 1.0)).to_degrees();
     let lit = clear + GLOW * (0.55 * libm::exp(-from_sun / 16.0));
     let over = direction / (direction.y + 0.16);
@@ -76,10 +76,10 @@ fn sky(azimuth: f64, elevation: f64, ahead: f64) -> DVec3 {
 
 fn sea(azimuth: f64, elevation: f64, ahead: f64) -> DVec3 {
     let down = -elevation;
-    let calm = SEA_FAR.lerp(SEA_NEAR, smooth_step(0.0, 16.0, down).sqrt());
+    let calm = SEA_FAR.lerp(SEA_NEAR, smooth_step(0.0, 13.0, down).sqrt());
     let swell = octaves(1900, 3, DVec3::new(azimuth * 0.35 + 50.0, 46.0 / (down + 1.6), 0.7)) - 0.5;
     let glitter = libm::exp(-(azimuth + 40.0) * (azimuth + 40.0) / 500.0) * (0.25 + 0.5 * swell.max(0.0));
-    calm * (1.0 + 0.55 * swell * ahead) + GLOW * (0.8 * glitter * smooth_step(14.0, 0.0, down))
+    calm * (1.0 + 0.38 * swell * ahead) + GLOW * (0.5 * glitter * smooth_step(14.0, 0.0, down))
 }
 
 fn towards(azimuth: f64, elevation: f64) -> DVec3 {
