@@ -38,6 +38,8 @@ impl<'a, W: Watch> TileContext<'a, W> {
     /// A context without a tile. `cancelled` is polled once a tile. Inlined: it is too large to be copied for each band.
     #[inline(always)]
     pub(crate) fn new(frame: &'a PreparedFrame, cancelled: &'a dyn Fn() -> bool, watch: &'a mut W) -> Self {
+        // First: what is built before a step that may unwind is built elsewhere, and copied.
+        let bounces = Bounces::for_frame(frame);
         Self {
             frame,
             counts: RayCounts::default(),
@@ -47,7 +49,7 @@ impl<'a, W: Watch> TileContext<'a, W> {
             surfaces: Surfaces::empty(frame),
             tile: tile::Scratch::new(),
             direct: Scratch::new(),
-            bounces: Bounces::for_frame(frame),
+            bounces,
             batch: None,
         }
     }
