@@ -3,11 +3,10 @@
 use super::footprint::Footprint;
 use crate::scene::{Tiling, Wrap};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{
-    LANES, Lanes, Level, Simd, SimdBase, SimdFloat, bits, dispatch, each_bit, f32x16, select, splat, three,
-};
+use crate::simd::{LANES, Lanes, Level, Simd, SimdBase, SimdFloat, bits, dispatch, each_bit, f32x16, splat};
 use crate::srgb;
 use crate::texture::Texture;
+use crate::texture::bilinear::{Axis, mean};
 
 /// The place of a coordinate in a texture: in texels, from 0 to `size`, which rounding may reach.
 #[inline(always)]
@@ -49,32 +48,6 @@ pub(super) fn nearest<S: Simd>(
     Vec3x16::load(simd, &color)
 }
 
-/// The two texels around a position along one axis, and the weight of the second.
-struct Pair<S: Simd> {
-    first: [f32; LANES],
-    second: [f32; LANES],
-    weight: f32x16<S>,
-}
-
-impl<S: Simd> Pair<S> {
-    /// The pair around a position. Texel centres are at whole numbers plus a half; of a repeated texture the first and the last
-    /// texel are neighbours.
-    #[inline(always)]
-    fn around(simd: S, wrap: Wrap, position: f32x16<S>, size: f32x16<S>) -> Self {
-        let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-        let from_center = position - splat(simd, 0.5);
-        let first = from_center.floor();
-        let next = first + one;
-        let last = size - one;
-        let (before, behind) = if wrap == Wrap::Repeat { (last, zero) } else { (zero, last) };
-        Self {
-            first: select(first.simd_lt(zero), before, first).to_array(),
-            second: select(next.simd_lt(size), next, behind).to_array(),
-            weight: from_center - first,
-        }
-    }
-}
-
 /// The four texels around each point, weighted by nearness.
 #[inline(always)]
 pub(super) fn bilinear<S: Simd>(
@@ -99,28 +72,10 @@ fn around<S: Simd>(
     lanes: u32,
     texel: impl Fn(usize, u32, u32) -> [u8; 3],
 ) -> Vec3x16<S> {
-    let columns = Pair::around(simd, wrap, position(simd, wrap, u, width), width);
-    let rows = Pair::around(simd, wrap, position(simd, wrap, v, height), height);
+    let columns = Axis::wrapped(simd, wrap, position(simd, wrap, u, width), width);
+    let rows = Axis::wrapped(simd, wrap, position(simd, wrap, v, height), height);
     let decoded = srgb::decoded();
-    let mut colors = [[Lanes::ZERO; 3]; 4];
-    for lane in each_bit(lanes) {
-        let [x0, x1] = [columns.first[lane] as u32, columns.second[lane] as u32];
-        let [y0, y1] = [rows.first[lane] as u32, rows.second[lane] as u32];
-        for (corner, (x, y)) in [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].into_iter().enumerate() {
-            let texel = texel(lane, x, y);
-            for channel in 0..3 {
-                colors[corner][channel].0[lane] = decoded[usize::from(texel[channel])];
-            }
-        }
-    }
-    let one = splat(simd, 1.0);
-    let [x1, y1] = [columns.weight, rows.weight];
-    let [x0, y0] = [one - x1, one - y1];
-    Vec3x16(three!(i => {
-        let lower = colors[0][i].load(simd) * x0 + colors[1][i].load(simd) * x1;
-        let upper = colors[2][i].load(simd) * x0 + colors[3][i].load(simd) * x1;
-        lower * y0 + upper * y1
-    }))
+    mean(simd, &columns, &rows, lanes, |lane, x, y| texel(lane, x, y).map(|code| decoded[usize::from(code)]))
 }
 
 /// The means of the four texels around each point in the two levels of the texture's pyramid next to the size of the footprint,

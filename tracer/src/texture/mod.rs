@@ -7,6 +7,7 @@
 //!   blob              its bytes
 //!   alpha             what alpha cuts out and hides
 //!   shared_exponent   linear RGB in four bytes, for high dynamic range
+//!   bilinear          the four texels around each of sixteen places
 //!   map               filter, wrap, scale and offset of a lookup
 //!   lookup            single lookups in f64, of alpha and normals
 //!   pyramid           smaller and smaller sizes, for surfaces far away
@@ -14,6 +15,7 @@
 //! ```
 
 mod alpha;
+pub(crate) mod bilinear;
 mod blob;
 mod lookup;
 mod map;

@@ -14,10 +14,10 @@
 //!
 //! The table is that of a left-handed system: seen from the centre, a face is its picture reflected from left to right.
 
-use super::bilinear::{Axis, mean};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Lanes, Simd, SimdBase, bits, each_bit, f32x16, mask_of, select, splat};
 use crate::texture::Texture;
+use crate::texture::bilinear::{Axis, mean};
 
 /// The faces that directions meet, and the places there in [-1, 1].
 struct Meeting<S: Simd> {

@@ -4,10 +4,8 @@
 //!   sky        a picture all around: rotation and strength
 //!   panorama   directions to places in an equirectangular picture
 //!   cubemap    directions to places on the faces of a cube
-//!   bilinear   the four texels around each place
 //! ```
 
-mod bilinear;
 mod cubemap;
 mod panorama;
 mod sky;

@@ -2,11 +2,11 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::bilinear::{Axis, mean};
 use crate::simd::math::atan2;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, SimdFloat, splat};
 use crate::texture::Texture;
+use crate::texture::bilinear::{Axis, mean};
 
 /// Radiance in directions whose largest component is about 1. u = 1/2 + atan2(x, -z) / 2 pi from the left; the angle to +Y is acos(y)
 /// of the unit vector, computed as atan2(sqrt(x^2 + z^2), y), which is precise at the poles as well. Left and right border are

@@ -1,10 +1,11 @@
 //! The four texels around each of sixteen places, weighted by nearness in linear light.
 
+use super::Wrap;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, SimdFloat, each_bit, f32x16, select, splat, three};
 
 /// The two texels around each of sixteen places along one axis of a picture, and the weight of the second.
-pub(super) struct Axis<S: Simd> {
+pub(crate) struct Axis<S: Simd> {
     first: [f32; LANES],
     second: [f32; LANES],
     weight: f32x16<S>,
@@ -14,7 +15,7 @@ impl<S: Simd> Axis<S> {
     /// Places in [0, `size`], in texels: centres of texels are at whole numbers plus a half. The last texel and the first are
     /// neighbours.
     #[inline(always)]
-    pub(super) fn cyclic(simd: S, place: f32x16<S>, size: f32x16<S>) -> Self {
+    pub(crate) fn cyclic(simd: S, place: f32x16<S>, size: f32x16<S>) -> Self {
         let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
         let (below, weight) = below(simd, place);
         let next = below + one;
@@ -25,9 +26,15 @@ impl<S: Simd> Axis<S> {
         }
     }
 
-    /// The same without neighbours across the border, where the nearest texel continues.
+    /// [`Axis::cyclic`] for a repeated texture, [`Axis::clamped`] for others.
     #[inline(always)]
-    pub(super) fn clamped(simd: S, place: f32x16<S>, size: f32x16<S>) -> Self {
+    pub(crate) fn wrapped(simd: S, wrap: Wrap, place: f32x16<S>, size: f32x16<S>) -> Self {
+        if wrap == Wrap::Repeat { Self::cyclic(simd, place, size) } else { Self::clamped(simd, place, size) }
+    }
+
+    /// The same as [`Axis::cyclic`] without neighbours across the border, where the nearest texel continues.
+    #[inline(always)]
+    pub(crate) fn clamped(simd: S, place: f32x16<S>, size: f32x16<S>) -> Self {
         let one = splat(simd, 1.0);
         let (below, weight) = below(simd, place);
         Self {
@@ -49,7 +56,7 @@ fn below<S: Simd>(simd: S, place: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
 /// Weighted means of linear texels, in some lanes (a bit a lane); black in the others. `texel` returns the texel of a lane in a column,
 /// from the left, of a row, from the bottom; it is defined outside of the picture as well.
 #[inline(always)]
-pub(super) fn mean<S: Simd>(
+pub(crate) fn mean<S: Simd>(
     simd: S,
     columns: &Axis<S>,
     rows: &Axis<S>,
