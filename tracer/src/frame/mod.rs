@@ -68,7 +68,7 @@ pub struct PreparedFrame {
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) features: SceneFeatures,
     /// Whether light may pass each item and plane; empty in scenes where none lets it pass.
-    veils: Vec<bool>,
+    translucent: Vec<bool>,
     /// The level of SIMD that renders the frame.
     pub(crate) level: Level,
 }
@@ -141,7 +141,7 @@ impl PreparedFrame {
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
-            veils: Vec::new(),
+            translucent: Vec::new(),
             features: scene.features().at(&view.quality),
             level: simd::best(),
             scene,
@@ -149,7 +149,7 @@ impl PreparedFrame {
         go_on(cancelled)?;
         frame.make_pyramids();
         go_on(cancelled)?;
-        frame.veils = frame.find_veils();
+        frame.translucent = frame.find_translucent();
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
@@ -210,16 +210,16 @@ impl PreparedFrame {
 
     /// Whether light may pass an item or plane: one of its materials is transparent, or casts no shadow.
     #[inline(always)]
-    pub(crate) fn is_veil(&self, item: u32) -> bool {
-        self.veils.get(item as usize).is_some_and(|&veil| veil)
+    pub(crate) fn is_translucent(&self, item: u32) -> bool {
+        self.translucent.get(item as usize).is_some_and(|&translucent| translucent)
     }
 
     /// Whether light may pass anything.
-    pub(crate) fn has_veils(&self) -> bool {
-        !self.veils.is_empty()
+    pub(crate) fn has_translucent_items(&self) -> bool {
+        !self.translucent.is_empty()
     }
 
-    fn find_veils(&self) -> Vec<bool> {
+    fn find_translucent(&self) -> Vec<bool> {
         let scene = self.scene();
         let lets_pass = |index: &u32| {
             let material = &scene.materials[*index as usize];

@@ -12,8 +12,8 @@ use super::surface::SurfacePoint;
 /// Most reflected and transmitted rays of a sample.
 const MOST_RAYS: usize = 1024;
 
-/// A ray on its way.
-struct Traveller {
+/// A ray with its weight, and the bodies around its origin.
+struct TracedRay {
     ray: Ray,
     /// The primitive that it starts on.
     starts_on: Option<usize>,
@@ -32,20 +32,20 @@ impl Oracle {
         let max_depth = self.view.quality.max_depth;
         let (mut sum, mut count) = (DVec3::ZERO, 0);
         let mut generation =
-            vec![Traveller { ray, starts_on: None, weight: DVec3::ONE, bodies: Bodies::default() }];
+            vec![TracedRay { ray, starts_on: None, weight: DVec3::ONE, bodies: Bodies::default() }];
         for depth in 0..=max_depth {
             let (mut reflected, mut transmitted) = (Vec::new(), Vec::new());
-            for mut traveller in generation {
-                let Some(surface) = self.surface(traveller.ray, traveller.starts_on) else {
-                    sum += self.seen_without_hit(&traveller, depth > 0);
+            for mut traced in generation {
+                let Some(surface) = self.surface(traced.ray, traced.starts_on) else {
+                    sum += self.seen_without_hit(&traced, depth > 0);
                     continue;
                 };
-                traveller.weight *= self.remaining(&traveller, &surface);
-                sum += traveller.weight * self.local_light(&surface);
+                traced.weight *= self.remaining(&traced, &surface);
+                sum += traced.weight * self.local_light(&surface);
                 if depth == max_depth {
                     continue;
                 }
-                let [first, second] = self.leaving(&traveller, &surface);
+                let [first, second] = self.leaving(&traced, &surface);
                 for (leaving, list) in [(first, &mut reflected), (second, &mut transmitted)] {
                     if let Some(leaving) = leaving.filter(|_| count < MOST_RAYS) {
                         count += 1;
@@ -60,29 +60,26 @@ impl Oracle {
     }
 
     /// What a ray sees of the background.
-    fn seen_without_hit(&self, traveller: &Traveller, bounced: bool) -> DVec3 {
-        let direction = traveller.ray.direction;
+    fn seen_without_hit(&self, traced: &TracedRay, bounced: bool) -> DVec3 {
+        let direction = traced.ray.direction;
         let seen = if bounced { self.background(direction) } else { self.background_of_camera(direction) };
-        traveller.weight * traveller.bodies.remaining_at_infinity(&self.scene.materials) * seen
+        traced.weight * traced.bodies.remaining_at_infinity(&self.scene.materials) * seen
     }
 
     /// Share of light that the body around a ray leaves on the way to a surface.
-    fn remaining(&self, traveller: &Traveller, surface: &SurfacePoint) -> DVec3 {
+    fn remaining(&self, traced: &TracedRay, surface: &SurfacePoint) -> DVec3 {
         let ends_at = (surface.material_index, surface.front);
-        traveller.bodies.remaining(&self.scene.materials, ends_at, surface.way)
+        traced.bodies.remaining(&self.scene.materials, ends_at, surface.way)
     }
 
     /// The reflected and the transmitted ray that leave a surface, as far as they contribute.
-    fn leaving(&self, traveller: &Traveller, surface: &SurfacePoint) -> [Option<Traveller>; 2] {
+    fn leaving(&self, traced: &TracedRay, surface: &SurfacePoint) -> [Option<TracedRay>; 2] {
         let material = &self.scene.materials[surface.material_index as usize];
         let (direction, ns) = (surface.direction, surface.ns);
         let (mut reflect, mut transmit) = (material.reflect.as_dvec3(), material.transmit.as_dvec3());
-        let sides = traveller.bodies.sides(&self.scene.materials, surface.material_index, surface.front);
-        let (indices, beyond) = if material.thin {
-            ([1.0, 1.0], traveller.bodies.clone())
-        } else {
-            (sides.indices, sides.beyond)
-        };
+        let sides = traced.bodies.sides(&self.scene.materials, surface.material_index, surface.front);
+        let (indices, beyond) =
+            if material.thin { ([1.0, 1.0], traced.bodies.clone()) } else { (sides.indices, sides.beyond) };
         let bent = optics::bent(direction, ns, indices);
         if material.fresnel {
             let share = if material.thin {
@@ -99,17 +96,17 @@ impl Oracle {
         }
         let least = f64::from(self.view.quality.min_contribution);
         let leave = |direction: DVec3, share: DVec3, bodies: Bodies| {
-            let weight = traveller.weight * share;
+            let weight = traced.weight * share;
             let origin = surface.clear_origin();
             let before = surface.before + surface.way;
             let ray = Ray { origin, direction: direction.normalize(), place: surface.place, before };
             let contributes = weight.max_element() >= least && weight.max_element() > 0.0;
-            contributes.then_some(Traveller { ray, starts_on: Some(surface.primitive), weight, bodies })
+            contributes.then_some(TracedRay { ray, starts_on: Some(surface.primitive), weight, bodies })
         };
         let mirrored = optics::leaving(optics::mirrored(direction, ns), surface.ng);
         let through = bent.map(|direction| optics::leaving(direction, -surface.ng));
         [
-            leave(mirrored, reflect, traveller.bodies.clone()),
+            leave(mirrored, reflect, traced.bodies.clone()),
             through.and_then(|direction| leave(direction, transmit, beyond)),
         ]
     }

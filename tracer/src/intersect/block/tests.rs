@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use proptest::prelude::*;
 
 use super::*;
@@ -12,8 +12,8 @@ use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::rays::{BLOCKS, RayBatch};
 use crate::reference::Oracle;
 use crate::scene::{
-    Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
-    Triangle,
+    Background, Camera, CameraKind, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene,
+    Sphere, Triangle,
 };
 use crate::simd::{self, LANES};
 use crate::surface::Surfaces;
@@ -42,7 +42,7 @@ fn scene_of(corners: &[[f64; 9]], rotate: DVec3, scale: DVec3) -> (Scene, Arc<Co
         translate,
         rotate,
         scale,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     let single = |numbers: &[f64; 9]| Triangle { vertices: triangle(numbers), uvs: None, material: 0 };
     let scene = Scene {
@@ -54,7 +54,7 @@ fn scene_of(corners: &[[f64; 9]], rotate: DVec3, scale: DVec3) -> (Scene, Arc<Co
             up: DVec3::Y,
             fov: 40.0,
             zoom: 1.0,
-            kind: crate::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::ZERO),
         lights: vec![],

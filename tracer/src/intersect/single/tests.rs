@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use proptest::prelude::*;
 
 use super::*;
@@ -10,8 +10,8 @@ use crate::compile::CompiledScene;
 use crate::intersect::{Primitive, RayHit};
 use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use crate::scene::{
-    Background, Camera, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene, Sphere,
-    Triangle,
+    Background, Camera, CameraKind, FrameView, Material, Model, NormalMode, Plane, RenderSettings, Scene,
+    Sphere, Triangle,
 };
 use crate::shape::ShearedRay;
 
@@ -30,7 +30,7 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     let look_at = eye + DVec3::NEG_Z;
     let mut scene = Scene {
@@ -42,7 +42,7 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
             up: DVec3::Y,
             fov: 40.0,
             zoom: 1.0,
-            kind: crate::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::ZERO),
         lights: vec![],

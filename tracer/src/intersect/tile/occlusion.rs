@@ -30,13 +30,13 @@ pub(super) struct OcclusionQuery<'a> {
     /// Bits of its triangles that alpha cuts out.
     cutouts: &'a [u16],
     /// Whether light may pass it.
-    is_veil: bool,
+    is_translucent: bool,
 }
 
 impl<'a> OcclusionQuery<'a> {
     /// A query without an item.
     pub(super) fn new(tile: &'a ShadowTile<'a>, rays: &'a TileRays, points: &'a mut Points) -> Self {
-        Self { tile, rays, points, item: NO_ITEM, cutouts: &[], is_veil: false }
+        Self { tile, rays, points, item: NO_ITEM, cutouts: &[], is_translucent: false }
     }
 
     /// Selects the item that is tested next.
@@ -44,7 +44,7 @@ impl<'a> OcclusionQuery<'a> {
     pub(super) fn turn_to(&mut self, item: u32) {
         self.item = item;
         self.cutouts = self.tile.frame.cutouts_of(item);
-        self.is_veil = self.tile.frame.is_veil(item);
+        self.is_translucent = self.tile.frame.is_translucent(item);
     }
 
     /// Tests the selected item against all open points.
@@ -87,8 +87,8 @@ impl<'a> OcclusionQuery<'a> {
             for lane in each_bit(self.points.open[block]) {
                 let (ray, starts_on) = (self.tile.ray(block, lane), self.tile.starts_on(block, lane));
                 if self.tile.frame.occluded(&ray, self.tile.t_max, starts_on) {
-                    let found = if self.tile.frame.has_veils() {
-                        &mut self.points.veiled
+                    let found = if self.tile.frame.has_translucent_items() {
+                        &mut self.points.undecided
                     } else {
                         &mut self.points.occluded
                     };
@@ -112,8 +112,8 @@ impl<'a> OcclusionQuery<'a> {
     /// Marks points that the selected item occludes. Behind an item that light may pass they stay open: another one may be opaque.
     #[inline(always)]
     fn mark(&mut self, block: usize, lanes: u32) {
-        if self.is_veil {
-            self.points.veiled[block] |= lanes;
+        if self.is_translucent {
+            self.points.undecided[block] |= lanes;
         } else {
             self.points.mark_occluded(block, lanes);
         }

@@ -12,7 +12,7 @@ pub(super) struct Points {
     /// Bits of the points that are known to be occluded.
     pub occluded: [u32; BLOCKS],
     /// Bits of the points with a surface before the light that light may pass.
-    pub veiled: [u32; BLOCKS],
+    pub undecided: [u32; BLOCKS],
     /// Bounds of the closeness of the points to the light.
     pub low: [Lanes; BLOCKS],
     pub high: [Lanes; BLOCKS],
@@ -26,7 +26,7 @@ impl Points {
     pub(super) const NONE: Points = Points {
         open: [0; BLOCKS],
         occluded: [0; BLOCKS],
-        veiled: [0; BLOCKS],
+        undecided: [0; BLOCKS],
         low: [Lanes::ZERO; BLOCKS],
         high: [Lanes::ZERO; BLOCKS],
         least: Lanes::ZERO,

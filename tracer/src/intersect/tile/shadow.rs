@@ -22,7 +22,7 @@ pub(crate) struct Occlusion {
     /// Bits of the points that are occluded.
     pub occluded: [u32; BLOCKS],
     /// Bits of the points with a surface in their way that light may pass, and no other.
-    pub veiled: [u32; BLOCKS],
+    pub undecided: [u32; BLOCKS],
 }
 
 impl ShadowTile<'_> {
@@ -41,11 +41,11 @@ impl ShadowTile<'_> {
         let Scratch { scene_frontier, mesh_frontier, projected, shadow_rays: rays, points, .. } = scratch;
         points.open = self.live;
         points.occluded = [0; BLOCKS];
-        points.veiled = [0; BLOCKS];
+        points.undecided = [0; BLOCKS];
         let extent = Extent::of(simd, self.points, self.grid, &self.live);
         let Some(projection) = extent.projection(self.light) else {
             OcclusionQuery::new(self, rays, points).test_scene();
-            return Occlusion { occluded: points.occluded, veiled: points.veiled };
+            return Occlusion { occluded: points.occluded, undecided: points.undecided };
         };
         points.project(simd, self.points, &extent, &projection, rays);
         let picture = Picture { projection: &projection, rays };
@@ -64,7 +64,7 @@ impl ShadowTile<'_> {
             query.turn_to(self.frame.items.first_plane() + plane);
             query.test_item();
         }
-        let veiled = std::array::from_fn(|block| points.veiled[block] & !points.occluded[block]);
-        Occlusion { occluded: points.occluded, veiled }
+        let undecided = std::array::from_fn(|block| points.undecided[block] & !points.occluded[block]);
+        Occlusion { occluded: points.occluded, undecided }
     }
 }

@@ -73,7 +73,7 @@ impl Media {
     }
 
     /// Share of light that is left after a way inside, which ends at a surface of a material; `way` in world units.
-    pub(super) fn left_after(&self, materials: &[Material], end: (u32, bool), way: f64) -> Option<DVec3> {
+    pub(super) fn transmittance(&self, materials: &[Material], end: (u32, bool), way: f64) -> Option<DVec3> {
         let absorption = self.absorbing(materials, end)?;
         Some(DVec3::from_array(absorption.to_array().map(|share| libm::pow(f64::from(share), way))))
     }
@@ -87,8 +87,8 @@ impl Media {
         absorbs(body).then_some(body.absorption)
     }
 
-    /// Share of light of the background that arrives: a body without end leaves none of a channel that it absorbs.
-    pub(super) fn left_without_end(&self, materials: &[Material]) -> Option<DVec3> {
+    /// Share of light of the background that reaches the start of the ray: a body without end leaves none of a channel that it absorbs.
+    pub(super) fn transmittance_to_infinity(&self, materials: &[Material]) -> Option<DVec3> {
         let body = &materials[self.innermost()? as usize];
         let left = body.absorption.to_array().map(|share| if share < 1.0 { 0.0 } else { 1.0 });
         Some(DVec3::from_array(left))
@@ -152,11 +152,11 @@ mod tests {
         let mut materials = materials();
         materials[0].absorption = Vec3::new(0.5, 1.0, 0.25);
         let inside = Media::default().interface(&materials, 0, true).behind;
-        let left = inside.left_after(&materials, (0, false), 2.0).unwrap();
+        let left = inside.transmittance(&materials, (0, false), 2.0).unwrap();
         assert!((left - DVec3::new(0.25, 1.0, 0.0625)).length() < 1e-12);
-        assert_eq!(Media::default().left_after(&materials, (0, true), 2.0), None);
-        let started = Media::default().left_after(&materials, (0, false), 1.0).unwrap();
+        assert_eq!(Media::default().transmittance(&materials, (0, true), 2.0), None);
+        let started = Media::default().transmittance(&materials, (0, false), 1.0).unwrap();
         assert!((started - DVec3::new(0.5, 1.0, 0.25)).length() < 1e-12);
-        assert_eq!(inside.left_without_end(&materials), Some(DVec3::new(0.0, 1.0, 0.0)));
+        assert_eq!(inside.transmittance_to_infinity(&materials), Some(DVec3::new(0.0, 1.0, 0.0)));
     }
 }

@@ -42,7 +42,7 @@ impl Mirrors {
         self.clear();
         let mut rest = reflected;
         for _ in 0..MOST_MIRRORS {
-            let Some(next) = rest.iter().position(|secondary| secondary.by_plane && !self.knows(secondary))
+            let Some(next) = rest.iter().position(|secondary| secondary.by_plane && !self.has(secondary))
             else {
                 return;
             };
@@ -63,7 +63,7 @@ impl Mirrors {
         self.known = [0; BLOCKS];
     }
 
-    fn knows(&self, secondary: &Secondary) -> bool {
+    fn has(&self, secondary: &Secondary) -> bool {
         let (block, lane) = place_of(usize::from(secondary.sample));
         self.known[block] >> lane & 1 == 1
     }
@@ -83,11 +83,11 @@ impl Mirrors {
             let (block, lane) = place_of(usize::from(secondary.sample));
             live[block] |= 1 << lane;
             // The depth of a ray of the camera grows by one per t.
-            let arriving = tile.ray(block, lane);
+            let incident = tile.ray(block, lane);
             self.rays[usize::from(secondary.sample)] = MirroredRay {
                 ray: secondary.ray,
-                start: secondary.arrived,
-                speed: 1.0 / arriving.direction.length(),
+                start: secondary.previous_t,
+                speed: 1.0 / incident.direction.length(),
             };
             on_plane.get_or_insert(secondary.ray.origin);
         }
@@ -112,7 +112,7 @@ impl Mirrors {
     pub(super) fn put(&self, rays: &[Secondary], hits: &mut HitBlock) -> u32 {
         let mut known = 0;
         for (lane, secondary) in rays.iter().enumerate() {
-            if secondary.by_plane && self.knows(secondary) {
+            if secondary.by_plane && self.has(secondary) {
                 let (block, of_lane) = place_of(usize::from(secondary.sample));
                 hits.put(lane, &self.hits[block], of_lane);
                 known |= 1 << lane;

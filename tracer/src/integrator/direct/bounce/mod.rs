@@ -6,7 +6,7 @@
 //! order of their generations, and within a generation in the order of its own rays, so the sum does not depend on other samples.
 //!
 //! ```text
-//!   secondary   rays that leave a surface
+//!   secondary   rays that a surface reflects or transmits
 //!   media       the transparent bodies around a ray
 //!   mirrors     rays that one plane reflects: traced as a tile
 //! ```
@@ -22,16 +22,19 @@ use glam::DVec3;
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::intersect::tile::Scratch;
-use crate::rays::{BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, SurfaceSource, TileColors, TileRays};
+use crate::rays::{
+    BATCH, BLOCKS, HitBlock, PrimitiveId, Ray, RayBatch, RayCounts, SurfaceSource, TileColors, TileRays,
+};
+use crate::scene::Material;
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::{SurfaceBlock, Surfaces};
 use media::Media;
 use mirrors::Mirrors;
-use secondary::{Arrival, Secondary};
+use secondary::{Interaction, Secondary};
 
-/// Most secondary rays of one sample: what two mirrors of glass in each other would send on without end is cut here. Rays with less than
-/// 0.004 of the light, the default of `min_contribution`, end before.
-const MOST_OF_SAMPLE: u16 = crate::rays::RayCounts::MAX_SECONDARY;
+/// Most secondary rays of one sample. Materials that both reflect and transmit double the rays with each bounce, without a limit if
+/// `min_contribution` is 0.
+const MOST_OF_SAMPLE: u16 = RayCounts::MAX_SECONDARY;
 
 /// Traces and shades batches of rays, in the memory of the current tile.
 pub(super) trait BatchShader<'a> {
@@ -167,21 +170,23 @@ impl<'a> Bounces<'a> {
                     media: Media::default(),
                     sample: (block * LANES + lane) as u16,
                 };
-                let Some((arrival, left)) = hit.arrival(frame, primitive, &incoming) else { continue };
+                let Some((interaction, left)) = hit.interaction(frame, primitive, &incoming) else {
+                    continue;
+                };
                 if let Some(left) = left {
                     absorb(&mut colors[block], lane, left);
                 }
-                self.leave(&arrival, frame);
+                self.enqueue(&interaction, frame);
             }
         }
     }
 
-    /// Appends the rays that leave a surface to the next generation.
-    fn leave(&mut self, arrival: &Arrival<'_>, frame: &PreparedFrame) {
-        let departures = arrival.departures(frame);
-        let count = &mut self.counts[usize::from(arrival.sample)];
+    /// Appends the scattered rays of an interaction to the next generation.
+    fn enqueue(&mut self, interaction: &Interaction<'_>, frame: &PreparedFrame) {
+        let scattered = interaction.scatter(frame);
+        let count = &mut self.counts[usize::from(interaction.sample)];
         for (secondary, generation) in
-            [(departures.reflected, &mut self.reflected), (departures.transmitted, &mut self.transmitted)]
+            [(scattered.reflected, &mut self.reflected), (scattered.transmitted, &mut self.transmitted)]
         {
             if let Some(secondary) = secondary.filter(|_| *count < MOST_OF_SAMPLE) {
                 *count += 1;
@@ -218,7 +223,7 @@ impl<'a> Bounces<'a> {
             *hits = HitBlock::NONE;
             let start = (block * LANES).min(rays.len());
             let of_block = &rays[start..rays.len().min(start + LANES)];
-            // Only the first generation leaves a tile of the camera.
+            // Only the first generation starts on the hits of a tile of the camera.
             known[block] = if depth == 1 { self.mirrors.put(of_block, hits) } else { 0 };
         }
         let together: u32 = known.iter().map(|lanes| lanes.count_ones()).sum();
@@ -226,7 +231,7 @@ impl<'a> Bounces<'a> {
         shader.shade(simd, batch, known)
     }
 
-    /// Adds the colours of a batch to the samples, and collects the rays that leave its surfaces.
+    /// Adds the colours of a batch to the samples, and enqueues the rays that its surfaces scatter.
     fn collect(&mut self, rays: &[Secondary], goes_on: bool, frame: &PreparedFrame, shaded: &Shaded<'_>) {
         let materials = &frame.scene().materials;
         for (index, secondary) in rays.iter().enumerate() {
@@ -245,13 +250,15 @@ impl<'a> Bounces<'a> {
                 let material = hit.material(materials);
                 let goes_on = goes_on && material.bounces();
                 if goes_on || secondary.media.may_absorb(materials, material) {
-                    let Some((arrival, _)) = hit.arrival(frame, primitive, &incoming) else { continue };
-                    weight = arrival.weight;
+                    let Some((interaction, _)) = hit.interaction(frame, primitive, &incoming) else {
+                        continue;
+                    };
+                    weight = interaction.weight;
                     if goes_on {
-                        self.leave(&arrival, frame);
+                        self.enqueue(&interaction, frame);
                     }
                 }
-            } else if let Some(left) = secondary.media.left_without_end(materials) {
+            } else if let Some(left) = secondary.media.transmittance_to_infinity(materials) {
                 weight *= left;
             }
             let (of_block, of_lane) = place_of(usize::from(secondary.sample));
@@ -270,7 +277,7 @@ fn place_of(index: usize) -> (usize, usize) {
 }
 
 /// Bits of the points whose material reflects or transmits.
-fn bouncing(surface: &SurfaceBlock, materials: &[crate::scene::Material]) -> u32 {
+fn bouncing(surface: &SurfaceBlock, materials: &[Material]) -> u32 {
     let of = |lane: &usize| materials[surface.material.0[*lane] as usize].bounces();
     each_bit(surface.hit).filter(of).fold(0, |lanes, lane| lanes | 1 << lane)
 }
@@ -303,17 +310,17 @@ struct Hit<'a> {
 }
 
 impl Hit<'_> {
-    fn material<'m>(&self, materials: &'m [crate::scene::Material]) -> &'m crate::scene::Material {
+    fn material<'m>(&self, materials: &'m [Material]) -> &'m Material {
         &materials[self.surface.material.0[self.lane] as usize]
     }
 
-    /// The arrival of a ray, and the share of light that its way inside a transparent body leaves.
-    fn arrival<'m>(
+    /// The interaction of a ray with the surface, and the transmittance of its way inside a transparent body.
+    fn interaction<'m>(
         &self,
         frame: &'m PreparedFrame,
         primitive: PrimitiveId,
         incoming: &Incoming,
-    ) -> Option<(Arrival<'m>, Option<DVec3>)> {
+    ) -> Option<(Interaction<'m>, Option<DVec3>)> {
         let (surface, lane) = (self.surface, self.lane);
         let t = frame.t_of(self.ray, primitive, incoming.starts_on)?;
         let length = self.ray.direction.length();
@@ -331,12 +338,12 @@ impl Hit<'_> {
             DVec3::from_array([0, 1, 2].map(|axis| f64::from(surface.ns[axis].0[lane]))).normalize()
         };
         let left = if frame.features.transparent {
-            incoming.media.left_after(materials, (index, front), t * length / frame.per_unit)
+            incoming.media.transmittance(materials, (index, front), t * length / frame.per_unit)
         } else {
             None
         };
         let coincides = self.hits.coincident >> lane & 1 == 1;
-        let arrival = Arrival {
+        let interaction = Interaction {
             direction: self.ray.direction / length,
             point,
             t,
@@ -353,6 +360,6 @@ impl Hit<'_> {
             media: incoming.media,
             sample: incoming.sample,
         };
-        Some((arrival, left))
+        Some((interaction, left))
     }
 }

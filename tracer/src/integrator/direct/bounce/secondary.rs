@@ -1,4 +1,4 @@
-//! Secondary rays: what leaves a surface that reflects or transmits.
+//! Secondary rays: rays that a surface reflects or transmits.
 
 use glam::DVec3;
 
@@ -22,14 +22,14 @@ pub(super) struct Secondary {
     pub media: Media,
     /// The sample of the tile that it contributes to.
     pub sample: u16,
-    /// The t at which the ray before it arrived.
-    pub arrived: f64,
+    /// The t at which the ray before it previous_t.
+    pub previous_t: f64,
     /// Whether it is reflected by the plane of the primitive that it starts on.
     pub by_plane: bool,
 }
 
 /// A hit of a ray with a surface that reflects or transmits.
-pub(super) struct Arrival<'a> {
+pub(super) struct Interaction<'a> {
     /// Unit direction of the ray.
     pub direction: DVec3,
     pub point: DVec3,
@@ -48,7 +48,7 @@ pub(super) struct Arrival<'a> {
     pub material: &'a Material,
     /// Distance from the point within which other surfaces may coincide with this one, or 0.
     pub coincidence: f64,
-    /// Weight of the ray where it arrives.
+    /// Weight of the ray at the hit.
     pub weight: DVec3,
     /// Length of the way to the camera, in eye units.
     pub way: f64,
@@ -56,15 +56,15 @@ pub(super) struct Arrival<'a> {
     pub sample: u16,
 }
 
-/// The rays that leave a surface: a reflected and a transmitted one, as far as they can contribute.
-pub(super) struct Departures {
+/// The reflected and the transmitted ray of an interaction, as far as they can contribute.
+pub(super) struct ScatteredRays {
     pub reflected: Option<Secondary>,
     pub transmitted: Option<Secondary>,
 }
 
-impl Arrival<'_> {
-    /// The rays that leave. Hall's terms c_r I(R) + c_t I(T): total internal reflection sends the transmitted share into R.
-    pub(super) fn departures(&self, frame: &PreparedFrame) -> Departures {
+impl Interaction<'_> {
+    /// The scattered rays. Hall's terms c_r I(R) + c_t I(T): total internal reflection sends the transmitted share into R.
+    pub(super) fn scatter(&self, frame: &PreparedFrame) -> ScatteredRays {
         let materials = &frame.scene().materials;
         let (mut reflect, mut transmit) =
             (self.material.reflect.as_dvec3(), self.material.transmit.as_dvec3());
@@ -89,7 +89,7 @@ impl Arrival<'_> {
             through = refracted.map(|direction| (on_side_of(direction, -self.ng), behind));
         }
         let least = f64::from(frame.view().quality.min_contribution);
-        let leave = |direction: DVec3, share: DVec3, media: Media, by_plane: bool| {
+        let ray_along = |direction: DVec3, share: DVec3, media: Media, by_plane: bool| {
             let weight = self.weight * share;
             let origin = self.point + self.ng * self.coincidence;
             let enough = weight.max_element() >= least && weight.max_element() > 0.0;
@@ -100,15 +100,16 @@ impl Arrival<'_> {
                 way: self.way,
                 media,
                 sample: self.sample,
-                arrived: self.t,
+                previous_t: self.t,
                 by_plane,
             };
             (enough && secondary.ray.direction.is_finite() && origin.is_finite()).then_some(secondary)
         };
         let mirrored = on_side_of(reflected(self.direction, self.ns), self.ng);
-        Departures {
-            reflected: leave(mirrored, reflect, self.media, self.on_plane && self.coincidence == 0.0),
-            transmitted: through.and_then(|(direction, behind)| leave(direction, transmit, behind, false)),
+        ScatteredRays {
+            reflected: ray_along(mirrored, reflect, self.media, self.on_plane && self.coincidence == 0.0),
+            transmitted: through
+                .and_then(|(direction, behind)| ray_along(direction, transmit, behind, false)),
         }
     }
 }

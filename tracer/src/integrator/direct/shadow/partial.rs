@@ -153,17 +153,17 @@ impl Points<'_> {
             hits: self.hits,
             live: *lanes,
         };
-        let Occlusion { occluded, veiled } = if self.neighbours {
+        let Occlusion { occluded, undecided } = if self.neighbours {
             shadow.occluded(simd, self.scratch)
-        } else if self.frame.has_veils() {
-            Occlusion { occluded: [0; BLOCKS], veiled: occluded_one_by_one(&shadow) }
+        } else if self.frame.has_translucent_items() {
+            Occlusion { occluded: [0; BLOCKS], undecided: occluded_one_by_one(&shadow) }
         } else {
-            Occlusion { occluded: occluded_one_by_one(&shadow), veiled: [0; BLOCKS] }
+            Occlusion { occluded: occluded_one_by_one(&shadow), undecided: [0; BLOCKS] }
         };
-        self.traced += count(&occluded) + count(&veiled);
-        let free = std::array::from_fn(|block| lanes[block] & !(occluded[block] | veiled[block]));
+        self.traced += count(&occluded) + count(&undecided);
+        let free = std::array::from_fn(|block| lanes[block] & !(occluded[block] | undecided[block]));
         self.arrive(simd, &free, 1.0);
-        self.follow(&shadow, &veiled);
+        self.follow(&shadow, &undecided);
     }
 
     /// Adds a number of rays that nothing occludes in each of the lanes.
@@ -181,9 +181,9 @@ impl Points<'_> {
         );
     }
 
-    /// Adds the light that passes the surfaces in the way of the veiled lanes.
-    fn follow(&mut self, shadow: &ShadowTile<'_>, veiled: &[u32; BLOCKS]) {
-        for (block, &lanes) in veiled.iter().enumerate() {
+    /// Adds the light that passes the surfaces in the way of the undecided lanes.
+    fn follow(&mut self, shadow: &ShadowTile<'_>, undecided: &[u32; BLOCKS]) {
+        for (block, &lanes) in undecided.iter().enumerate() {
             for lane in each_bit(lanes) {
                 let (ray, starts_on) = (shadow.ray(block, lane), shadow.starts_on(block, lane));
                 let share = self.frame.transmittance(&ray, shadow.t_max, starts_on, &mut self.crossings);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::super::tests::Random;
 use super::Shaft;
@@ -41,7 +41,7 @@ fn frame(random: &mut Random) -> PreparedFrame {
         translate: place() * 0.3,
         rotate: place() * 50.0,
         scale: DVec3::new(1.0, 0.5, 1.3),
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     let scene = Scene {
         ambient: Vec3::ZERO,

@@ -6,7 +6,7 @@ mod mirrored;
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::{Scratch, find_closest};
 use crate::compile::{CompiledScene, Item};
@@ -182,7 +182,7 @@ fn frame_of(
         translate,
         rotate: DVec3::ZERO,
         scale,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     let shift = random.vector() * random.one_of(&[0.0, 1e-8, 1e-6, 0.1]);
     let scale = random.one_of(&[DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 0.3, 1e-4)]);
