@@ -148,11 +148,11 @@ fn a_ball_of_glass_in_a_white_sky_cannot_be_seen() {
     scene.render.quality.min_contribution = 1e-5;
     let (pixels, _) = render(&scene);
     pixels.iter().for_each(|&pixel| assert_near(pixel, [1.0; 3]));
-    // In a ball of glass around water each ray splits again and again: those beyond the limit of a sample carry a tenth together.
+    // Glass around water: total reflection keeps some light inside for more than twenty bounces.
     scene.spheres.push(ball(DVec3::new(0.1, 0.0, 0.2), 0.5, 1));
+    scene.render.quality.max_depth = 64;
     let (pixels, _) = render(&scene);
-    let least = srgb::encode(Vec3::splat(0.85));
-    assert!(pixels.iter().all(|pixel| pixel[0] >= least[0]), "{:?}", pixels.iter().min());
+    pixels.iter().for_each(|&pixel| assert_near(pixel, [1.0; 3]));
 }
 
 #[test]
