@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::{BuildQuality, CompileOptions, CompiledMesh, Mesh, NamedMaterial};
-use rayfarm_tracer::scene::{Background, Camera, Material, RenderSettings, Scene, Sphere};
+use rayfarm_tracer::scene::{Background, Camera, CameraKind, Material, RenderSettings, Scene, Sphere};
 
 /// Largest accepted ratio to the random pattern.
 const LIMIT: f64 = 2.0;
@@ -166,7 +166,7 @@ fn compile_spheres(ball: Ball, count: usize) -> Duration {
             up: DVec3::Y,
             fov: 45.0,
             zoom: 1.0,
-            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(glam::Vec3::ZERO),
         lights: vec![],

@@ -80,17 +80,12 @@ mod tests {
     use proptest::prelude::*;
     use rayfarm_tracer::scene::Quality;
 
+    use rayfarm_tracer::scene::CameraKind;
+
     use super::*;
 
     fn camera(position: DVec3, look_at: DVec3, up: DVec3) -> Camera {
-        Camera {
-            position,
-            look_at,
-            up,
-            fov: 40.0,
-            zoom: 1.0,
-            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
-        }
+        Camera { position, look_at, up, fov: 40.0, zoom: 1.0, kind: CameraKind::PINHOLE }
     }
 
     fn base() -> FrameView {

@@ -5,12 +5,12 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompileOptions, CompiledMesh, Mesh};
 use rayfarm_tracer::scene::{
-    Attenuation, Background, Camera, Filter, FrameView, Light, LightKind, LoadedScene, Material, Model,
-    NormalMode, RenderSettings, Scene, TextureMap, Triangle,
+    Attenuation, Background, Camera, CameraKind, Filter, FrameView, Light, LightKind, LoadedScene, Material,
+    Model, NormalMode, RenderSettings, Scene, TextureMap, Triangle,
 };
 use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame};
@@ -198,7 +198,7 @@ impl Setting {
             translate: translate * scale,
             rotate: DVec3::ZERO,
             scale: DVec3::splat(scale),
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         };
         self.scene.models = places.iter().map(model).collect();
         let warnings = vec![];
@@ -240,7 +240,7 @@ fn ambient_only(width: u32, height: u32) -> Scene {
             up: DVec3::Y,
             fov: 42.0,
             zoom: 1.0,
-            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::ZERO),
         lights: vec![],

@@ -82,7 +82,7 @@ mod tests {
             translate: DVec3::ZERO,
             rotate,
             scale: DVec3::ONE,
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         };
         assert_eq!(orientation(&model(DVec3::new(90.0, 0.0, 0.0)), 0.0) * DVec3::Y, DVec3::Z);
         assert_eq!(orientation(&model(DVec3::new(0.0, 90.0, 0.0)), 0.0) * DVec3::Z, DVec3::X);

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::Subject;
 use crate::mesh::{CompiledMesh, Mesh, MeshError, NamedMaterial};
 use crate::scene::{
-    Attenuation, Background, Camera, Light, LightKind, Material, Model, NormalMode, Plane, RenderSettings,
-    Scene, Sphere,
+    Attenuation, Background, Camera, CameraKind, Light, LightKind, Material, Model, NormalMode, Plane,
+    RenderSettings, Scene, Sphere,
 };
 
 /// Three scenes: a plane, spheres on it, and flat and smooth tori over it.
@@ -53,7 +53,7 @@ pub fn built_in() -> Result<Vec<Subject>, MeshError> {
             translate: DVec3::new(x, 0.6, 0.0),
             rotate: DVec3::new(60.0, 25.0, 10.0),
             scale: DVec3::splat(0.6),
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         });
     }
     let subject =
@@ -77,7 +77,7 @@ fn ground() -> Scene {
             up: DVec3::Y,
             fov: 45.0,
             zoom: 1.0,
-            kind: crate::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::splat(0.3)),
         lights: vec![Light {

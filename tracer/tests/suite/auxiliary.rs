@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayfarm_tracer::Basis;
 use rayfarm_tracer::image::compare;
 use rayfarm_tracer::mesh::CompiledMesh;
@@ -34,7 +34,7 @@ fn mesh_ball(normals: NormalMode) -> (Scene, Arc<CompiledMesh>) {
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     }];
     scene.lights = vec![light(point(2.0, 4.0, 3.0), 0.9, Attenuation::None)];
     (scene, Arc::new(mesh))

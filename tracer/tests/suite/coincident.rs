@@ -9,8 +9,8 @@ use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{
-    Attenuation, Background, Camera, FrameView, LightKind, Material, Model, NormalMode, Plane, Scene,
-    Triangle,
+    Attenuation, Background, Camera, CameraKind, FrameView, LightKind, Material, Model, NormalMode, Plane,
+    Scene, Triangle,
 };
 use rayfarm_tracer::{CompiledScene, PreparedFrame, Primitive, render_rows};
 
@@ -65,7 +65,7 @@ fn model(mesh: &CompiledMesh) -> Model {
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     }
 }
 
@@ -73,14 +73,8 @@ fn model(mesh: &CompiledMesh) -> Model {
 fn dark_scene(eye: DVec3, look_at: DVec3) -> Scene {
     let mut scene = empty(SIDE, SIDE * 3 / 4);
     scene.background = Background::Color(Vec3::ZERO);
-    scene.camera = Camera {
-        position: eye,
-        look_at,
-        up: DVec3::Y,
-        fov: 55.0,
-        zoom: 1.0,
-        kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
-    };
+    scene.camera =
+        Camera { position: eye, look_at, up: DVec3::Y, fov: 55.0, zoom: 1.0, kind: CameraKind::PINHOLE };
     scene.ambient = Vec3::splat(0.5);
     let flat = |diffuse| Material { diffuse, specular: Vec3::ZERO, exponent: 1.0, ..Material::NEUTRAL };
     scene.materials = vec![flat(Vec3::new(0.75, 0.15, 0.1)), flat(Vec3::splat(0.8))];

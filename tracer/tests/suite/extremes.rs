@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use crate::common::{analytic, empty, light, point, render, torus};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh};
 use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{
@@ -155,7 +155,7 @@ fn with_model(mesh: &CompiledMesh, width: u32, height: u32) -> Scene {
         translate: DVec3::ZERO,
         rotate: DVec3::new(40.0, 10.0, 0.0),
         scale: DVec3::ONE,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     }];
     scene
 }

@@ -6,8 +6,8 @@ use crate::common::{analytic, instanced, render, render_textured};
 use rayfarm_tracer::image::{RgbImage, compare};
 use rayfarm_tracer::reference::Oracle;
 use rayfarm_tracer::scene::{
-    Background, Camera, ColorDepth, ExponentPrecision, Filter, FrameView, LoadedScene, Quality, Scene,
-    Shading, load,
+    Background, Camera, CameraKind, ColorDepth, ExponentPrecision, Filter, FrameView, LoadedScene, Quality,
+    Scene, Shading, load,
 };
 
 const FULL: fn() -> Quality = Quality::default;
@@ -108,14 +108,7 @@ fn dusk() -> Scene {
     let mut scene = analytic(320, 240);
     (scene.spheres, scene.planes, scene.triangles) = (Vec::new(), Vec::new(), Vec::new());
     let (position, look_at, up) = (glam::DVec3::ZERO, glam::DVec3::NEG_Z, glam::DVec3::Y);
-    scene.camera = Camera {
-        position,
-        look_at,
-        up,
-        fov: 10.0,
-        zoom: 1.0,
-        kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
-    };
+    scene.camera = Camera { position, look_at, up, fov: 10.0, zoom: 1.0, kind: CameraKind::PINHOLE };
     let [bottom, top] = [0.0, DUSK].map(glam::Vec3::splat);
     scene.background = Background::Gradient { bottom, top };
     scene

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use crate::common::{analytic, ball, empty, instanced, light, point, render};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use proptest::prelude::*;
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::CompiledMesh;
@@ -189,7 +189,7 @@ fn no_acne_on_a_convex_mesh_under_any_light() {
             translate: DVec3::ZERO,
             rotate: DVec3::new(10.0, 20.0, 30.0),
             scale: DVec3::ONE,
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         }];
         let mut unshadowed = scene.clone();
         unshadowed.lights[0].shadows = false;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::common::{ball, empty, light, point, render, torus};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompileOptions, CompiledMesh};
 use rayfarm_tracer::reference::Oracle;
@@ -24,7 +24,7 @@ fn model(mesh: &CompiledMesh, normals: NormalMode) -> Model {
         translate: DVec3::ZERO,
         rotate: DVec3::new(0.0, 25.0, 0.0),
         scale: DVec3::ONE,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::common::{ball, empty, light, point, render_textured};
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::image::{self, RgbImage};
 use rayfarm_tracer::mesh::CompiledMesh;
@@ -197,7 +197,7 @@ fn textured_instances_match_the_oracle() {
             translate: DVec3::new(x, 0.0, 0.0),
             rotate: DVec3::new(20.0, 70.0, 10.0),
             scale: scale.into(),
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         };
         scene.models = vec![
             model(-1.2, [0.8; 3], NormalMode::Flat, vec![0, 1]),
@@ -242,7 +242,7 @@ fn mismatched_meshes_and_textures_are_refused() {
         translate: DVec3::ZERO,
         rotate: DVec3::ZERO,
         scale: DVec3::ONE,
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     }];
     let unfit = CompiledScene::new(scene.clone(), [bare.clone()], [texture.clone()]).unwrap_err().to_string();
     assert!(unfit.contains("without texture coordinates"), "{unfit}");

@@ -137,7 +137,7 @@ impl Assets {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
+    use glam::{DMat3, DVec3};
     use rayfarm_tracer::image::RgbImage;
     use rayfarm_tracer::mesh::{Mesh, NamedMaterial};
     use rayfarm_tracer::scene::{Filter, Material, Model, NormalMode, TextureMap};
@@ -164,7 +164,7 @@ mod tests {
             translate: DVec3::ZERO,
             rotate: DVec3::ZERO,
             scale: DVec3::ONE,
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         };
         Scene { models: vec![model], ..test_scene::scene() }
     }

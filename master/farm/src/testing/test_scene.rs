@@ -1,7 +1,7 @@
 //! A minimal scene, for tests that are not about pictures.
 
 use glam::{DVec3, Vec3};
-use rayfarm_tracer::scene::{Background, Camera, FrameView, Material, RenderSettings, Scene};
+use rayfarm_tracer::scene::{Background, Camera, CameraKind, FrameView, Material, RenderSettings, Scene};
 
 /// A scene without objects, of 32 x 64 pixels.
 pub fn scene() -> Scene {
@@ -14,7 +14,7 @@ pub fn scene() -> Scene {
             up: DVec3::Y,
             fov: 40.0,
             zoom: 1.0,
-            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::ONE),
         lights: Vec::new(),

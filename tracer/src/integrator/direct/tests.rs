@@ -10,8 +10,8 @@ use crate::frame::PreparedFrame;
 use crate::integrator::render_rows;
 use crate::reference::Oracle;
 use crate::scene::{
-    Attenuation, Background, Camera, ExponentPrecision, FrameView, Light, LightKind, Material, Plane,
-    Quality, RenderSettings, Scene, Shading, Sphere, Triangle,
+    Attenuation, Background, Camera, CameraKind, ExponentPrecision, FrameView, Light, LightKind, Material,
+    Plane, Quality, RenderSettings, Scene, Shading, Sphere, Triangle,
 };
 use crate::simd;
 
@@ -28,7 +28,7 @@ fn empty() -> Scene {
             up: DVec3::Y,
             fov: 40.0,
             zoom: 1.0,
-            kind: crate::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Color(Vec3::splat(0.3)),
         lights: vec![],

@@ -1,4 +1,4 @@
-use glam::Vec2;
+use glam::{DMat3, Vec2};
 
 use super::*;
 use crate::material::CheckerSpace;
@@ -42,7 +42,7 @@ fn scene() -> Scene {
             translate: DVec3::ZERO,
             rotate: DVec3::ZERO,
             scale: DVec3::new(1.0, -2.0, 3.0),
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         }],
         spheres: vec![Sphere {
             center: DVec3::ZERO,

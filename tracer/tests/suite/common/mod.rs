@@ -1,12 +1,12 @@
 //! Generated scenes for tests.
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use rayfarm_tracer::scene::{
-    Attenuation, Background, Camera, FrameView, Light, LightKind, Material, Model, NormalMode, Plane,
-    RenderSettings, Scene, Sphere, Triangle,
+    Attenuation, Background, Camera, CameraKind, FrameView, Light, LightKind, Material, Model, NormalMode,
+    Plane, RenderSettings, Scene, Sphere, Triangle,
 };
 use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts, render_rows};
@@ -24,7 +24,7 @@ pub(crate) fn empty(width: u32, height: u32) -> Scene {
             up: DVec3::Y,
             fov: 45.0,
             zoom: 1.0,
-            kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+            kind: CameraKind::PINHOLE,
         },
         background: Background::Gradient { bottom: Vec3::new(0.3, 0.25, 0.2), top: Vec3::new(0.2, 0.4, 0.8) },
         lights: vec![],
@@ -147,7 +147,7 @@ pub(crate) fn instanced(width: u32, height: u32) -> (Scene, Arc<CompiledMesh>) {
         translate: translate.into(),
         rotate: rotate.into(),
         scale: scale.into(),
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     scene.models = vec![
         model([-0.9, 0.0, 0.0], [70.0, 20.0, 5.0], [0.8; 3], NormalMode::Flat),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::common::{ball, empty, light, point, render_textured};
 use ::image::{Rgba, RgbaImage};
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use rayfarm_tracer::image::{RgbImage, save};
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use rayfarm_tracer::numerics::{self, Effort, Subject};
@@ -186,7 +186,7 @@ fn emission_takes_textures_on_every_shape_and_lights_nothing() {
         translate: DVec3::new(x, 1.0, -1.0),
         rotate: DVec3::new(10.0, 20.0, 30.0),
         scale: scale.into(),
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     // Nothing emits towards the inside; a mirrored sphere keeps its front outside.
     scene.models = vec![
@@ -265,7 +265,7 @@ fn colours_of_vertices_are_factors_of_textures_and_lit() {
         translate: DVec3::new(x, 0.0, 0.0),
         rotate: DVec3::new(10.0, 20.0, 30.0),
         scale: DVec3::splat(0.6),
-        group: glam::DMat3::IDENTITY,
+        group: DMat3::IDENTITY,
     };
     scene.models = vec![
         model(-1.3, NormalMode::Smooth, [3, 1]),
@@ -329,7 +329,7 @@ fn every_wrap_scale_and_offset_matches_the_oracle() {
                     translate: DVec3::ZERO,
                     rotate: DVec3::ZERO,
                     scale: DVec3::ONE,
-                    group: glam::DMat3::IDENTITY,
+                    group: DMat3::IDENTITY,
                 };
                 (scene.models, scene.triangles) = (vec![model], vec![]);
                 let instance = loaded(scene, vec![mesh], vec![Arc::clone(&picture)]);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytes::Bytes;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DMat3, DVec3, Vec2, Vec3};
 use rayfarm_protocol::pixels::unpack;
 use rayfarm_protocol::session::{self, Receiver, Sender};
 use rayfarm_protocol::{
@@ -15,8 +15,8 @@ use rayfarm_protocol::{
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::mesh::{CompiledMesh, Mesh, NamedMaterial};
 use rayfarm_tracer::scene::{
-    Attenuation, Background, Camera, Filter, FrameView, Light, LightKind, Material, Model, NormalMode, Plane,
-    RenderSettings, Scene, Sphere, TextureMap,
+    Attenuation, Background, Camera, CameraKind, Filter, FrameView, Light, LightKind, Material, Model,
+    NormalMode, Plane, RenderSettings, Scene, Sphere, TextureMap,
 };
 use rayfarm_tracer::texture::Texture;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
@@ -44,7 +44,7 @@ impl Stage {
                 up: DVec3::Y,
                 fov: 45.0,
                 zoom: 1.0,
-                kind: rayfarm_tracer::scene::CameraKind::PINHOLE,
+                kind: CameraKind::PINHOLE,
             },
             background: Background::Gradient { bottom: Vec3::ZERO, top: Vec3::new(0.3, 0.5, 0.9) },
             lights: vec![Light {
@@ -63,7 +63,7 @@ impl Stage {
                 translate: DVec3::new(-0.8, 0.0, 0.0),
                 rotate: DVec3::new(0.0, 30.0, 0.0),
                 scale: DVec3::ONE,
-                group: glam::DMat3::IDENTITY,
+                group: DMat3::IDENTITY,
             }],
             spheres: vec![Sphere {
                 center: DVec3::new(1.0, 0.0, 0.0),

@@ -51,7 +51,7 @@ pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) 
             translate: DVec3::ZERO,
             rotate,
             scale,
-            group: glam::DMat3::IDENTITY,
+            group: DMat3::IDENTITY,
         }],
         materials,
         textures: Vec::new(),
