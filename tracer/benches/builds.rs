@@ -178,6 +178,7 @@ fn compile_spheres(ball: Ball, count: usize) -> Duration {
         triangles: vec![],
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     };
     least(|| {
         if let Err(error) = CompiledScene::new(scene.clone(), [], []) {

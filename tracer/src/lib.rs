@@ -70,9 +70,10 @@ pub mod texture;
 
 pub use cancel::{Cancelled, IsCancelled};
 pub use compile::{CompileError, CompiledScene};
-pub use film::PixelFormat;
+pub use film::{MAX_RADIANCE, PixelSums};
 pub use frame::{Basis, PreparedFrame};
 pub use integrator::{Stage, Watch, render_rows, render_rows_watched};
 pub use intersect::{Primitive, RayHit, RaySegment};
 pub use rays::{RayCounts, TILE_SIZE, tile_rows};
+pub use scene::PixelFormat;
 pub use simd::best_name as simd_level;

@@ -1,4 +1,4 @@
-//! Blinn-Phong materials as plain data.
+//! Materials as plain data.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Largest Blinn-Phong exponent.
 pub const MAX_EXPONENT: f32 = 1e6;
 
-/// A Blinn-Phong material.
+/// A material: Blinn-Phong with mirrors and glass, or metallic-roughness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// c_d, linear RGB; a factor of the texel where there is a texture.
@@ -47,6 +47,25 @@ pub struct Material {
     pub absorption: Vec3,
     /// Whether it casts shadows: without, it lets all light through to what is behind.
     pub casts_shadow: bool,
+    /// The metallic-roughness model in place of Blinn-Phong: c_d is then the base colour, and c_s, p_r, c_r and c_t are those by which the
+    /// direct integrator shows the material.
+    pub metallic_roughness: Option<MetallicRoughness>,
+}
+
+/// The metallic-roughness model of glTF 2.0. The base colour and the index of refraction are those of the [`Material`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MetallicRoughness {
+    /// Share of metal, from 0 to 1.
+    pub metallic: f32,
+    /// Perceptual roughness, from 0 to 1: the square root of the GGX width alpha.
+    pub roughness: f32,
+    /// Share of the light that is not reflected and is transmitted, not scattered, from 0 to 1.
+    pub transmission: f32,
+    /// Factor of the reflectance of what is not metal, from 0 to 1.
+    pub specular_factor: f32,
+    /// Texture whose green is a factor of the roughness and whose blue is one of the share of metal, an index into
+    /// [`crate::scene::Scene::textures`]. Valid only on geometry with texture coordinates.
+    pub texture: Option<u32>,
 }
 
 /// A pattern of cubes or squares in two colours.
@@ -108,12 +127,14 @@ impl Material {
         fresnel: false,
         absorption: Vec3::ONE,
         casts_shadow: true,
+        metallic_roughness: None,
     };
 
     /// All textures of the material, as indices into [`crate::scene::Scene::textures`].
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         let normals = self.normal_map.map(|map| map.texture);
-        [self.texture, self.cutout, self.emission_texture, normals].into_iter().flatten()
+        let rough = self.metallic_roughness.and_then(|model| model.texture);
+        [self.texture, self.cutout, self.emission_texture, normals, rough].into_iter().flatten()
     }
 
     /// Whether it needs texture coordinates: it has a texture, or a checker pattern that is laid in them.

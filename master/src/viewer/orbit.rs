@@ -90,7 +90,15 @@ mod tests {
 
     fn base() -> FrameView {
         let camera = camera(DVec3::new(0.0, 1.0, 4.0), DVec3::new(0.0, 1.0, 0.0), DVec3::Y);
-        FrameView { camera, width: 64, height: 48, samples: 1, spin: 0.0, quality: Quality::default() }
+        FrameView {
+            camera,
+            width: 64,
+            height: 48,
+            samples: 1,
+            spin: 0.0,
+            quality: Quality::default(),
+            ..FrameView::default()
+        }
     }
 
     #[test]

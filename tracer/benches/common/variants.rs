@@ -252,5 +252,6 @@ fn ambient_only(width: u32, height: u32) -> Scene {
         triangles: vec![triangle([0, 1, 2]), triangle([0, 2, 3])],
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     }
 }

@@ -4,21 +4,23 @@
 //!   pixel_format   bytes per pixel and their range
 //!   encode         means of samples, sixteen pixels at a time
 //!   dither         ordered dither, and reduction to fewer colours
+//!   sums           exact sums of samples
 //! ```
 
 mod dither;
 mod encode;
 mod pixel_format;
+mod sums;
 
 use std::ops::Range;
 
 use crate::frame::PreparedFrame;
 use crate::image;
-use crate::scene::{ColorDepth, Quality};
+use crate::scene::{ColorDepth, PixelFormat, Quality};
 
 pub(crate) use dither::Dither;
 pub(crate) use encode::{Means, PixelBytes, write_corner_means, write_samples};
-pub use pixel_format::PixelFormat;
+pub use sums::{MAX_RADIANCE, PixelSums};
 
 /// The requested pixels of a tile.
 pub(crate) struct TilePixels {

@@ -96,6 +96,7 @@ fn ground() -> Scene {
         triangles: Vec::new(),
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     }
 }
 

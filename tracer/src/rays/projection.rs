@@ -171,7 +171,18 @@ mod tests {
             kind,
         };
         let quality = Quality::default();
-        CameraRays::new(&FrameView { camera, width: 64, height: 48, samples: 4, spin: 0.0, quality }, 1.0)
+        CameraRays::new(
+            &FrameView {
+                camera,
+                width: 64,
+                height: 48,
+                samples: 4,
+                spin: 0.0,
+                quality,
+                ..FrameView::default()
+            },
+            1.0,
+        )
     }
 
     #[test]

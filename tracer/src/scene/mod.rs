@@ -17,8 +17,9 @@ mod toml;
 mod validate;
 
 pub use data::{
-    Attenuation, Background, Camera, CameraKind, Disk, FovAxis, FrameView, Light, LightKind, Model,
-    NormalMode, Plane, RenderSettings, Scene, SceneFeatures, Sky, SkyPicture, Sphere, Triangle,
+    Attenuation, Background, Camera, CameraKind, Disk, FovAxis, FrameView, Integrator, Lens, Light,
+    LightKind, Model, NormalMode, PathSettings, PixelFormat, Plane, RenderSettings, Sampler, Scene,
+    SceneFeatures, Sky, SkyPicture, Sphere, ToneCurve, ToneMapping, Triangle,
 };
 #[cfg(feature = "import")]
 pub use import::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError, Up};
@@ -32,6 +33,6 @@ pub use validate::{
 };
 
 pub(crate) use crate::material::is_squared;
-pub use crate::material::{Checker, CheckerSpace, MAX_EXPONENT, Material, NormalMap};
+pub use crate::material::{Checker, CheckerSpace, MAX_EXPONENT, Material, MetallicRoughness, NormalMap};
 pub use crate::rotation;
 pub use crate::texture::{Filter, MAX_TILING, TextureMap, Tiling, Wrap};

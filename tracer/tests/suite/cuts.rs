@@ -88,7 +88,15 @@ fn a_frame_cut_into_rows_is_the_same_frame_with_every_kind_of_camera() {
             let (width, height) = (1 + next(&mut state) % 70, 1 + next(&mut state) % 50);
             let (grid, adaptive) = (1 + next(&mut state) % 3, next(&mut state).is_multiple_of(2));
             let quality = Quality { adaptive, ..Quality::default() };
-            let view = FrameView { camera, width, height, samples: grid * grid, spin: 0.0, quality };
+            let view = FrameView {
+                camera,
+                width,
+                height,
+                samples: grid * grid,
+                spin: 0.0,
+                quality,
+                ..FrameView::default()
+            };
             let frame = PreparedFrame::new(Arc::clone(&scene), &view).unwrap();
             let whole = rendered(&frame, 0..height);
             let cuts = cuts(height, &mut state);

@@ -23,7 +23,8 @@ fn loaded(name: &str) -> LoadedScene {
 fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
     let scene = &loaded.scene;
     let (width, height, quality) = (WIDTH, HEIGHT, Quality::default());
-    let view = FrameView { width, height, samples: 1, camera: *camera, spin: 0.0, quality };
+    let view =
+        FrameView { width, height, samples: 1, camera: *camera, spin: 0.0, quality, ..FrameView::default() };
     let (meshes, textures) = (loaded.meshes.iter().cloned(), loaded.textures.iter().cloned());
     let compiled = Arc::new(CompiledScene::new(scene.clone(), meshes, textures).unwrap());
     let frame = PreparedFrame::new(compiled, &view).unwrap();

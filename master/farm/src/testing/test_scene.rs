@@ -26,6 +26,7 @@ pub fn scene() -> Scene {
         triangles: Vec::new(),
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     }
 }
 

@@ -296,7 +296,7 @@ proptest! {
             prop_assert!(camera.position.is_finite() && camera.look_at.is_finite() && camera.up.is_finite());
             prop_assert!(camera.position.distance(camera.look_at) > 0.0);
             let (width, height, samples, quality) = (64, 48, 1, Quality::default());
-            let view = FrameView { camera, width, height, samples, spin: 0.0, quality };
+            let view = FrameView { camera, width, height, samples, spin: 0.0, quality, ..FrameView::default() };
             prop_assert!(view.validate().is_ok(), "{:?}", camera);
             let steepness = forward(&camera).dot(camera.up.normalize()).abs();
             prop_assert!(steepness <= (89.0_f64).to_radians().sin() + 1e-6, "flips over the pole at {steepness}");

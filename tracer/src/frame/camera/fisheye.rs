@@ -79,7 +79,15 @@ mod tests {
             kind: CameraKind::Fisheye,
         };
         let quality = Quality::default();
-        FisheyeRays::new(&FrameView { camera, width, height, samples: 1, spin: 0.0, quality })
+        FisheyeRays::new(&FrameView {
+            camera,
+            width,
+            height,
+            samples: 1,
+            spin: 0.0,
+            quality,
+            ..FrameView::default()
+        })
     }
 
     fn close(ray: FisheyeRay, direction: DVec3) -> bool {

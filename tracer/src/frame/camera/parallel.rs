@@ -87,7 +87,10 @@ mod tests {
             kind: CameraKind::Orthographic { view_height: 2.0 },
         };
         let quality = Quality::default();
-        ParallelRays::new(&FrameView { camera, width, height, samples, spin: 0.0, quality }, 2.0)
+        ParallelRays::new(
+            &FrameView { camera, width, height, samples, spin: 0.0, quality, ..FrameView::default() },
+            2.0,
+        )
     }
 
     #[test]

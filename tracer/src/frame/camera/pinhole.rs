@@ -83,7 +83,15 @@ mod tests {
             zoom: 1.0,
             kind: CameraKind::PINHOLE,
         };
-        FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() }
+        FrameView {
+            camera,
+            width,
+            height,
+            samples,
+            spin: 0.0,
+            quality: Quality::default(),
+            ..FrameView::default()
+        }
     }
 
     fn vertical(view: &FrameView) -> PinholeRays {

@@ -189,6 +189,7 @@ mod tests {
             planes: vec![Plane { point: DVec3::NEG_Y * scale, normal: DVec3::NEG_Y, material: 1, size: 1.0 }],
             triangles: vec![],
             disks: vec![],
+            ..Scene::default()
         }
     }
 

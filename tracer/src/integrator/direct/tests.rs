@@ -40,6 +40,7 @@ fn empty() -> Scene {
         triangles: vec![],
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     }
 }
 

@@ -77,6 +77,7 @@ fn scene_of(corners: &[[f64; 9]], rotate: DVec3, scale: DVec3) -> (Scene, Arc<Co
         triangles: corners.iter().take(2).map(single).collect(),
         disks: Vec::new(),
         background_visible: true,
+        ..Scene::default()
     };
     (scene, mesh)
 }

@@ -54,6 +54,7 @@ fn frame_of(mesh: &Mesh, eye: DVec3, change: impl FnOnce(&mut Scene)) -> Prepare
         triangles: vec![],
         disks: Vec::new(),
         background_visible: true,
+        ..Scene::default()
     };
     change(&mut scene);
     let view = FrameView::of(&scene);

@@ -56,6 +56,7 @@ fn empty() -> Scene {
         disks: vec![],
         planes: vec![],
         triangles: vec![],
+        ..Scene::default()
     }
 }
 

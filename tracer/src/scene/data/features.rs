@@ -165,6 +165,7 @@ mod tests {
             triangles: Vec::new(),
             disks: Vec::new(),
             background_visible: true,
+            ..Scene::default()
         }
     }
 

@@ -1,8 +1,11 @@
 //! The scene as plain data: no file handles, no acceleration structures, nothing derived.
 
 mod features;
+mod integrator;
+mod lens;
 mod light;
 mod objects;
+mod picture;
 mod quality;
 mod scale;
 mod setting;
@@ -12,8 +15,11 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 pub use features::SceneFeatures;
+pub use integrator::{Integrator, PathSettings, Sampler};
+pub use lens::Lens;
 pub use light::{Attenuation, Light, LightKind};
 pub use objects::{Disk, Model, NormalMode, Plane, Sphere, Triangle};
+pub use picture::{PixelFormat, ToneCurve, ToneMapping};
 pub use quality::{ColorDepth, ExponentPrecision, Quality, Shading, word_of};
 pub use scale::RenderScale;
 pub use setting::Setting;
@@ -31,6 +37,8 @@ pub struct Scene {
     pub render: RenderSettings,
     /// Initial camera.
     pub camera: Camera,
+    /// The camera's lens.
+    pub lens: Lens,
     /// Radiance of rays that hit nothing.
     pub background: Background,
     /// Whether rays of the camera see the background; without, they see black. Reflected and transmitted rays see it always.
@@ -51,4 +59,26 @@ pub struct Scene {
     pub planes: Vec<Plane>,
     /// Single triangles of the scene file.
     pub triangles: Vec<Triangle>,
+}
+
+impl Default for Scene {
+    /// A scene without any object or light, with a black background.
+    fn default() -> Self {
+        Self {
+            ambient: Vec3::ZERO,
+            render: RenderSettings::default(),
+            camera: Camera::default(),
+            lens: Lens::default(),
+            background: Background::Color(Vec3::ZERO),
+            background_visible: true,
+            lights: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            models: Vec::new(),
+            spheres: Vec::new(),
+            disks: Vec::new(),
+            planes: Vec::new(),
+            triangles: Vec::new(),
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Quality, RenderScale, Scene, Setting};
+use super::{Integrator, Lens, PixelFormat, Quality, RenderScale, Scene, Setting, ToneMapping};
 
 /// Picture size and sampling.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,17 +12,29 @@ pub struct RenderSettings {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Rays per pixel: a square number, n * n on a regular grid.
+    /// How light is computed.
+    pub integrator: Integrator,
+    /// Rays per pixel: with direct light a square number, n * n on a regular grid; any number of paths.
     pub samples: u32,
     /// Quality knobs.
     pub quality: Quality,
     /// Share of width and height that is rendered.
     pub scale: RenderScale,
+    /// How light becomes colours.
+    pub tone: ToneMapping,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { width: 1024, height: 768, samples: 1, quality: Quality::default(), scale: RenderScale::Full }
+        Self {
+            width: 1024,
+            height: 768,
+            integrator: Integrator::Direct,
+            samples: 1,
+            quality: Quality::default(),
+            scale: RenderScale::Full,
+            tone: ToneMapping::default(),
+        }
     }
 }
 
@@ -73,6 +85,20 @@ pub enum CameraKind {
     /// All rays start at the position, at an angle to the view direction of r fov / 2 (equidistant), where r is the distance from the
     /// picture's centre in units of half its smaller side. Pixels with r > 1 show the background.
     Fisheye,
+}
+
+impl Default for Camera {
+    /// At the origin, towards -Z.
+    fn default() -> Self {
+        Self {
+            kind: CameraKind::PINHOLE,
+            position: DVec3::ZERO,
+            look_at: DVec3::NEG_Z,
+            up: DVec3::Y,
+            fov: 40.0,
+            zoom: 1.0,
+        }
+    }
 }
 
 impl CameraKind {
@@ -137,28 +163,57 @@ pub enum SkyPicture {
 pub struct FrameView {
     /// Camera of this frame.
     pub camera: Camera,
+    /// The camera's lens.
+    pub lens: Lens,
     /// Pixels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Rays per pixel, a square number.
+    /// How light is computed.
+    pub integrator: Integrator,
+    /// Rays per pixel: with direct light a square number; any number of paths.
     pub samples: u32,
+    /// Number of the first sample of each pixel. Only paths begin later than at 0: a pass of a picture has the samples from this one.
+    pub first_sample: u32,
     /// Degrees by which every model is rotated about the +Y axis through its own origin, after its own rotation.
     pub spin: f64,
     /// Quality knobs.
     pub quality: Quality,
+    /// How light becomes colours.
+    pub tone: ToneMapping,
+    /// Format of the rendered pixels.
+    pub format: PixelFormat,
+}
+
+impl Default for FrameView {
+    /// The view of [`Scene::default`].
+    fn default() -> Self {
+        Self::of(&Scene::default())
+    }
 }
 
 impl FrameView {
-    /// Whether adaptive sampling takes effect: enabled, with more than one sample per pixel.
+    /// Whether the direct integrator samples adaptively: enabled, with more than one sample per pixel.
     pub fn is_adaptive(&self) -> bool {
-        self.quality.adaptive && self.samples > 1
+        self.quality.adaptive && self.samples > 1 && self.integrator == Integrator::Direct
     }
 
     /// The frame that the scene requests, at full scale.
     pub fn of(scene: &Scene) -> Self {
-        let RenderSettings { width, height, samples, quality, .. } = scene.render;
-        Self { camera: scene.camera, width, height, samples, spin: 0.0, quality }
+        let RenderSettings { width, height, integrator, samples, quality, tone, .. } = scene.render;
+        Self {
+            camera: scene.camera,
+            lens: scene.lens,
+            width,
+            height,
+            integrator,
+            samples,
+            first_sample: 0,
+            spin: 0.0,
+            quality,
+            tone,
+            format: PixelFormat::Rgb8,
+        }
     }
 
     /// Sample count and knobs, with the scale at which the view is rendered.
@@ -205,6 +260,7 @@ mod tests {
             samples: 1,
             spin: 5.0,
             quality: Quality::default(),
+            ..FrameView::default()
         };
         let quality = Quality { adaptive: true, ..Quality::default() };
         let setting = Setting { samples: 4, scale: RenderScale::Half, quality };

@@ -85,6 +85,7 @@ fn assemble(
         triangles: text.triangles,
         disks: text.disks,
         background_visible: text.background.visible,
+        ..Scene::default()
     };
     for model in &text.models {
         let instance = models.instance(model, &mut scene.materials, &text.textures, locate)?;

@@ -55,6 +55,7 @@ fn scene() -> Scene {
         triangles: vec![Triangle { vertices: [DVec3::X, DVec3::Y, DVec3::Z], uvs: None, material: 1 }],
         disks: vec![Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 2.0, material: 0 }],
         background_visible: true,
+        ..Scene::default()
     }
 }
 

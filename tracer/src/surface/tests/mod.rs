@@ -46,6 +46,7 @@ fn empty() -> Scene {
         disks: vec![],
         planes: vec![],
         triangles: vec![],
+        ..Scene::default()
     }
 }
 

@@ -40,6 +40,7 @@ pub(crate) fn empty(width: u32, height: u32) -> Scene {
         triangles: vec![],
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     }
 }
 

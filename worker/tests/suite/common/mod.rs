@@ -82,6 +82,7 @@ impl Stage {
             triangles: vec![],
             background_visible: true,
             disks: Vec::new(),
+            ..Scene::default()
         };
         let view = FrameView::of(&scene);
         let body = codec::encode(&scene).unwrap().into();

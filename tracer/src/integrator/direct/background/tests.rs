@@ -50,6 +50,7 @@ fn scene(textures: &[Texture], rotate: f64, strength: f32) -> Scene {
         disks: Vec::new(),
         planes: Vec::new(),
         triangles: Vec::new(),
+        ..Scene::default()
     }
 }
 

@@ -39,6 +39,7 @@ fn under_white_sky() -> Scene {
         disks: vec![],
         planes: vec![],
         triangles: vec![],
+        ..Scene::default()
     }
 }
 

@@ -89,6 +89,7 @@ fn scene() -> Scene {
             material: 3,
         }],
         background_visible: true,
+        ..Scene::default()
     }
 }
 

@@ -82,6 +82,7 @@ fn frame(random: &mut Random) -> PreparedFrame {
             .map(|_| Disk { center: place(), normal: place().normalize(), radius: 0.3, material: 0 })
             .collect(),
         background_visible: true,
+        ..Scene::default()
     };
     let compiled = CompiledScene::new(scene.clone(), [Arc::new(mesh)], []).unwrap();
     PreparedFrame::new(Arc::new(compiled), &FrameView::of(&scene)).unwrap()

@@ -40,7 +40,15 @@ fn check_mirrored(seed: u64) -> usize {
     let grid = 1 + random.below(4) as u32;
     let size = (1 + random.below(40) as u32, 1 + random.below(40) as u32, grid * grid);
     let (width, height, samples) = size;
-    let view = FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() };
+    let view = FrameView {
+        camera,
+        width,
+        height,
+        samples,
+        spin: 0.0,
+        quality: Quality::default(),
+        ..FrameView::default()
+    };
     let rays = CameraRays::new(&view, 1.0);
     let corner = (random.below(width as usize * 4) as u32, random.below(height as usize * 4) as u32);
     let plane = mirror_before(random, &camera);

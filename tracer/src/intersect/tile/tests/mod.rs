@@ -213,6 +213,7 @@ fn frame_of(
         triangles: singles.iter().map(single).collect(),
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     };
     let view = FrameView::of(&scene);
     PreparedFrame::new(Arc::new(CompiledScene::new(scene, mesh, []).unwrap()), &view).unwrap()
@@ -298,7 +299,15 @@ fn check_closest(seed: u64, camera: fn(&mut Random) -> Camera) {
     let grid = 1 + random.below(4) as u32;
     let size = (1 + random.below(40) as u32, 1 + random.below(40) as u32, grid * grid);
     let (width, height, samples) = size;
-    let view = FrameView { camera, width, height, samples, spin: 0.0, quality: Quality::default() };
+    let view = FrameView {
+        camera,
+        width,
+        height,
+        samples,
+        spin: 0.0,
+        quality: Quality::default(),
+        ..FrameView::default()
+    };
     let rays = CameraRays::new(&view, 1.0);
     let corner = (random.below(width as usize * 4) as u32, random.below(height as usize * 4) as u32);
     let side = SIDE as u32;

@@ -60,6 +60,7 @@ pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) 
         triangles: Vec::new(),
         background_visible: true,
         disks: Vec::new(),
+        ..Scene::default()
     }
 }
 
