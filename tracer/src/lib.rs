@@ -36,6 +36,7 @@
 //!   intersect    rays to hits
 //!   surface      hits to points, normals, materials
 //!   light, bsdf  incident light, reflection
+//!   sampler      random numbers of paths
 //!   film         samples to pixels
 //!   integrator   the loop over tiles, and the shading equation
 //!   reference    the same in f64, by brute force
@@ -61,6 +62,7 @@ pub mod numerics;
 mod rays;
 pub mod reference;
 pub mod rotation;
+mod sampler;
 pub mod scene;
 mod shape;
 mod simd;

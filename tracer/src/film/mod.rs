@@ -20,6 +20,7 @@ use crate::scene::{ColorDepth, PixelFormat, Quality};
 
 pub(crate) use dither::Dither;
 pub(crate) use encode::{Means, PixelBytes, write_corner_means, write_samples};
+pub(crate) use sums::write_sums;
 pub use sums::{MAX_RADIANCE, PixelSums};
 
 /// The requested pixels of a tile.

@@ -24,6 +24,7 @@ use crate::bvh::WideNode;
 use crate::cancel::{IsCancelled, go_on, never};
 use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, transformed_bounds};
 use crate::light::EyeLight;
+use crate::light::table::LightTable;
 use crate::rotation::sin_cos_degrees;
 use crate::scene::{Background, Camera, Filter, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
 use crate::shape::{EyeDisk, EyePlane, EyeSphere};
@@ -60,6 +61,8 @@ pub struct PreparedFrame {
     /// Largest error bound of any surface, in eye units.
     pub(crate) coarsest: f64,
     pub(crate) lights: Vec<EyeLight>,
+    /// The lights that paths select from; only in frames of the path integrator.
+    pub(crate) light_table: Option<LightTable>,
     /// The background as rays of the camera see it.
     pub(crate) seen_background: Background,
     /// Sine and cosine of the rotation of a sky.
@@ -138,6 +141,7 @@ impl PreparedFrame {
             planes,
             coarsest,
             lights: lights(source, &view.quality, &to_eye),
+            light_table: None,
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
@@ -149,6 +153,7 @@ impl PreparedFrame {
         go_on(cancelled)?;
         frame.make_pyramids();
         go_on(cancelled)?;
+        frame.light_table = view.integrator.path().and_then(|_| LightTable::of(&frame));
         frame.translucent = frame.find_translucent();
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)

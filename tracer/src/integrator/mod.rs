@@ -2,13 +2,17 @@
 //!
 //! ```text
 //!   direct     a tile of rays, from its hits to its colours: direct light, shadows, emission, bounces, background
+//!   path       a tile of paths, from its rays to the radiance of its samples
+//!   background rays without a hit
 //!   regular    bands of tiles with the same samples in every pixel
 //!   adaptive   bands of tiles with few samples where the picture is smooth, all of them elsewhere
 //!   stage      the stages of a tile, for benchmarks
 //! ```
 
 mod adaptive;
+mod background;
 mod direct;
+mod path;
 mod regular;
 mod stage;
 #[cfg(test)]
@@ -20,6 +24,7 @@ use crate::cancel::Cancelled;
 use crate::film;
 use crate::frame::PreparedFrame;
 use crate::rays::RayCounts;
+use crate::scene::Integrator;
 use crate::simd::dispatch;
 pub use stage::{Stage, Watch};
 
@@ -68,7 +73,9 @@ pub fn render_rows_watched<W: Watch>(
         let bottom = (top + 1).next_multiple_of(band_rows).min(rows.end);
         let start = (top - rows.start) as usize * row_bytes;
         let band = &mut out[start..start + (bottom - top) as usize * row_bytes];
-        counts += if adaptive {
+        counts += if let Integrator::Path(settings) = &frame.view().integrator {
+            dispatch!(frame.level, simd => path::render_band(simd, frame, settings, top..bottom, band, cancelled, &mut *watch))?
+        } else if adaptive {
             dispatch!(frame.level, simd => adaptive::render_band(simd, frame, top..bottom, band, cancelled, &mut *watch))?
         } else {
             dispatch!(frame.level, simd => regular::render_band(simd, frame, top..bottom, band, cancelled, &mut *watch))?

@@ -2,9 +2,11 @@
 //!
 //! ```text
 //!   extent   the points on a light with a radius
+//!   table    lights of paths, selected at random
 //! ```
 
 pub(crate) mod extent;
+pub(crate) mod table;
 
 use glam::{DVec3, Vec3};
 

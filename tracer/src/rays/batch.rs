@@ -22,7 +22,7 @@ pub(crate) struct RayBatch<'a> {
     /// Whether most rays hit points near those of their neighbours.
     pub neighbours: bool,
     /// Whether the rays are those of a camera.
-    pub(super) of_camera: bool,
+    pub(crate) of_camera: bool,
 }
 
 impl<'a> RayBatch<'a> {

@@ -27,7 +27,7 @@ pub(crate) type TileColors = [[Lanes; 3]; BLOCKS];
 /// the same number of rays at any number of samples, so with more samples it has fewer rows. Bands of adaptive frames have
 /// [`TILE_SIZE`] rows.
 pub fn tile_rows(view: &FrameView) -> u32 {
-    if view.is_adaptive() { TILE_SIZE } else { (TILE_SIZE / view.samples.isqrt().max(1)).max(1) }
+    if view.is_adaptive() { TILE_SIZE } else { (TILE_SIZE / view.grid().max(1)).max(1) }
 }
 
 impl PreparedFrame {

@@ -139,6 +139,36 @@ pub(crate) fn atan2<S: Simd>(simd: S, y: f32x16<S>, x: f32x16<S>) -> f32x16<S> {
     select(y.simd_lt(zero), -angle, angle)
 }
 
+/// Sine and cosine of angles of at most 8 pi, in radians; error below 2e-7.
+///
+/// The angle is reduced to [-pi / 4, pi / 4] by the nearest multiple of pi / 2, which is subtracted in three parts (Cody and Waite), and the
+/// series of sine and cosine are exchanged by its quadrant.
+#[inline(always)]
+pub(crate) fn sin_cos<S: Simd>(simd: S, angle: f32x16<S>) -> [f32x16<S>; 2] {
+    let quadrant = (angle * splat(simd, std::f32::consts::FRAC_2_PI)).round_ties_even();
+    // The parts of pi / 2: products with the quadrant are exact for the first two.
+    let r = angle - quadrant * splat(simd, 1.570_312_5);
+    let r = r - quadrant * splat(simd, 4.837_513e-4);
+    let r = r - quadrant * splat(simd, 7.549_789_4e-8);
+    let r2 = r * r;
+    let series = |coefficients: [f32; 4]| {
+        let mut sum = splat(simd, coefficients[3]);
+        for i in 0..3 {
+            sum = sum * r2 + splat(simd, coefficients[2 - i]);
+        }
+        sum
+    };
+    let one = splat(simd, 1.0);
+    let sine = r + r * r2 * series([-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
+    let cosine = one + r2 * series([-0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0]);
+    let turns = simd.cvt_i32_f32x16(quadrant);
+    let odd = (turns & i32x16::splat(simd, 1)).simd_eq(i32x16::splat(simd, 1));
+    let second = |shift: i32| (turns + i32x16::splat(simd, shift)) & i32x16::splat(simd, 2);
+    let negative = |shift: i32| second(shift).simd_eq(i32x16::splat(simd, 2));
+    let (sin, cos) = (select(odd, cosine, sine), select(odd, sine, cosine));
+    [select(negative(0), -sin, sin), select(negative(1), -cos, cos)]
+}
+
 /// The power of two that scales each number into [1, 2), exactly. Numbers must not be negative; the result is unusable for
 /// subnormal ones.
 #[inline(always)]
@@ -191,6 +221,28 @@ mod tests {
                     let allowed = if which == 2 { tolerance } else { tolerance * expected.abs() + 1e-12 };
                     assert!(error <= allowed, "{which}({x}) = {y}, not {expected}");
                 }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn circle<S: Simd>(simd: S, x: [f32; LANES]) -> [[f32; LANES]; 2] {
+        sin_cos(simd, f32x16::load_array(simd, x)).map(|numbers| numbers.to_array())
+    }
+
+    #[test]
+    fn sines_are_accurate_and_equal_on_every_level() {
+        for step in 0..1000 {
+            let x = sixteen(-25.0, 25.0, step);
+            let first = dispatch!(all()[0], simd => circle(simd, x));
+            for level in all() {
+                let here = dispatch!(level, simd => circle(simd, x));
+                assert_eq!(here.map(|row| row.map(f32::to_bits)), first.map(|row| row.map(f32::to_bits)));
+            }
+            for lane in 0..LANES {
+                let (sin, cos) = (libm::sin(f64::from(x[lane])), libm::cos(f64::from(x[lane])));
+                let errors = [f64::from(first[0][lane]) - sin, f64::from(first[1][lane]) - cos];
+                assert!(errors.iter().all(|error| error.abs() < 2e-7), "{}: {errors:?}", x[lane]);
             }
         }
     }

@@ -42,7 +42,7 @@ impl Cone {
     fn of(view: &FrameView, per_unit: f64) -> Self {
         let (width, height) = (f64::from(view.width), f64::from(view.height));
         let Camera { fov, zoom, .. } = view.camera;
-        let samples = f64::from(view.samples.isqrt());
+        let samples = f64::from(view.grid());
         let plane = |side: f64| 2.0 * libm::tan(fov.to_radians() / 2.0) / (zoom * side * samples);
         match view.camera.kind {
             CameraKind::Pinhole { fov_axis: FovAxis::Vertical } => Self { base: 0.0, growth: plane(height) },

@@ -18,6 +18,7 @@
 //!   pattern        cubes and squares in two colours
 //!   normal_map     shading normals tilted by textures
 //!   material       colours and exponents of the materials
+//!   of_batch       the points of a batch of rays
 //! ```
 
 mod detail;
@@ -28,6 +29,7 @@ mod footprint;
 mod group;
 mod material;
 mod normal_map;
+mod of_batch;
 mod pattern;
 mod place;
 mod space;

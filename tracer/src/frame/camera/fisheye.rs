@@ -40,7 +40,7 @@ impl FisheyeRays {
             center: [view.width, view.height].map(|side| f64::from(side) / 2.0),
             radius: f64::from(view.width.min(view.height)) / 2.0,
             half_angle: view.camera.fov.to_radians() / 2.0,
-            grid: view.samples.isqrt(),
+            grid: view.grid(),
         }
     }
 

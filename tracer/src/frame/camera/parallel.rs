@@ -37,7 +37,7 @@ impl ParallelRays {
             down: -up,
             step: height / f64::from(view.height),
             center: [view.width, view.height].map(|side| f64::from(side) / 2.0),
-            grid: view.samples.isqrt(),
+            grid: view.grid(),
         }
     }
 

@@ -34,7 +34,7 @@ impl PinholeRays {
             corner: forward - right * half_width + up * half_height,
             right: right * (2.0 * half_width / width),
             down: -up * (2.0 * half_height / height),
-            grid: view.samples.isqrt(),
+            grid: view.grid(),
         }
     }
 

@@ -10,21 +10,20 @@
 //! ```text
 //!   context      a tile of rays, from its hits to its colours
 //!   auxiliary    pictures without light: normals, depth, items, diffuse colours
-//!   background   rays without a hit
 //!   bounce       reflected and transmitted rays
 //!   emission     unlit materials, and light that surfaces emit
 //!   shadow       S_j
 //! ```
 
 mod auxiliary;
-mod background;
 mod bounce;
 mod context;
 mod emission;
-mod shadow;
+pub(super) mod shadow;
 #[cfg(test)]
 mod tests;
 
+use super::background;
 use super::stage::{Stage, Watch};
 use crate::bsdf;
 use crate::frame::PreparedFrame;

@@ -193,6 +193,14 @@ impl Default for FrameView {
 }
 
 impl FrameView {
+    /// Samples along a side of a pixel: with direct light they are a regular grid, and paths have one random place at a time.
+    pub fn grid(&self) -> u32 {
+        match self.integrator {
+            Integrator::Direct => self.samples.isqrt(),
+            Integrator::Path(_) => 1,
+        }
+    }
+
     /// Whether the direct integrator samples adaptively: enabled, with more than one sample per pixel.
     pub fn is_adaptive(&self) -> bool {
         self.quality.adaptive && self.samples > 1 && self.integrator == Integrator::Direct

@@ -7,11 +7,9 @@
 //!
 //! ```text
 //!   secondary   rays that a surface reflects or transmits
-//!   media       the transparent bodies around a ray
 //!   mirrors     rays that one plane reflects: traced as a tile
 //! ```
 
-mod media;
 mod mirrors;
 mod secondary;
 #[cfg(test)]
@@ -19,6 +17,7 @@ mod tests;
 
 use glam::DVec3;
 
+use crate::bsdf::Media;
 use crate::cancel::Cancelled;
 use crate::frame::PreparedFrame;
 use crate::intersect::tile::Scratch;
@@ -28,7 +27,6 @@ use crate::rays::{
 use crate::scene::Material;
 use crate::simd::{LANES, Lanes, Simd, each_bit};
 use crate::surface::{SurfaceBlock, Surfaces};
-use media::Media;
 use mirrors::Mirrors;
 use secondary::{Interaction, Secondary};
 

@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 
-use super::media::Media;
-use crate::bsdf::{fresnel, fresnel_of_sheet, on_side_of, reflected, refracted};
+use crate::bsdf::{Media, fresnel, fresnel_of_sheet, on_side_of, reflected, refracted};
 use crate::frame::PreparedFrame;
 use crate::rays::{PrimitiveId, Ray};
 use crate::scene::Material;

@@ -23,7 +23,7 @@ pub(super) fn is_partial(frame: &PreparedFrame, light: &EyeLight) -> bool {
 
 /// Bits of the lit points of a tile that are in the shadow of a light.
 #[inline(always)]
-pub(super) fn occluded<S: Simd, R: SurfaceSource>(
+pub(in crate::integrator) fn occluded<S: Simd, R: SurfaceSource>(
     simd: S,
     rays: &R,
     hits: &[HitBlock; BLOCKS],

@@ -10,14 +10,14 @@ const DEEPEST: usize = 4;
 /// The materials of the transparent bodies around a point, the innermost last. A ray of the camera starts in none, so a camera in
 /// glass is noticed where a ray leaves a body that it never entered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Media {
+pub(crate) struct Media {
     materials: [u32; DEEPEST],
     count: u8,
 }
 
 /// What a ray crosses at a surface of a transparent body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Interface {
+pub(crate) struct Interface {
     /// n_from / n_to.
     pub eta: f64,
     /// The bodies around the far side.
@@ -55,7 +55,7 @@ impl Media {
     }
 
     /// The surface of a body of a material: a ray enters through the front, and leaves through the back.
-    pub(super) fn interface(&self, materials: &[Material], material: u32, front: bool) -> Interface {
+    pub(crate) fn interface(&self, materials: &[Material], material: u32, front: bool) -> Interface {
         let index_in =
             |media: &Self| media.innermost().map_or(1.0, |inside| f64::from(materials[inside as usize].ior));
         let own = &materials[material as usize];
@@ -68,12 +68,12 @@ impl Media {
     }
 
     /// Whether light may be absorbed on a way that ends at a surface of a material.
-    pub(super) fn may_absorb(&self, materials: &[Material], end: &Material) -> bool {
+    pub(crate) fn may_absorb(&self, materials: &[Material], end: &Material) -> bool {
         absorbs(end) || self.innermost().is_some_and(|inside| absorbs(&materials[inside as usize]))
     }
 
     /// Share of light that is left after a way inside, which ends at a surface of a material; `way` in world units.
-    pub(super) fn transmittance(&self, materials: &[Material], end: (u32, bool), way: f64) -> Option<DVec3> {
+    pub(crate) fn transmittance(&self, materials: &[Material], end: (u32, bool), way: f64) -> Option<DVec3> {
         let absorption = self.absorbing(materials, end)?;
         Some(DVec3::from_array(absorption.to_array().map(|share| libm::pow(f64::from(share), way))))
     }
@@ -88,7 +88,7 @@ impl Media {
     }
 
     /// Share of light of the background that reaches the start of the ray: a body without end leaves none of a channel that it absorbs.
-    pub(super) fn transmittance_to_infinity(&self, materials: &[Material]) -> Option<DVec3> {
+    pub(crate) fn transmittance_to_infinity(&self, materials: &[Material]) -> Option<DVec3> {
         let body = &materials[self.innermost()? as usize];
         let left = body.absorption.to_array().map(|share| if share < 1.0 { 0.0 } else { 1.0 });
         Some(DVec3::from_array(left))

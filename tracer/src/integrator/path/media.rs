@@ -1,0 +1,71 @@
+//! Transparent bodies along paths: indices of refraction, and absorption inside.
+
+use glam::DVec3;
+
+use super::group::Group;
+use super::vertex::Incoming;
+use crate::bsdf::Media;
+use crate::rays::RaySource;
+use crate::scene::Material;
+use crate::simd::vector::Vec3x16;
+use crate::simd::{LANES, Lanes, Simd, each_bit, three};
+
+impl Group<'_> {
+    /// The material that a path hits, its index, and whether the path hits its front.
+    fn hit_side(&self, block: usize, lane: usize) -> (&Material, u32, bool) {
+        let surface = &self.surfaces.blocks[block];
+        let index = surface.material.0[lane];
+        let point = DVec3::from_array(three!(axis => f64::from(surface.point[axis].0[lane])));
+        let outwards = self.frame.front_normal(self.hits[block].slot(lane), point);
+        let front = outwards.dot(self.batch.ray(block, lane).direction) < 0.0;
+        (&self.frame.scene().materials[index as usize], index, front)
+    }
+
+    /// n_from / n_to for a path that enters the surface that it hits; 1 for all but transparent bodies.
+    pub(super) fn eta_at(&self, block: usize, lane: usize) -> f32 {
+        let (material, index, front) = self.hit_side(block, lane);
+        if !material.is_transparent() || material.thin {
+            return 1.0;
+        }
+        let media = &self.current[block * LANES + lane].media;
+        media.interface(&self.frame.scene().materials, index, front).eta as f32
+    }
+
+    /// The bodies around a path behind the surface that it hits.
+    pub(super) fn media_behind(&self, block: usize, lane: usize) -> Media {
+        let (material, index, front) = self.hit_side(block, lane);
+        let media = self.current[block * LANES + lane].media;
+        if material.thin {
+            media
+        } else {
+            media.interface(&self.frame.scene().materials, index, front).behind
+        }
+    }
+
+    /// Multiplies the weights of paths by the share of light that is left after their way inside of a body.
+    #[inline(never)]
+    pub(super) fn absorb<S: Simd>(&self, simd: S, block: usize, hit: u32, incoming: &mut Incoming<S>) {
+        let materials = &self.frame.scene().materials;
+        let mut left = [Lanes([1.0; LANES]); 3];
+        let mut any = false;
+        for lane in each_bit(hit) {
+            let (material, index, front) = self.hit_side(block, lane);
+            let media = &self.current[block * LANES + lane].media;
+            if !media.may_absorb(materials, material) {
+                continue;
+            }
+            let surface = &self.surfaces.blocks[block];
+            let point = DVec3::from_array(three!(axis => f64::from(surface.point[axis].0[lane])));
+            let way = (point - self.batch.ray(block, lane).origin).length() / self.frame.per_unit;
+            if let Some(share) = media.transmittance(materials, (index, front), way) {
+                any = true;
+                for channel in 0..3 {
+                    left[channel].0[lane] = share[channel] as f32;
+                }
+            }
+        }
+        if any {
+            incoming.weight = incoming.weight.mul(Vec3x16::load(simd, &left));
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! The path integrator: Monte-Carlo estimates of the rendering equation (Kajiya, "The rendering equation", 1986).
+//!
+//! ```text
+//! T = 1, L = 0
+//! for each vertex:
+//!     no hit: L += T background w, end
+//!     L += T emission w, on the front side
+//!     L += T f(to light) cos / p(light) w, if nothing is in between
+//!     direction by the material: T *= f cos / p(direction); roulette from the fourth vertex on
+//! ```
+//!
+//! w are the weights of multiple importance sampling by the power heuristic (Veach 1997): light that two strategies find counts once. The
+//! first vertex gets the light of all lights without extent, by tiles of shadow rays, and a sample of the others; later ones get a sample
+//! of one light.
+//!
+//! All random numbers are functions of pixel, sample and dimension (`sampler`), and the radiance of a sample is rounded to whole steps
+//! (`film`): a pixel is the same in any segment, pass and thread.
+//!
+//! ```text
+//!   camera    first rays of a sample of each pixel of a tile
+//!   queue     paths that go on, generation by generation
+//!   group     some samples of all pixels of a tile, from their rays to their radiance
+//!   media     transparent bodies: indices of refraction, absorption
+//!   vertex    sixteen paths at the surfaces that they hit
+//!   delta     light of all lights without extent at the first vertices of a tile
+//! ```
+
+mod camera;
+mod delta;
+mod group;
+mod media;
+mod queue;
+mod vertex;
+
+use std::ops::Range;
+
+use super::stage::{Stage, Watch};
+use crate::cancel::Cancelled;
+use crate::film::{PixelSums, TilePixels, write_sums};
+use crate::frame::PreparedFrame;
+use crate::rays::{RayCounts, SIDE};
+use crate::scene::PathSettings;
+use crate::simd::Simd;
+use group::Group;
+
+/// Renders the tiles of a band of rows.
+#[inline(always)]
+pub(super) fn render_band<S: Simd, W: Watch>(
+    simd: S,
+    frame: &PreparedFrame,
+    settings: &PathSettings,
+    rows: Range<u32>,
+    out: &mut [u8],
+    cancelled: &dyn Fn() -> bool,
+    watch: &mut W,
+) -> Result<RayCounts, Cancelled> {
+    let view = frame.view();
+    let side = SIDE as u32;
+    let width = frame.width() as usize;
+    let mut sums = vec![PixelSums::default(); width * rows.len()];
+    let mut group = Group::new(frame, settings, cancelled);
+    for left in (0..frame.width()).step_by(SIDE) {
+        let pixels = TilePixels {
+            left,
+            right: (left + side).min(frame.width()),
+            top: rows.start / side * side,
+            rows: rows.clone(),
+        };
+        watch.enter(Stage::Visible);
+        group.begin(&pixels);
+        let end = view.first_sample + view.samples;
+        for first in (view.first_sample..end).step_by(Group::SAMPLES as usize) {
+            let numbers = first..end.min(first + Group::SAMPLES);
+            group.trace(simd, numbers, watch)?;
+            group.add_to(&pixels, width, &mut sums);
+        }
+    }
+    watch.enter(Stage::Encoding);
+    write_sums(frame, &rows, &sums, out);
+    Ok(group.counts())
+}
