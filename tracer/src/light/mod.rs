@@ -41,6 +41,16 @@ pub(crate) enum Emitter {
     Directional { to_light: DVec3 },
 }
 
+impl Emitter {
+    /// The place of the light; a directional one has none.
+    pub(crate) fn position(&self) -> Option<DVec3> {
+        match *self {
+            Self::Point { position } | Self::Spot { position, .. } => Some(position),
+            Self::Directional { .. } => None,
+        }
+    }
+}
+
 /// The edge of a beam as 1 - cosine of the angle to its axis, a form that stays precise for narrow beams.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {

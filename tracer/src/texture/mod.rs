@@ -11,12 +11,14 @@
 //!   map               filter, wrap, scale and offset of a lookup
 //!   lookup            single lookups in f64, of alpha and normals
 //!   pyramid           smaller and smaller sizes, for surfaces far away
+//!   distribution      random places in the picture of a sky, by its light
 //!   uv                texture coordinates with and without whole repeats
 //! ```
 
 mod alpha;
 pub(crate) mod bilinear;
 mod blob;
+mod distribution;
 mod lookup;
 mod map;
 mod pyramid;

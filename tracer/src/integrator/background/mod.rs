@@ -12,6 +12,7 @@ mod sky;
 #[cfg(test)]
 mod tests;
 
+use crate::frame::PreparedFrame;
 use crate::rays::SurfaceSource;
 use crate::scene::Background;
 use crate::simd::vector::Vec3x16;
@@ -40,5 +41,12 @@ pub(super) fn background<S: Simd, R: SurfaceSource>(
             rays.directions(simd, block).store(colors);
             sky::replace(frame, sky, rays.live(block), colors);
         }
+    }
+}
+
+/// Replaces directions of any length by the radiance of the scene's sky in them, in some lanes (a bit a lane).
+pub(super) fn sky_radiance(frame: &PreparedFrame, lanes: u32, vectors: &mut [Lanes; 3]) {
+    if let Background::Sky(sky) = &frame.scene().background {
+        sky::replace(frame, sky, lanes, vectors);
     }
 }

@@ -1,6 +1,6 @@
 //! Sixteen paths at the surfaces that they hit.
 
-use super::super::background::background;
+use super::super::background::{background, sky_radiance};
 use super::super::stage::{Stage, Watch};
 use super::group::Group;
 use super::queue::Path;
@@ -181,13 +181,11 @@ impl Group<'_> {
             let selection = self.selection(bounce - 1);
             let other = table.density_of_hits(
                 simd,
-                frame,
                 selection,
                 (origins, incoming.direction),
-                &self.hits[block],
+                (&self.hits[block], shining),
                 Vec3x16::load(simd, &surface.point),
             );
-            let other = select(mask_of(simd, shining), other, splat(simd, 0.0));
             light = light.scale(power_heuristic(simd, incoming.density, other));
         }
         self.add(simd, block, shining | ended, bounce, light);
@@ -292,8 +290,8 @@ impl Group<'_> {
         let Some(table) = self.table else { return };
         let numbers = |vertex: Vertex| self.numbers(simd, incoming, Dimension::of(bounce, vertex));
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
-        let select_by = numbers(Vertex::Light);
-        let samples = table.sample(
+        let [select_by, _] = numbers(Vertex::Light);
+        let mut samples = table.sample(
             simd,
             self.frame,
             (points, lanes),
@@ -303,6 +301,15 @@ impl Group<'_> {
         );
         if samples.live == 0 {
             return;
+        }
+        if samples.sky != 0 {
+            let mut radiance = samples.direction;
+            sky_radiance(self.frame, samples.sky, &mut radiance);
+            for lane in each_bit(samples.sky) {
+                for channel in 0..3 {
+                    samples.radiance[channel].0[lane] = radiance[channel].0[lane];
+                }
+            }
         }
         let to_light = Vec3x16::load(simd, &samples.direction);
         let Evaluated { value, density } = scattering.eval(simd, to_light);

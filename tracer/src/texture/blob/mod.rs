@@ -15,6 +15,7 @@ use std::sync::OnceLock;
 use bytemuck::{Pod, Zeroable};
 
 use super::alpha::{LEAST_ALPHA, bleed};
+use super::distribution::Distribution;
 use super::pyramid::Pyramid;
 use super::shared_exponent::{MAX_CHANNEL, pack, unpack};
 use super::{MAX_TEXELS, TextureError, TextureId};
@@ -96,6 +97,8 @@ pub struct Texture {
     id: TextureId,
     /// Smaller pictures, made when they are first needed.
     pyramid: OnceLock<Pyramid>,
+    /// Where the light of a panorama comes from, found when it is first needed.
+    pub(super) light: OnceLock<Option<Distribution>>,
 }
 
 /// Numbers of texels that a linear texture cannot hold as they are.
@@ -200,7 +203,7 @@ impl Texture {
         let id = TextureId(*blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes());
         let alpha = HEADER_BYTES + 3 * width as usize * height as usize;
         let (alpha, linear) = ((version == WITH_ALPHA).then_some(alpha), version == LINEAR);
-        Ok(Self { bytes, width, height, alpha, linear, id, pyramid: OnceLock::new() })
+        Ok(Self { bytes, width, height, alpha, linear, id, pyramid: OnceLock::new(), light: OnceLock::new() })
     }
 
     /// The bytes as they are sent.
