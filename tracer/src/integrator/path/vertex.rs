@@ -329,11 +329,20 @@ impl Group<'_> {
             watch.enter(Stage::Shadows);
             let side = self.surfaces.to_shadow_origins(simd, block, along);
             let origins = arrays(points.add(setting.geometric.scale(side)));
+            let (points, to_light) = (arrays(points), arrays(to_light));
             let mut rays = RayBlock::new(self.frame);
             for lane in each_bit(shadowed) {
-                let direction = three!(axis => samples.direction[axis].0);
-                let ray = Ray { origin: vector(&origins, lane), direction: vector(&direction, lane) };
-                let end = samples.distance[lane] * SHADOW_T_MAX;
+                let origin = vector(&origins, lane);
+                let way = vector(&to_light, lane) * samples.distance[lane];
+                let (ray, end) = if samples.distance[lane].is_finite() {
+                    // To the same point, from another origin. The light itself is no occluder: near lights end earlier.
+                    let direction = vector(&points, lane) + way - origin;
+                    let margin =
+                        2.0 * f64::from(self.surfaces.blocks[block].bias.0[lane]) / direction.length();
+                    (Ray { origin, direction }, SHADOW_T_MAX - margin)
+                } else {
+                    (Ray { origin, direction: vector(&to_light, lane) }, f64::INFINITY)
+                };
                 rays.set(lane, ray, end, self.hits[block].primitive(lane));
             }
             self.counts.shadow += u64::from(shadowed.count_ones());
