@@ -125,6 +125,8 @@ pub enum Event {
         worker: WorkerId,
         /// The ping's nonce.
         nonce: u64,
+        /// Whether its threads have made progress since its previous pong.
+        progressed: bool,
     },
     /// A worker is alive: it is receiving assets.
     Heard {

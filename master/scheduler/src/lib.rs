@@ -49,6 +49,7 @@ mod record;
 mod second;
 mod speculation;
 mod speed;
+mod stall;
 mod timeouts;
 mod verification;
 mod worker;
@@ -59,6 +60,8 @@ mod scenarios;
 mod service_scenarios;
 #[cfg(test)]
 mod sizes_tests;
+#[cfg(test)]
+mod stall_scenarios;
 #[cfg(test)]
 mod transcript;
 #[cfg(test)]
@@ -119,7 +122,7 @@ pub struct Scheduler {
     width: u32,
     actions: VecDeque<Action>,
     next_nonce: u64,
-    /// A worker that holds leases and finishes none for this long is disconnected.
+    /// A worker that holds leases and makes no progress for this long is disconnected.
     stall_timeout: Duration,
     /// Recent worst ratio of actual to predicted lease time, at least 1.
     overrun: f64,
@@ -202,7 +205,7 @@ impl Scheduler {
                 self.rows_rejected(frame, first_row, row_count);
             }
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
-            Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
+            Event::Pong { worker, nonce, progressed } => self.pong(now, worker, nonce, progressed),
             Event::Heard { worker } => self.touch(now, worker),
             Event::Woken => {
                 self.keepalive(now);
@@ -227,7 +230,7 @@ impl Scheduler {
     pub fn poll_timeout(&self) -> Option<Duration> {
         let timers = self.workers.values().flat_map(|worker| {
             let keepalive = worker.next_ping_at().min(worker.silence_deadline());
-            let stalled = worker.stalled_since().map(|since| since + self.stall_timeout);
+            let stalled = worker.stall_deadline(self.stall_timeout).map(|(at, _)| at);
             let now = self.handled_at;
             let (ready, suspect) = (worker.backoff_until(now), worker.suspect_at(now));
             [Some(keepalive), stalled, ready, suspect, worker.next_deadline()]
@@ -287,9 +290,12 @@ impl Scheduler {
         self.workers.iter().filter(|(_, worker)| which(worker)).map(|(&id, _)| id).collect()
     }
 
-    fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64) {
+    fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64, progressed: bool) {
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.pong(now, nonce);
+            if progressed {
+                worker.note_progress(now);
+            }
         }
     }
 
