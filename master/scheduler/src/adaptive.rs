@@ -25,8 +25,8 @@ const MESSAGE_SECONDS: f64 = 10e-6;
 const MAX_SEGMENT_SECONDS: f64 = 0.5;
 /// Cost of a second of waiting for a frame's last rows, in seconds, where workers render the next frame meanwhile.
 const OVERLAP_WEIGHT: f64 = 0.25;
-/// Segments per worker and frame, at least, while no speed is measured. They have no more than one tile band per thread:
-/// the cost of a band is unknown, and the first reply measures it.
+/// Segments per worker and frame, at least, while no speed is measured. They have at most one tile band per thread: the
+/// cost of a band is unknown, and the first reply measures it.
 const FIRST_SEGMENTS: u32 = 8;
 
 /// A worker that may get leases.

@@ -133,6 +133,12 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
+    /// A part of a message of a worker has arrived: it is neither silent nor stalled. A long message over a slow link
+    /// delays the pongs behind it. Reported for [`Scheduler::silent`](super::Scheduler::silent) workers.
+    Receiving {
+        /// The worker.
+        worker: WorkerId,
+    },
     /// The time of [`poll_timeout`](super::Scheduler::poll_timeout) has come.
     Woken,
 }

@@ -100,7 +100,8 @@ const OWN_PAUSE: Duration = PING_INTERVAL.saturating_mul(2);
 ///
 /// 1. Report every event to [`handle`](Self::handle). Times never decrease.
 /// 2. After each event, perform the actions of [`poll_action`](Self::poll_action) in order until there are none.
-/// 3. Report [`Event::Woken`] at the time of [`poll_timeout`](Self::poll_timeout), unless another event comes first.
+/// 3. Report [`Event::Woken`] at the time of [`poll_timeout`](Self::poll_timeout), unless another event comes first. Before
+///    it, report [`Event::Receiving`] for those [`silent`](Self::silent) workers of which a message is arriving.
 ///
 /// In return: a frame that has begun completes as soon as one worker that answers stays connected for long enough,
 /// whatever the others do; frames complete in order; an event about an unknown worker or frame changes nothing.
@@ -207,6 +208,9 @@ impl Scheduler {
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
             Event::Pong { worker, nonce, progressed } => self.pong(now, worker, nonce, progressed),
             Event::Heard { worker } => self.touch(now, worker),
+            Event::Receiving { worker } => {
+                self.workers.get_mut(&worker).into_iter().for_each(|known| known.note_arriving(now));
+            }
             Event::Woken => {
                 self.keepalive(now);
                 self.disconnect_stalled(now);
@@ -236,6 +240,11 @@ impl Scheduler {
             [Some(keepalive), stalled, ready, suspect, worker.next_deadline()]
         });
         timers.chain([self.recheck_at]).flatten().min()
+    }
+
+    /// Workers that the next [`Event::Woken`] disconnects at `now` because no message of theirs has arrived for 10 s.
+    pub fn silent(&self, now: Duration) -> Vec<WorkerId> {
+        self.ids_of(|worker| worker.silence_deadline() <= now)
     }
 
     fn segment_done(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) {

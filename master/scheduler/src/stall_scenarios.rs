@@ -86,3 +86,24 @@ fn progress_without_leases_changes_nothing() {
     );
     assert_eq!(disconnected(&log), None, "{log}");
 }
+
+/// A script in which a part of a message of worker 1 arrives every 10 s, until second `until`, and the whole message in
+/// second 139.
+fn arriving(until: u64) -> String {
+    let mut script = FIRST_LEASE.to_owned();
+    for second in (2..139).step_by(2) {
+        if second % 10 == 0 && second <= until {
+            writeln!(script, "{second}000 receiving 1").unwrap();
+        }
+        writeln!(script, "{second}000 wake").unwrap();
+    }
+    script + "139000 done 1 1.0"
+}
+
+#[test]
+fn a_worker_whose_message_arrives_slowly_is_not_silent() {
+    let log = transcript("static:10", &arriving(110));
+    assert_eq!(disconnected(&log), Some((120, "it has been silent for 10 s")), "{log}");
+    let log = transcript("static:10", &arriving(130));
+    assert!(disconnected(&log).is_none() && log.contains("finished 1 after 139000 ms"), "{log}");
+}

@@ -77,7 +77,7 @@ impl Scheduler {
 
     /// Sends due pings and disconnects silent workers.
     pub(super) fn keepalive(&mut self, now: Duration) {
-        for id in self.ids_of(|worker| worker.silence_deadline() <= now) {
+        for id in self.silent(now) {
             let limit_s = worker::SILENCE_TIMEOUT.as_secs();
             self.disconnect(id, format!("it has been silent for {limit_s} s"), Reconnect::Now);
         }

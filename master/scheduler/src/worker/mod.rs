@@ -299,6 +299,12 @@ impl Worker {
         self.stall = self.stall.map(|_| Stall::new(now));
     }
 
+    /// Counts it as alive and not stalled: a part of a message has arrived. It stays suspect, since its pings are unanswered.
+    pub(super) fn note_arriving(&mut self, now: Duration) {
+        self.last_alive_at = now;
+        self.note_progress(now);
+    }
+
     pub(super) fn mark_alive(&mut self, now: Duration) {
         self.last_alive_at = now;
         self.unanswered_since = None;
