@@ -202,6 +202,23 @@ async fn a_close_within_an_envelope_is_an_error() {
     }
 }
 
+#[tokio::test]
+async fn bytes_of_an_envelope_are_counted_as_they_arrive() {
+    let bytes = wire(&ToMaster::Pong { nonce: 5, progressed: true }).await;
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (_out, mut received, traffic) = spawn::<_, ToWorker, ToMaster>(ours);
+    theirs.write_all(&bytes[..12]).await.unwrap();
+    let counted = async {
+        while traffic.received_bytes() < 12 {
+            tokio::task::yield_now().await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(10), counted).await.expect("the first part is not counted");
+    theirs.write_all(&bytes[12..]).await.unwrap();
+    assert_eq!(received.recv().await.unwrap().unwrap(), ToMaster::Pong { nonce: 5, progressed: true });
+    assert_eq!(traffic.received_bytes(), bytes.len() as u64);
+}
+
 #[tokio::test(start_paused = true)]
 async fn silence_is_unlimited_between_envelopes_and_limited_within_one() {
     let bytes = wire(&ToMaster::Pong { nonce: 5, progressed: false }).await;
