@@ -54,6 +54,7 @@ mod cancel;
 mod catch_panic;
 mod error;
 mod peer;
+mod progress;
 mod render_pool;
 mod renderer;
 mod scenes;

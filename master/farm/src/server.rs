@@ -165,7 +165,9 @@ async fn receive(
             }
             ToMaster::Sharing { port } => driver.add_peer_server(worker, port),
             ToMaster::HaveAsset { id } => driver.asset_received(worker, id),
-            ToMaster::Pong { nonce } => driver.handle(Event::Pong { worker, nonce }),
+            ToMaster::Pong { nonce, progressed } => {
+                driver.handle(Event::Pong { worker, nonce, progressed });
+            }
             ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
             ToMaster::Disconnect { reason } => return Ok(reason),

@@ -25,7 +25,8 @@ const MESSAGE_SECONDS: f64 = 10e-6;
 const MAX_SEGMENT_SECONDS: f64 = 0.5;
 /// Cost of a second of waiting for a frame's last rows, in seconds, where workers render the next frame meanwhile.
 const OVERLAP_WEIGHT: f64 = 0.25;
-/// Segments per worker and frame while no speed is measured.
+/// Segments per worker and frame, at least, while no speed is measured. They have at most one tile band per thread: the
+/// cost of a band is unknown, and the first reply measures it.
 const FIRST_SEGMENTS: u32 = 8;
 
 /// A worker that may get leases.
@@ -163,9 +164,9 @@ impl Scheduler {
         let limit = self.max_rows(frame.width);
         let candidate = fleet.candidates.get(candidate)?;
         let Some(speed) = candidate.speed else {
-            let rows = frame.height / (FIRST_SEGMENTS * fleet.candidates.len().max(1) as u32);
-            let step = frame.forecast.tiles.rows.min(rows.max(1));
-            return Some(to_boundary(range.first, rows.max(1), step).min(limit));
+            let rows = first_rows(frame, fleet.candidates.len(), candidate.threads);
+            let step = frame.forecast.tiles.rows.min(rows);
+            return Some(to_boundary(range.first, rows, step).min(limit));
         };
         let queued: f64 = self.frames.iter().take(index + 1).map(Frame::queued_work).sum();
         let until_done = (queued + fleet.under_way) / fleet.total;
@@ -210,6 +211,12 @@ impl Scheduler {
         let halves = std::iter::successors(Some(tile), |&step| (step > 1).then_some(step / 2));
         halves.min_by(|&a, &b| seconds(a).total_cmp(&seconds(b))).unwrap_or(tile)
     }
+}
+
+/// Number of rows, at least 1, of a lease while no speed is measured, for one of `workers` with `threads` threads.
+fn first_rows(frame: &Frame, workers: usize, threads: f64) -> u32 {
+    let share = frame.height / (FIRST_SEGMENTS * workers.max(1) as u32);
+    share.min((threads as u32).saturating_mul(frame.forecast.tiles.rows)).max(1)
 }
 
 /// Number of rows, at least 1, from `first` to the multiple of `step` that is nearest to `first + rows`.

@@ -12,6 +12,7 @@ use super::{Scheduler, SegmentPolicy};
 /// - every row of a frame in flight is in exactly one of the states queued, leased to a live worker, done;
 /// - frames and workers agree on every lease;
 /// - leases of a worker never exceed the window;
+/// - a worker has a stall timer if, and only if, it holds leases or has overdue ones;
 /// - rows are not queued while all ready workers are idle;
 /// - under the fixed policies, no ready worker is idle while rows are queued;
 /// - at most two frames are in flight, in order, and none of them is complete;
@@ -22,6 +23,7 @@ pub fn violated(scheduler: &Scheduler) -> Option<String> {
         .or_else(|| scheduler.frames.iter().find_map(rows_are_somewhere))
         .or_else(|| scheduler.frames.iter().find_map(|frame| holders_hold(scheduler, frame)))
         .or_else(|| leases_are_known(scheduler))
+        .or_else(|| stalls_are_timed(scheduler))
         .or_else(|| verifications_are_valid(scheduler))
         .or_else(|| no_worker_is_idle(scheduler))
 }
@@ -99,6 +101,14 @@ fn leases_are_known(scheduler: &Scheduler) -> Option<String> {
             });
             (!fits).then(|| format!("{id} holds {:?}, which its frame does not know", active.lease))
         })
+    })
+}
+
+fn stalls_are_timed(scheduler: &Scheduler) -> Option<String> {
+    scheduler.workers.iter().find_map(|(id, worker)| {
+        let count = worker.leases.len() + worker.overdue.len();
+        let timed = worker.stall_deadline(scheduler.stall_timeout).is_some();
+        (timed != (count > 0)).then(|| format!("{id} holds {count} leases, stall timer: {timed}"))
     })
 }
 

@@ -125,9 +125,17 @@ pub enum Event {
         worker: WorkerId,
         /// The ping's nonce.
         nonce: u64,
+        /// Whether its threads have made progress since its previous pong.
+        progressed: bool,
     },
     /// A worker is alive: it is receiving assets.
     Heard {
+        /// The worker.
+        worker: WorkerId,
+    },
+    /// A part of a message of a worker has arrived: it is neither silent nor stalled. A long message over a slow link
+    /// delays the pongs behind it. Reported for [`Scheduler::silent`](super::Scheduler::silent) workers.
+    Receiving {
         /// The worker.
         worker: WorkerId,
     },

@@ -49,6 +49,7 @@ mod record;
 mod second;
 mod speculation;
 mod speed;
+mod stall;
 mod timeouts;
 mod verification;
 mod worker;
@@ -59,6 +60,8 @@ mod scenarios;
 mod service_scenarios;
 #[cfg(test)]
 mod sizes_tests;
+#[cfg(test)]
+mod stall_scenarios;
 #[cfg(test)]
 mod transcript;
 #[cfg(test)]
@@ -97,7 +100,8 @@ const OWN_PAUSE: Duration = PING_INTERVAL.saturating_mul(2);
 ///
 /// 1. Report every event to [`handle`](Self::handle). Times never decrease.
 /// 2. After each event, perform the actions of [`poll_action`](Self::poll_action) in order until there are none.
-/// 3. Report [`Event::Woken`] at the time of [`poll_timeout`](Self::poll_timeout), unless another event comes first.
+/// 3. Report [`Event::Woken`] at the time of [`poll_timeout`](Self::poll_timeout), unless another event comes first. Before
+///    it, report [`Event::Receiving`] for those [`silent`](Self::silent) workers of which a message is arriving.
 ///
 /// In return: a frame that has begun completes as soon as one worker that answers stays connected for long enough,
 /// whatever the others do; frames complete in order; an event about an unknown worker or frame changes nothing.
@@ -119,7 +123,7 @@ pub struct Scheduler {
     width: u32,
     actions: VecDeque<Action>,
     next_nonce: u64,
-    /// A worker that holds leases and finishes none for this long is disconnected.
+    /// A worker that holds leases and makes no progress for this long is disconnected.
     stall_timeout: Duration,
     /// Recent worst ratio of actual to predicted lease time, at least 1.
     overrun: f64,
@@ -202,8 +206,11 @@ impl Scheduler {
                 self.rows_rejected(frame, first_row, row_count);
             }
             Event::WorkerFailed { worker, frame } => self.worker_failed(now, worker, frame),
-            Event::Pong { worker, nonce } => self.pong(now, worker, nonce),
+            Event::Pong { worker, nonce, progressed } => self.pong(now, worker, nonce, progressed),
             Event::Heard { worker } => self.touch(now, worker),
+            Event::Receiving { worker } => {
+                self.workers.get_mut(&worker).into_iter().for_each(|known| known.note_arriving(now));
+            }
             Event::Woken => {
                 self.keepalive(now);
                 self.disconnect_stalled(now);
@@ -227,12 +234,17 @@ impl Scheduler {
     pub fn poll_timeout(&self) -> Option<Duration> {
         let timers = self.workers.values().flat_map(|worker| {
             let keepalive = worker.next_ping_at().min(worker.silence_deadline());
-            let stalled = worker.stalled_since().map(|since| since + self.stall_timeout);
+            let stalled = worker.stall_deadline(self.stall_timeout).map(|(at, _)| at);
             let now = self.handled_at;
             let (ready, suspect) = (worker.backoff_until(now), worker.suspect_at(now));
             [Some(keepalive), stalled, ready, suspect, worker.next_deadline()]
         });
         timers.chain([self.recheck_at]).flatten().min()
+    }
+
+    /// Workers that the next [`Event::Woken`] disconnects at `now` because no message of theirs has arrived for 10 s.
+    pub fn silent(&self, now: Duration) -> Vec<WorkerId> {
+        self.ids_of(|worker| worker.silence_deadline() <= now)
     }
 
     fn segment_done(&mut self, now: Duration, id: WorkerId, lease: Lease, cost: Cost) {
@@ -287,9 +299,12 @@ impl Scheduler {
         self.workers.iter().filter(|(_, worker)| which(worker)).map(|(&id, _)| id).collect()
     }
 
-    fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64) {
+    fn pong(&mut self, now: Duration, id: WorkerId, nonce: u64, progressed: bool) {
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.pong(now, nonce);
+            if progressed {
+                worker.note_progress(now);
+            }
         }
     }
 

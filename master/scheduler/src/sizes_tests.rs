@@ -62,6 +62,33 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
     rows
 }
 
+/// While the cost of a band is unknown, a lease has one band per thread: a row may take minutes.
+#[test]
+fn the_first_leases_have_one_band_per_thread_at_most() {
+    for (threads, tile_rows, height, most) in [
+        (1, 1, 1080, 1),
+        (4, 1, 1080, 4),
+        (1, 16, 1080, 16),
+        (2, 16, 1080, 32),
+        (64, 16, 1080, 128),
+        (8, 16, 4, 1),
+    ] {
+        let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
+        let join = Event::WorkerJoined { worker: WorkerId(1), threads, host: HostId(1) };
+        scheduler.handle(Duration::ZERO, join);
+        let request = Event::FrameRequested { frame: FrameId(1), width: 1920, height, tile_rows };
+        scheduler.handle(Duration::ZERO, request);
+        let rows: Vec<u32> = std::iter::from_fn(|| scheduler.poll_action())
+            .filter_map(|action| match action {
+                Action::Grant { lease, .. } => Some(lease.row_count),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(rows.first(), Some(&most), "{threads} threads, bands of {tile_rows} rows: {rows:?}");
+        assert!(rows.iter().all(|&rows| rows <= most), "{threads} threads: {rows:?}");
+    }
+}
+
 #[test]
 fn a_lease_never_exceeds_the_bytes_of_a_message() {
     for policy in ["static:1000", "smart:1000", "adaptive"] {

@@ -8,9 +8,9 @@ use super::{Action, FrameId, Reconnect, Scheduler, WorkerId};
 
 /// A frame fails when every active worker has refused it this many times, with no segment finished in between.
 const MAX_REFUSALS: u32 = 3;
-/// A worker that holds leases and finishes none for this long is disconnected...
+/// A worker that holds leases and makes no progress for this long is disconnected...
 pub(super) const FIRST_STALL_TIMEOUT: Duration = Duration::from_secs(60);
-/// ...and the timeout doubles with each such worker, up to this: a frame may take a slow machine longer than predicted.
+/// ...and the timeout doubles with each such worker, up to this: one tile may take a slow machine longer than this.
 const MAX_STALL_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
 
 impl Scheduler {
@@ -34,13 +34,16 @@ impl Scheduler {
         self.redraw_second_renderers(id);
     }
 
-    /// Disconnects workers that answer pings but finish no lease within the stall timeout.
+    /// Disconnects workers that answer pings and hold leases, but make no progress within the stall timeout, or finish
+    /// no lease within the limit of [`Stall`](super::stall::Stall).
     pub(super) fn disconnect_stalled(&mut self, now: Duration) {
         let timeout = self.stall_timeout;
-        let stalled = |since: Option<Duration>| since.is_some_and(|since| since + timeout <= now);
-        for id in self.ids_of(|worker| stalled(worker.stalled_since())) {
-            let reason = format!("it holds leases and has finished none for {} s", timeout.as_secs());
-            self.disconnect(id, reason, Reconnect::Now);
+        let deadlines = self.workers.iter().filter_map(|(&id, worker)| {
+            let (at, reason) = worker.stall_deadline(timeout)?;
+            (at <= now).then_some((id, reason))
+        });
+        for (id, reason) in deadlines.collect::<Vec<_>>() {
+            self.disconnect(id, reason.to_string(), Reconnect::Now);
             self.stall_timeout = timeout.saturating_mul(2).min(MAX_STALL_TIMEOUT);
         }
     }
@@ -74,7 +77,7 @@ impl Scheduler {
 
     /// Sends due pings and disconnects silent workers.
     pub(super) fn keepalive(&mut self, now: Duration) {
-        for id in self.ids_of(|worker| worker.silence_deadline() <= now) {
+        for id in self.silent(now) {
             let limit_s = worker::SILENCE_TIMEOUT.as_secs();
             self.disconnect(id, format!("it has been silent for {limit_s} s"), Reconnect::Now);
         }

@@ -7,7 +7,7 @@
 //! - `drain W` (by the worker), `request-drain W` (by the master's user), `pause W`, `resume W`
 //! - `done W FRAME.SEGMENT`, `fail W FRAME`, `reject FRAME FIRST+ROWS`
 //! - `verified W FRAME.SEGMENT same|different`, `arbitrated FRAME.SEGMENT right|wrong right|wrong` (first, second)
-//! - `pong W NONCE`, `wake`
+//! - `pong W NONCE`, `pong W NONCE progress` (its threads have made progress since its previous pong), `receiving W`, `wake`
 //!
 //! The policy may be followed by `, verify PERCENT KEY`.
 
@@ -88,7 +88,9 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             Event::RowsRejected { frame: FrameId(number(frame)), first_row: first_row as u32, row_count }
         }
         ["fail", _, frame] => Event::WorkerFailed { worker, frame: FrameId(number(frame)) },
-        ["pong", _, nonce] => Event::Pong { worker, nonce: number(nonce) },
+        ["pong", _, nonce] => Event::Pong { worker, nonce: number(nonce), progressed: false },
+        ["pong", _, nonce, "progress"] => Event::Pong { worker, nonce: number(nonce), progressed: true },
+        ["receiving", _] => Event::Receiving { worker },
         ["wake"] => Event::Woken,
         _ => panic!("no such command: {command}"),
     }

@@ -48,12 +48,22 @@ pub async fn read_header(io: &mut (impl AsyncRead + Unpin)) -> Result<Option<Hea
 /// # Errors
 /// A failed transport; a body that is incomplete at the deadline.
 pub async fn read_body(io: &mut (impl AsyncRead + Unpin), header: Header) -> Result<Bytes, ProtocolError> {
+    read_body_counted(io, header, |_| {}).await
+}
+
+/// As [`read_body`]. `count` receives the number of bytes of each part as it arrives.
+pub(crate) async fn read_body_counted(
+    io: &mut (impl AsyncRead + Unpin),
+    header: Header,
+    count: impl Fn(usize),
+) -> Result<Bytes, ProtocolError> {
     let mut body = BytesMut::with_capacity(header.body_bytes);
     within_deadline("sending a message", header.body_bytes, async {
         while body.len() < header.body_bytes {
             let missing = header.body_bytes - body.len();
-            if io.read_buf(&mut (&mut body).limit(missing)).await.map_err(receiving)? == 0 {
-                return Err(ProtocolError::Closed { at: "in the middle of a message" });
+            match io.read_buf(&mut (&mut body).limit(missing)).await.map_err(receiving)? {
+                0 => return Err(ProtocolError::Closed { at: "in the middle of a message" }),
+                bytes => count(bytes),
             }
         }
         Ok(())

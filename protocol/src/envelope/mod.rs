@@ -18,6 +18,8 @@ mod io;
 pub use crate::kind::Kind;
 pub(crate) use crate::kind::MAX_HEAD_BYTES;
 #[cfg(feature = "transport")]
+pub(crate) use io::read_body_counted;
+#[cfg(feature = "transport")]
 pub use io::{read_body, read_header};
 
 /// Number of bytes of a header.

@@ -42,6 +42,9 @@ pub enum ToMaster {
     Pong {
         /// Number of the ping.
         nonce: u64,
+        /// Whether the worker's threads have finished a step of their work (a tile, a batch of rays, a part of the
+        /// preparation of a scene) since the previous pong of the session.
+        progressed: bool,
     },
     /// Reports that the worker renders none of a frame's leases.
     Failed {
@@ -88,7 +91,7 @@ impl Message for ToMaster {
                 check_rows(header)?;
                 Envelope::new(Kind::Pixels, &header.to_bytes(), bytes.clone())
             }
-            Self::Pong { nonce } => encode_control(Kind::Pong, nonce),
+            Self::Pong { nonce, progressed } => encode_control(Kind::Pong, &(nonce, progressed)),
             Self::Failed { frame, reason } => encode_reason(Kind::Failed, &frame.0.to_le_bytes(), reason),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
             Self::Disconnect { reason } => encode_reason(Kind::Disconnect, &[], reason),
@@ -104,7 +107,10 @@ impl Message for ToMaster {
             Kind::Sharing => Self::Sharing { port: checked_port(decode_control(kind, &body)?)? },
             Kind::HaveAsset => Self::HaveAsset { id: decode_control(kind, &body)? },
             Kind::Pixels => decode_pixels(body)?,
-            Kind::Pong => Self::Pong { nonce: decode_control(kind, &body)? },
+            Kind::Pong => {
+                let (nonce, progressed) = decode_control(kind, &body)?;
+                Self::Pong { nonce, progressed }
+            }
             Kind::Failed => decode_failed(body)?,
             Kind::Drain => expect_empty(kind, &body).map(|()| Self::Drain)?,
             Kind::Disconnect => Self::Disconnect { reason: decode_reason(&body) },

@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::Traffic;
 use crate::ProtocolError;
-use crate::envelope::{read_body, read_header};
+use crate::envelope::{HEADER_BYTES, read_body_counted, read_header};
 use crate::limits::INBOX_BYTES;
 use crate::message::Message;
 
@@ -94,7 +94,7 @@ async fn read_message<In: Message>(
     // Every body fits: INBOX_BYTES is above the limit of every type, and a u32 can count it.
     let permits = u32::try_from(header.body_bytes).unwrap_or(u32::MAX);
     let taken = room.clone().acquire_many_owned(permits).await;
-    let body = read_body(io, header).await?;
-    traffic.count_received(header);
+    traffic.count_received(HEADER_BYTES);
+    let body = read_body_counted(io, header, |bytes| traffic.count_received(bytes)).await?;
     Ok(Some(Delivery { message: In::from_body(header.kind, body), _room: taken.ok() }))
 }

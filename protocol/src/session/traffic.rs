@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use crate::envelope::{Envelope, HEADER_BYTES, Header, Kind};
+use crate::envelope::{Envelope, Kind};
 
 /// Numbers of bytes of a session's envelopes, headers included. The handshake is not counted.
 #[derive(Debug, Default)]
@@ -18,7 +18,7 @@ impl Traffic {
         self.sent.load(Relaxed)
     }
 
-    /// Number of bytes read.
+    /// Number of bytes read, including those of an envelope that is arriving.
     pub fn received_bytes(&self) -> u64 {
         self.received.load(Relaxed)
     }
@@ -36,7 +36,7 @@ impl Traffic {
         }
     }
 
-    pub(super) fn count_received(&self, header: Header) {
-        self.received.fetch_add((HEADER_BYTES + header.body_bytes) as u64, Relaxed);
+    pub(super) fn count_received(&self, bytes: usize) {
+        self.received.fetch_add(bytes as u64, Relaxed);
     }
 }

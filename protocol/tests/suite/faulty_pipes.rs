@@ -120,7 +120,7 @@ fn to_worker(random: &mut Random, n: u64) -> ToWorker {
 
 fn to_master(random: &mut Random, n: u64) -> ToMaster {
     match random.below(3) {
-        0 => ToMaster::Pong { nonce: n },
+        0 => ToMaster::Pong { nonce: n, progressed: false },
         1 => ToMaster::NeedAsset {
             id: AssetId([n as u8; 32]),
             offset: u64::from(n as u8),

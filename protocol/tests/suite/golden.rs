@@ -26,8 +26,8 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 }
 
 #[test]
-fn the_golden_bytes_are_those_of_version_5() {
-    assert_eq!(PROTOCOL_VERSION, 5);
+fn the_golden_bytes_are_those_of_version_6() {
+    assert_eq!(PROTOCOL_VERSION, 6);
 }
 
 #[tokio::test]
@@ -103,7 +103,10 @@ async fn messages_to_a_master() {
         let (header, bytes) = (PixelsHeader { encoding, ..header }, bytes.clone());
         golden(ToMaster::Pixels { header, bytes }, &rows).await;
     }
-    golden(ToMaster::Pong { nonce: 5 }, &[&[8, 0, 0, 0, 0x31, 0, 0, 0], &number]).await;
+    for (progressed, code) in [(false, 0), (true, 1)] {
+        let pong = ToMaster::Pong { nonce: 5, progressed };
+        golden(pong, &[&[9, 0, 0, 0, 0x31, 0, 0, 0], &number, &[code]]).await;
+    }
     let failed = ToMaster::Failed { frame: FrameId(5), reason: "no".into() };
     golden(failed, &[&[10, 0, 0, 0, 0x22, 0, 0, 0], &number, b"no"]).await;
     golden(ToMaster::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;

@@ -92,7 +92,7 @@ fn to_master() -> impl Strategy<Value = ToMaster> {
         (1..=u16::MAX).prop_map(|port| ToMaster::Sharing { port }),
         ids().prop_map(|id| ToMaster::HaveAsset { id }),
         (headers(), bytes(0..3000)).prop_map(|(header, bytes)| ToMaster::Pixels { header, bytes }),
-        any::<u64>().prop_map(|nonce| ToMaster::Pong { nonce }),
+        any::<(u64, bool)>().prop_map(|(nonce, progressed)| ToMaster::Pong { nonce, progressed }),
         (any::<u64>(), "[!-~äöü][ -~äöü]{0,199}")
             .prop_map(|(frame, reason)| ToMaster::Failed { frame: FrameId(frame), reason }),
         Just(ToMaster::Drain),

@@ -154,7 +154,7 @@ async fn a_full_queue_returns_the_message() {
     assert_eq!(returned, pixels(sent, 3000));
     assert!(sent as usize <= limits::BULK_QUEUE + 2, "{sent} messages were taken");
     // Control messages have their own queue.
-    out.try_send(ToMaster::Pong { nonce: 1 }).unwrap();
+    out.try_send(ToMaster::Pong { nonce: 1, progressed: false }).unwrap();
 }
 
 #[tokio::test]
@@ -182,7 +182,7 @@ async fn abort_ends_both_directions_at_once() {
 
 #[tokio::test]
 async fn a_close_within_an_envelope_is_an_error() {
-    let bytes = wire(&ToMaster::Pong { nonce: 5 }).await;
+    let bytes = wire(&ToMaster::Pong { nonce: 5, progressed: false }).await;
     for cut in 0..=bytes.len() {
         let (ours, mut theirs) = duplex(1 << 16);
         let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
@@ -191,7 +191,7 @@ async fn a_close_within_an_envelope_is_an_error() {
         match received.recv().await {
             None => assert_eq!(cut, 0),
             Some(Ok(message)) => {
-                assert_eq!((cut, message), (bytes.len(), ToMaster::Pong { nonce: 5 }));
+                assert_eq!((cut, message), (bytes.len(), ToMaster::Pong { nonce: 5, progressed: false }));
             }
             Some(Err(error)) => {
                 assert!(matches!(error, ProtocolError::Closed { .. }), "{error}");
@@ -202,15 +202,32 @@ async fn a_close_within_an_envelope_is_an_error() {
     }
 }
 
+#[tokio::test]
+async fn bytes_of_an_envelope_are_counted_as_they_arrive() {
+    let bytes = wire(&ToMaster::Pong { nonce: 5, progressed: true }).await;
+    let (ours, mut theirs) = duplex(1 << 16);
+    let (_out, mut received, traffic) = spawn::<_, ToWorker, ToMaster>(ours);
+    theirs.write_all(&bytes[..12]).await.unwrap();
+    let counted = async {
+        while traffic.received_bytes() < 12 {
+            tokio::task::yield_now().await;
+        }
+    };
+    tokio::time::timeout(Duration::from_secs(10), counted).await.expect("the first part is not counted");
+    theirs.write_all(&bytes[12..]).await.unwrap();
+    assert_eq!(received.recv().await.unwrap().unwrap(), ToMaster::Pong { nonce: 5, progressed: true });
+    assert_eq!(traffic.received_bytes(), bytes.len() as u64);
+}
+
 #[tokio::test(start_paused = true)]
 async fn silence_is_unlimited_between_envelopes_and_limited_within_one() {
-    let bytes = wire(&ToMaster::Pong { nonce: 5 }).await;
+    let bytes = wire(&ToMaster::Pong { nonce: 5, progressed: false }).await;
     for cut in [1, 7, 8, 12] {
         let (ours, mut theirs) = duplex(1 << 16);
         let (_out, mut received, _) = spawn::<_, ToWorker, ToMaster>(ours);
         tokio::time::sleep(Duration::from_secs(3600)).await;
         theirs.write_all(&bytes).await.unwrap();
-        assert_eq!(received.recv().await.unwrap().unwrap(), ToMaster::Pong { nonce: 5 });
+        assert_eq!(received.recv().await.unwrap().unwrap(), ToMaster::Pong { nonce: 5, progressed: false });
         theirs.write_all(&bytes[..cut]).await.unwrap();
         let error = received.recv().await.unwrap().unwrap_err();
         assert!(matches!(error, ProtocolError::Deadline { .. }), "{error}");

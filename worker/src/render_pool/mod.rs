@@ -12,6 +12,7 @@ use rayfarm_protocol::{Encoding, FrameId, PixelFormat, PixelsHeader, ToMaster};
 use tokio::sync::mpsc;
 
 use crate::catch_panic::catch_panic;
+use crate::progress::ProgressFlag;
 use crate::renderer::{Cancelled, Renderer};
 
 use buffers::BufferPool;
@@ -54,6 +55,7 @@ struct Shared<R: Renderer> {
     state: Mutex<State<R>>,
     work: Condvar,
     buffers: BufferPool,
+    progress: ProgressFlag,
 }
 
 struct State<R: Renderer> {
@@ -68,8 +70,8 @@ impl<R: Renderer> RenderPool<R> {
     /// A system that starts no more threads.
     pub(crate) fn new(renderer: Arc<R>, threads: usize) -> io::Result<Self> {
         let state = Mutex::new(State { queue: JobQueue::new(), stopping: false });
-        let shared =
-            Arc::new(Shared { renderer, state, work: Condvar::new(), buffers: BufferPool::default() });
+        let (buffers, progress) = (BufferPool::default(), ProgressFlag::default());
+        let shared = Arc::new(Shared { renderer, state, work: Condvar::new(), buffers, progress });
         let pool = Self { shared };
         for index in 0..threads {
             let shared = Arc::clone(&pool.shared);
@@ -87,6 +89,11 @@ impl<R: Renderer> RenderPool<R> {
     /// Number of jobs that are queued or being rendered.
     pub(crate) fn len(&self) -> usize {
         self.shared.state().queue.len()
+    }
+
+    /// The flag that the render threads set as they go on. Other work for the same master sets it as well.
+    pub(crate) fn progress(&self) -> &ProgressFlag {
+        &self.shared.progress
     }
 
     /// Cancels the jobs of every stale frame. Those being rendered end at the next tile.
@@ -138,9 +145,13 @@ impl<R: Renderer> Shared<R> {
     fn render(&self, band: PoolBand<R>, packer: &mut Packer) {
         let Band { job, rows, mut bytes } = band;
         let begun = Instant::now();
-        let rendered = catch_panic(|| {
-            self.renderer.render(&job.frame.frame, rows.clone(), &mut bytes, &|| job.is_cancelled())
-        });
+        let cancelled = || {
+            self.progress.note();
+            job.is_cancelled()
+        };
+        let rendered =
+            catch_panic(|| self.renderer.render(&job.frame.frame, rows.clone(), &mut bytes, &cancelled));
+        self.progress.note();
         match rendered {
             Ok(Ok(counts)) => {
                 let cost = BandCost { counts, trace: begun.elapsed(), ..BandCost::default() };

@@ -172,6 +172,10 @@ impl<R: Renderer> SessionRunner<'_, R> {
                     Effect::End { reason, reconnect } => {
                         return end_of_session(reason, reconnect, has_requested_drain, draining);
                     }
+                    Effect::Pong(nonce) => {
+                        let progressed = self.pool.progress().take();
+                        self.send(ToMaster::Pong { nonce, progressed }).await;
+                    }
                     Effect::Send(message) => {
                         if let (ToMaster::NeedAsset { id, .. }, Some(server)) = (&message, &self.peer_server)
                         {
@@ -269,7 +273,7 @@ impl<R: Renderer> SessionRunner<'_, R> {
             Effect::CancelBefore(before) => self.pool.cancel(|frame| frame < before),
             Effect::CancelFrame(stale) => self.pool.cancel(|frame| frame == stale),
             // The caller has handled these.
-            Effect::Send(_) | Effect::Drain | Effect::End { .. } => {}
+            Effect::Send(_) | Effect::Pong(_) | Effect::Drain | Effect::End { .. } => {}
         }
         Ok(())
     }
@@ -278,10 +282,12 @@ impl<R: Renderer> SessionRunner<'_, R> {
         let renderer = Arc::clone(self.renderer);
         let builders = self.builders.clone();
         let disk = self.disk.map(|disk| Arc::clone(disk.cache()));
+        let progress = self.pool.progress().clone();
         if matches!(work, Work::Scene(SceneWork::Compile { .. })) {
-            self.work.spawn(compile_with_permit(renderer, builders, work));
+            self.work.spawn(compile_with_permit(renderer, builders, progress, work));
         } else {
-            self.work.spawn_blocking(move || do_work(&*renderer, &builders, disk.as_deref(), work));
+            let work = move || do_work(&*renderer, &builders, disk.as_deref(), &progress, work);
+            self.work.spawn_blocking(work);
         }
     }
 

@@ -20,6 +20,8 @@ use crate::scenes::{AssetRequest, SceneLoader, SceneResult, SceneWork, Step};
 pub(super) enum Effect<R: Renderer> {
     /// Send a message to the master.
     Send(ToMaster),
+    /// Reply to the ping of this number, with the progress since the last reply.
+    Pong(u64),
     /// Run work on a blocking thread, and pass its result to [`SessionState::handle_result`].
     Work(Work<R>),
     /// Write an asset to the disk cache.
@@ -99,7 +101,7 @@ impl<'a, R: Renderer> SessionState<'a, R> {
                 self.loader.handle_asset_from(id, size, PeerSource { address: peer, token });
             }
             ToWorker::ShareKey { key } => self.effects.push_back(Effect::SetShareKey(key)),
-            ToWorker::Ping { nonce } => self.effects.push_back(Effect::Send(ToMaster::Pong { nonce })),
+            ToWorker::Ping { nonce } => self.effects.push_back(Effect::Pong(nonce)),
             ToWorker::Drain => self.effects.push_back(Effect::Drain),
             ToWorker::Disconnect { reason, reconnect } => {
                 self.effects.push_back(Effect::End { reason, reconnect });

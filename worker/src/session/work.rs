@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::state::{Work, WorkResult};
 use crate::catch_panic::catch_panic;
+use crate::progress::ProgressFlag;
 use crate::render_pool::ReadyFrame;
 use crate::renderer::Renderer;
 use crate::scenes::{BuildPool, DiskCache, SceneResult, SceneWork};
@@ -13,22 +14,24 @@ use crate::scenes::{BuildPool, DiskCache, SceneResult, SceneWork};
 pub(super) async fn compile_with_permit<R: Renderer>(
     renderer: Arc<R>,
     builders: BuildPool,
+    progress: ProgressFlag,
     work: Work<R>,
 ) -> Option<WorkResult<R>> {
     let permit = builders.compile_permit().await;
     let compile = move || {
         let _permit = permit;
-        do_work(&*renderer, &builders, None, work)
+        do_work(&*renderer, &builders, None, &progress, work)
     };
     // Panics are caught in `do_work`, so an error means that the runtime shuts down.
     tokio::task::spawn_blocking(compile).await.ok().flatten()
 }
 
-/// Runs work on the current thread. Returns `None` where it was cancelled.
+/// Runs work on the current thread and notes its progress. Returns `None` where it was cancelled.
 pub(super) fn do_work<R: Renderer>(
     renderer: &R,
     builders: &BuildPool,
     disk: Option<&DiskCache>,
+    progress: &ProgressFlag,
     work: Work<R>,
 ) -> Option<WorkResult<R>> {
     let result = match work {
@@ -47,7 +50,10 @@ pub(super) fn do_work<R: Renderer>(
             WorkResult::Scene(SceneResult::PartDecoded { id, result })
         }
         Work::Scene(SceneWork::Compile { id, draft, parts, cancel }) => {
-            let cancelled = || cancel.is_cancelled();
+            let cancelled = || {
+                progress.note();
+                cancel.is_cancelled()
+            };
             if cancelled() {
                 return None;
             }
@@ -59,7 +65,10 @@ pub(super) fn do_work<R: Renderer>(
             WorkResult::Scene(SceneResult::Compiled { id, result })
         }
         Work::Prepare { announce, scene, cancel } => {
-            let cancelled = || cancel.is_cancelled();
+            let cancelled = || {
+                progress.note();
+                cancel.is_cancelled()
+            };
             if cancelled() {
                 return None;
             }
@@ -72,5 +81,6 @@ pub(super) fn do_work<R: Renderer>(
             WorkResult::Prepared { frame: announce.frame, result: result.map(ready) }
         }
     };
+    progress.note();
     Some(result)
 }

@@ -1,7 +1,7 @@
 //! A renderer whose scenes are short byte strings.
 //!
 //! A scene body is `scene`, one byte of salt, and the ids of its meshes. A mesh is `mesh` and any bytes. The view of a
-//! frame selects its behaviour: `wait`, `panic`, `endless`, `unpreparable`, `rgb565`, or plain rendering.
+//! frame selects its behaviour: `wait`, `steps`, `panic`, `endless`, `unpreparable`, `rgb565`, or plain rendering.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -39,6 +39,10 @@ impl Gate {
         self.changed.notify_all();
     }
 
+    fn is_open(&self) -> bool {
+        *self.is_open.lock().unwrap()
+    }
+
     fn wait(&self) {
         let is_open = self.is_open.lock().unwrap();
         drop(self.changed.wait_while(is_open, |is_open| !*is_open).unwrap());
@@ -57,6 +61,10 @@ pub(super) struct Calls {
     pub(super) cancelled: AtomicUsize,
     /// Preparations that have begun.
     pub(super) prepared: AtomicUsize,
+    /// Bands of frames whose view is `steps` that have begun.
+    pub(super) stepping: AtomicUsize,
+    /// Steps that bands of such frames may still do. A band polls its cancellation after each, and ends with the gate.
+    pub(super) steps: AtomicUsize,
     /// Sizes of the thread pools that decoded and compiled scenes.
     pub(super) pool_sizes: Mutex<BTreeSet<usize>>,
 }
@@ -106,6 +114,19 @@ pub(super) fn expected(scene: &[u8], view: &[u8], rows: Range<u32>) -> Vec<u8> {
 pub(super) fn scene(salt: u8, meshes: &[&[u8]]) -> Vec<u8> {
     let ids = meshes.iter().flat_map(|mesh| AssetId::of(mesh).0);
     b"scene".iter().copied().chain([salt]).chain(ids).collect()
+}
+
+impl FakeRenderer {
+    fn render_steps(&self, cancelled: &dyn Fn() -> bool) {
+        let calls = &self.calls;
+        calls.stepping.fetch_add(1, Relaxed);
+        while !self.gate.is_open() {
+            if calls.steps.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_ok() {
+                cancelled();
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
 }
 
 impl Renderer for FakeRenderer {
@@ -184,6 +205,7 @@ impl Renderer for FakeRenderer {
     ) -> Result<RayCounts, Cancelled> {
         match frame.view.as_ref() {
             b"wait" => self.gate.wait(),
+            b"steps" => self.render_steps(cancelled),
             b"panic" => panic!("row {} panics", rows.start),
             _ => {}
         }

@@ -1,8 +1,12 @@
 //! Tests of sessions, with a master at the other end of a pipe.
 
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
+
 use rayfarm_protocol::{FrameId, Reconnect, ToMaster, ToWorker};
 
-use super::{FakeMaster, HEIGHT, LARGE_CACHE, WIDTH, expected, lease, persistent, scene};
+use super::{FakeMaster, HEIGHT, LARGE_CACHE, SLOW_SCENE, WIDTH, expected, lease, persistent, scene, until};
 use crate::session::{SessionConfig, SessionEnd, run_session};
 use crate::shutdown::ShutdownHandle;
 
@@ -65,10 +69,62 @@ async fn a_ping_is_answered_while_all_threads_render() {
     master.send(ToWorker::Segment(lease(0, 0..40))).await;
     for nonce in 0..3 {
         master.send(ToWorker::Ping { nonce }).await;
-        assert!(matches!(master.receive().await, Some(ToMaster::Pong { nonce: n }) if n == nonce));
+        assert!(matches!(master.receive().await, Some(ToMaster::Pong { nonce: n, .. }) if n == nonce));
     }
     gate.open();
     assert_eq!(master.receive_pixels().await.1, expected(&body, b"wait", 0..40));
+}
+
+/// Whether the worker's next pong reports progress.
+async fn progressed(master: &mut FakeMaster) -> bool {
+    master.send(ToWorker::Ping { nonce: 7 }).await;
+    match master.receive().await {
+        Some(ToMaster::Pong { nonce: 7, progressed }) => progressed,
+        other => panic!("expected a pong, not {other:?}"),
+    }
+}
+
+/// Waits for a pong that reports progress.
+async fn until_progressed(master: &mut FakeMaster) {
+    while !progressed(master).await {
+        tokio::time::sleep(Duration::from_millis(1)).await;
+    }
+}
+
+#[tokio::test]
+async fn a_pong_reports_progress_within_a_lease_and_none_of_a_stuck_thread() {
+    let body = scene(1, &[]);
+    let (kept, gate) = persistent(1, LARGE_CACHE);
+    let calls = Arc::clone(&kept.renderer.calls);
+    let mut master = FakeMaster::start(kept, &[&body]);
+    assert!(!progressed(&mut master).await, "it has no work");
+    master.announce(0, &body, b"steps").await;
+    master.serve_request().await;
+    master.send(ToWorker::Segment(lease(0, 0..8))).await;
+    until(&calls.stepping, 1).await;
+    assert!(progressed(&mut master).await, "the frame was prepared");
+    for _ in 0..3 {
+        for _ in 0..10 {
+            assert!(!progressed(&mut master).await, "the thread is stuck in a step");
+        }
+        calls.steps.fetch_add(1, Relaxed);
+        until_progressed(&mut master).await;
+    }
+    gate.open();
+    assert_eq!(master.receive_pixels().await.1, expected(&body, b"steps", 0..8));
+}
+
+#[tokio::test]
+async fn a_pong_reports_progress_of_a_compilation() {
+    let body = scene(SLOW_SCENE, &[]);
+    let mut master = FakeMaster::start(persistent(1, LARGE_CACHE).0, &[&body]);
+    master.announce(0, &body, b"v").await;
+    master.send(ToWorker::Segment(lease(0, 0..8))).await;
+    // The compilation lasts until it is cancelled, and goes on polling.
+    for _ in 0..5 {
+        until_progressed(&mut master).await;
+    }
+    master.send(ToWorker::Cancel { before: FrameId(1) }).await;
 }
 
 #[tokio::test]
@@ -88,7 +144,7 @@ async fn a_cancelled_frame_sends_nothing_and_does_not_delay_the_next() {
     master.send(ToWorker::Segment(lease(0, 16..24))).await;
     master.send(ToWorker::Segment(lease(1, 0..8))).await;
     master.send(ToWorker::Ping { nonce: 2 }).await;
-    assert!(matches!(master.receive().await, Some(ToMaster::Pong { nonce: 2 })));
+    assert!(matches!(master.receive().await, Some(ToMaster::Pong { nonce: 2, .. })));
     gate.open();
     let (done, bytes) = master.receive_pixels().await;
     assert_eq!((done, bytes), (lease(1, 0..8), expected(&body, b"new", 0..8).into()));
@@ -341,8 +397,8 @@ async fn a_silent_master_times_out_and_one_that_pings_does_not() {
     let mut master = FakeMaster::start(persistent(1, LARGE_CACHE).0, &[]);
     for nonce in 0..60 {
         master.send(ToWorker::Ping { nonce }).await;
-        assert_eq!(master.receive().await, Some(ToMaster::Pong { nonce }));
-        tokio::time::sleep(std::time::Duration::from_secs(2)).await;
+        assert_eq!(master.receive().await, Some(ToMaster::Pong { nonce, progressed: false }));
+        tokio::time::sleep(Duration::from_secs(2)).await;
     }
     let (end, _) = master.worker.await.unwrap();
     assert!(matches!(&end, SessionEnd::Lost(why) if why.contains("silent")), "{end:?}");

@@ -186,6 +186,7 @@ impl Accounts {
             | Event::DrainRequested { .. }
             | Event::Pong { .. }
             | Event::Heard { .. }
+            | Event::Receiving { .. }
             | Event::SegmentArbitrated { .. }
             | Event::Woken => {}
         }

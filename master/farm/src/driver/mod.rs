@@ -32,7 +32,7 @@ use crate::finished::FinishedFrame;
 use crate::framebuffer::Framebuffers;
 use crate::options::FarmOptions;
 use crate::sessions::identity::Tickets;
-use crate::sessions::{ByteCount, Sessions};
+use crate::sessions::{ByteCount, Session, Sessions};
 use crate::verification::arbiter::Dispute;
 use crate::verification::delivered::{Delivered, FrameSet};
 use crate::verification::{OpenSegments, SegmentDigest};
@@ -182,7 +182,13 @@ impl Driver {
     fn wake(&self) {
         let mut inner = self.lock();
         inner.armed_for = None;
-        if inner.scheduler.poll_timeout().is_some_and(|at| at <= self.started.elapsed()) {
+        let now = self.started.elapsed();
+        if inner.scheduler.poll_timeout().is_some_and(|at| at <= now) {
+            let mut silent = inner.scheduler.silent(now);
+            silent.retain(|&worker| inner.sessions.get(worker).is_some_and(Session::is_receiving));
+            for worker in silent {
+                self.drive(&mut inner, Event::Receiving { worker });
+            }
             self.drive(&mut inner, Event::Woken);
         }
     }

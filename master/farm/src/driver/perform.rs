@@ -9,7 +9,7 @@ use rayfarm_scheduler::{Action, Cost, Event, Reconnect, WorkerId};
 use super::{Driver, Inner, Request};
 use crate::error::FarmError;
 use crate::finished::FinishedFrame;
-use crate::sessions::SendFailed;
+use crate::sessions::{SendFailed, Session};
 
 impl Driver {
     /// Performs an action. Events that follow from it at once are appended to `events`.
@@ -50,7 +50,10 @@ impl Driver {
                     events.extend(send(inner, worker, ToWorker::Cancel { before }));
                 }
             }
-            Action::Ping { worker, nonce } => events.extend(send(inner, worker, ToWorker::Ping { nonce })),
+            Action::Ping { worker, nonce } => {
+                inner.sessions.get_mut(worker).into_iter().for_each(Session::note_ping);
+                events.extend(send(inner, worker, ToWorker::Ping { nonce }));
+            }
             Action::Drain { worker } => events.extend(send(inner, worker, ToWorker::Drain)),
             Action::Disconnect { worker, reason, reconnect } => {
                 match reconnect {

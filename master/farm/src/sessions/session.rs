@@ -31,6 +31,8 @@ pub(crate) struct Session {
     pub(crate) transfers: Transfers,
     pub(super) sender: Sender<ToWorker>,
     pub(super) traffic: Arc<Traffic>,
+    /// Numbers of bytes that had arrived at the last two pings, the earlier one first.
+    received_at_pings: [u64; 2],
 }
 
 impl Session {
@@ -52,7 +54,19 @@ impl Session {
             transfers: Transfers::default(),
             sender,
             traffic,
+            received_at_pings: [0; 2],
         }
+    }
+
+    /// Notes that a ping is sent now.
+    pub(crate) fn note_ping(&mut self) {
+        let [_, last] = self.received_at_pings;
+        self.received_at_pings = [last, self.traffic.received_bytes()];
+    }
+
+    /// Whether bytes have arrived since the last ping but one, whole messages or not.
+    pub(crate) fn is_receiving(&self) -> bool {
+        self.traffic.received_bytes() > self.received_at_pings[0]
     }
 }
 

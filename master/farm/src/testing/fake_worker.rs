@@ -110,7 +110,9 @@ async fn run(stream: TcpStream, mut script: Script) -> Outcome {
                 }
                 answer(&sender, &mut script, lease, &view).await;
             }
-            ToWorker::Ping { nonce } => sender.send(ToMaster::Pong { nonce }).await.unwrap(),
+            ToWorker::Ping { nonce } => {
+                sender.send(ToMaster::Pong { nonce, progressed: false }).await.unwrap();
+            }
             ToWorker::Disconnect { reason, .. } => outcome.disconnect_reason = Some(reason),
             ToWorker::Drain => outcome.drained = true,
             ToWorker::Cancel { .. } => {}

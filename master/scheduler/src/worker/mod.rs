@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::active_lease::ActiveLease;
 use super::limits::{MAX_FRAMES, TRAILING_FRAMES};
 use super::speed::{Observation, Speed};
+use super::stall::{Stall, StallReason};
 use super::{Cost, FrameId, HostId, Lease};
 
 /// Time between two pings of a worker.
@@ -70,8 +71,8 @@ pub(super) struct Worker {
     failures: u32,
     /// Consecutive timeouts.
     timeouts: u32,
-    /// Since when it holds leases, or has overdue ones, without having finished any.
-    stalled_since: Option<Duration>,
+    /// Progress since it last finished a lease, while it holds leases or has overdue ones.
+    stall: Option<Stall>,
 }
 
 impl Worker {
@@ -95,7 +96,7 @@ impl Worker {
             backoff_until: None,
             failures: 0,
             timeouts: 0,
-            stalled_since: None,
+            stall: None,
         }
     }
 
@@ -127,7 +128,7 @@ impl Worker {
     /// Records a lease that was granted.
     pub(super) fn record(&mut self, now: Duration, active: ActiveLease) {
         self.leases.insert((active.lease.frame, active.lease.segment), active);
-        self.stalled_since.get_or_insert(now);
+        self.stall.get_or_insert(Stall::new(now));
     }
 
     /// Ends a lease that it has answered, active or overdue. Returns the lease with the actual work of its rows,
@@ -149,7 +150,7 @@ impl Worker {
         let measured = self.measure(now, &active, cost, half_life);
         self.segments_done += 1;
         self.last_done_at = now;
-        self.stalled_since = (!self.leases.is_empty() || !self.overdue.is_empty()).then_some(now);
+        self.stall = (!self.leases.is_empty() || !self.overdue.is_empty()).then_some(Stall::new(now));
         Some((active, measured))
     }
 
@@ -213,9 +214,18 @@ impl Worker {
         keys
     }
 
-    /// Since when it holds leases, or has overdue ones, without having finished any.
-    pub(super) fn stalled_since(&self) -> Option<Duration> {
-        self.stalled_since
+    /// When it is disconnected as stalled unless it makes progress or finishes a lease, and the reason. `None` without
+    /// leases.
+    pub(super) fn stall_deadline(&self, timeout: Duration) -> Option<(Duration, StallReason)> {
+        let bands = self.leases.values().chain(self.overdue.values()).map(|active| active.bands);
+        self.stall.map(|stall| stall.deadline(timeout, bands.fold(0, u32::saturating_add)))
+    }
+
+    /// Notes that its threads have made progress, and may have finished no lease.
+    pub(super) fn note_progress(&mut self, now: Duration) {
+        if let Some(stall) = &mut self.stall {
+            stall.note_progress(now);
+        }
     }
 
     /// Drops its leases of frames before `before`, except second renderings. Returns whether to send the
@@ -257,7 +267,7 @@ impl Worker {
         self.overdue.retain(|&(frame, _), active| which(frame, active));
         let left = count(self);
         if left == 0 {
-            self.stalled_since = None;
+            self.stall = None;
         }
         self.stale |= left < before;
         left < before
@@ -279,14 +289,20 @@ impl Worker {
     /// Revokes all of its leases for good.
     pub(super) fn revoke_all(&mut self) -> BTreeMap<(FrameId, u32), ActiveLease> {
         self.overdue.clear();
-        self.stalled_since = None;
+        self.stall = None;
         std::mem::take(&mut self.leases)
     }
 
     /// Counts it as alive and not stalled: it is receiving assets.
     pub(super) fn touch(&mut self, now: Duration) {
         self.mark_alive(now);
-        self.stalled_since = self.stalled_since.map(|_| now);
+        self.stall = self.stall.map(|_| Stall::new(now));
+    }
+
+    /// Counts it as alive and not stalled: a part of a message has arrived. It stays suspect, since its pings are unanswered.
+    pub(super) fn note_arriving(&mut self, now: Duration) {
+        self.last_alive_at = now;
+        self.note_progress(now);
     }
 
     pub(super) fn mark_alive(&mut self, now: Duration) {

@@ -38,9 +38,9 @@ fn a_worker_with_an_overdue_lease_backs_off_until_it_answers() {
     assert_eq!(worker.next_deadline(), Some(SECOND));
     assert_eq!(worker.time_out(SECOND), [(FrameId(1), 0)]);
     assert!(!worker.is_ready(SECOND) && worker.next_deadline().is_none());
-    assert_eq!(worker.stalled_since(), Some(Duration::ZERO));
+    assert_eq!(worker.stall, Some(Stall::new(Duration::ZERO)));
     assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
-    assert!(worker.is_ready(SECOND) && worker.stalled_since().is_none());
+    assert!(worker.is_ready(SECOND) && worker.stall.is_none());
 }
 
 #[test]

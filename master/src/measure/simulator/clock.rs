@@ -53,7 +53,10 @@ pub(crate) enum WorkerMessage {
         fits: bool,
         content: u64,
     },
-    Pong(u64),
+    Pong {
+        nonce: u64,
+        progressed: bool,
+    },
     Failed(FrameId),
     Drain,
 }

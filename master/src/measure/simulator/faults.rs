@@ -2,6 +2,7 @@
 
 use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::Condition;
+use super::rng::Rng;
 use super::world::World;
 use crate::scheduler::{Event, FrameId, WorkerId};
 
@@ -32,7 +33,7 @@ impl World {
             (6, Some(_)) => self.churn(&ids),
             (7 | 8, Some(id)) => self.set_condition(id, Condition::Stopped),
             (9, Some(id)) => self.slow_down(id),
-            (10, Some(id)) => self.set_condition(id, Condition::Stuck),
+            (10, Some(id)) => self.set_condition(id, self.any_stuck()),
             (11, Some(id)) => self.vanish(id),
             (12, Some(_)) => self.partition(&ids),
             (13, Some(worker)) => self.handle(Event::DrainRequested { worker }),
@@ -70,11 +71,17 @@ impl World {
             return;
         };
         machine.condition = condition;
-        // A stuck worker stays stuck.
-        if condition != Condition::Stuck {
+        if !condition.is_final() {
             let lasts = self.rng.below(MAX_FAULT_DURATION);
             self.clock.schedule(self.clock.now + lasts, SimEvent::Recovered(id));
         }
+    }
+
+    /// A condition in which a worker answers pings and never a lease. From a separate generator, so that older seeds keep
+    /// their schedules.
+    fn any_stuck(&self) -> Condition {
+        let conditions = [Condition::Stuck, Condition::Hung, Condition::Endless];
+        Rng::new(self.setup.seed ^ self.clock.now).pick(&conditions).unwrap_or(Condition::Stuck)
     }
 
     fn slow_down(&mut self, id: WorkerId) {

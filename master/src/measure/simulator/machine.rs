@@ -20,6 +20,8 @@ pub(crate) struct Machine {
     pub(crate) unread: Vec<MasterMessage>,
     /// Threads that finished while it was stopped.
     pub(crate) unfinished: Vec<usize>,
+    /// Whether a thread has finished a band since the last pong.
+    finished_band: bool,
     pub(crate) up: Lane,
     pub(crate) up_order: Order,
     pub(crate) down_order: Order,
@@ -35,8 +37,24 @@ pub(crate) enum Condition {
     Stopped,
     /// It answers pings and never a lease.
     Stuck,
+    /// Its threads have stopped within their leases. It answers pings, without progress.
+    Hung,
+    /// As `Hung`, but it reports progress in every pong.
+    Endless,
     /// Gone without closing the connection, which is half open.
     Vanished,
+}
+
+impl Condition {
+    /// Whether its threads do nothing.
+    pub(crate) fn is_halted(self) -> bool {
+        matches!(self, Self::Stopped | Self::Hung | Self::Endless | Self::Vanished)
+    }
+
+    /// Whether it never recovers by itself.
+    pub(crate) fn is_final(self) -> bool {
+        matches!(self, Self::Stuck | Self::Hung | Self::Endless)
+    }
 }
 
 /// A lease in its queue.
@@ -70,6 +88,7 @@ impl Machine {
             condition: Condition::Healthy,
             unread: Vec::new(),
             unfinished: Vec::new(),
+            finished_band: false,
             up: Lane::default(),
             up_order: Order::default(),
             down_order: Order::default(),
@@ -80,6 +99,19 @@ impl Machine {
     pub(crate) fn thread_speed(&self) -> f64 {
         let full = self.speed / self.threads.len() as f64;
         if let Condition::Slow(times) = self.condition { full / times } else { full }
+    }
+
+    /// Whether its threads have made progress since the last pong. A band has many tiles, so a thread that traces a band
+    /// makes progress.
+    pub(crate) fn report_progress(&mut self) -> bool {
+        let finished_band = std::mem::take(&mut self.finished_band);
+        match self.condition {
+            Condition::Stuck | Condition::Hung => false,
+            Condition::Endless => true,
+            Condition::Healthy | Condition::Slow(_) | Condition::Stopped | Condition::Vanished => {
+                finished_band || self.threads.iter().flatten().any(|band| !band.stale)
+            }
+        }
     }
 
     pub(crate) fn lease(&mut self, lease: Lease) {
@@ -111,6 +143,7 @@ impl Machine {
 
     /// Finishes a band. Returns the lease and its tracing time in nanoseconds if this was its last band.
     pub(crate) fn finish(&mut self, band: &Band) -> Option<(Lease, u64)> {
+        self.finished_band = true;
         let job = self.queue.iter_mut().find(|job| job.lease == band.lease)?;
         job.rows_done += band.rows.end - band.rows.start;
         job.traced += band.nanoseconds;

@@ -22,7 +22,10 @@ impl World {
                 self.start(id);
             }
             (_, MasterMessage::Cancel(before)) => machine.cancel(before),
-            (_, MasterMessage::Ping(nonce)) => self.send_to_master(id, WorkerMessage::Pong(nonce)),
+            (_, MasterMessage::Ping(nonce)) => {
+                let progressed = machine.report_progress();
+                self.send_to_master(id, WorkerMessage::Pong { nonce, progressed });
+            }
             (_, MasterMessage::Announce | MasterMessage::Drain) => {}
         }
     }
@@ -68,7 +71,9 @@ impl World {
                     ReplyOutcome::Invalid => self.disconnect(worker),
                 }
             }
-            WorkerMessage::Pong(nonce) => self.handle(Event::Pong { worker, nonce }),
+            WorkerMessage::Pong { nonce, progressed } => {
+                self.handle(Event::Pong { worker, nonce, progressed });
+            }
             WorkerMessage::Failed(frame) => {
                 if let Some(book) = self.shell.books.get_mut(&worker) {
                     book.fail(frame);
@@ -100,7 +105,7 @@ impl World {
                 let raw = f64::from(lease.row_count) * f64::from(self.setup.size.0) * 3.0;
                 bytes::PIXELS_HEAD + raw / self.setup.compression
             }
-            WorkerMessage::Pong(_) | WorkerMessage::Failed(_) | WorkerMessage::Drain => bytes::CONTROL,
+            WorkerMessage::Pong { .. } | WorkerMessage::Failed(_) | WorkerMessage::Drain => bytes::CONTROL,
         }
     }
 

@@ -9,7 +9,7 @@ impl World {
     /// Gives rows to idle threads.
     pub(super) fn start(&mut self, id: WorkerId) {
         while let Some(machine) = self.machines.get_mut(&id) {
-            if matches!(machine.condition, Condition::Stopped | Condition::Vanished) {
+            if machine.condition.is_halted() {
                 return;
             }
             let Some(thread) = machine.idle_thread() else { return };
@@ -61,7 +61,9 @@ impl World {
     pub(super) fn band_done(&mut self, id: WorkerId, thread: usize) {
         let Some(machine) = self.machines.get_mut(&id) else { return };
         match machine.condition {
-            Condition::Stopped => return machine.unfinished.push(thread),
+            Condition::Stopped | Condition::Hung | Condition::Endless => {
+                return machine.unfinished.push(thread);
+            }
             Condition::Vanished => return,
             Condition::Healthy | Condition::Slow(_) | Condition::Stuck => {}
         }

@@ -61,7 +61,14 @@ fn efficiency_is_high_with_costs_that_move() {
 
 #[test]
 fn a_failing_worker_delays_a_frame_by_one_frame_at_most() {
-    let conditions = [None, Some(Condition::Stopped), Some(Condition::Slow(10.0)), Some(Condition::Stuck)];
+    let conditions = [
+        None,
+        Some(Condition::Stopped),
+        Some(Condition::Slow(10.0)),
+        Some(Condition::Stuck),
+        Some(Condition::Hung),
+        Some(Condition::Endless),
+    ];
     for pipeline in [false, true] {
         for condition in conditions {
             for victim in [1, 5] {
@@ -78,7 +85,7 @@ fn a_failing_worker_delays_a_frame_by_one_frame_at_most() {
 fn workers_that_join_and_never_answer_delay_no_frame() {
     for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Smart(16)] {
         for (workers, joining) in [(1, 3), (1, 6), (3, 20)] {
-            for condition in [Condition::Stopped, Condition::Stuck] {
+            for condition in [Condition::Stopped, Condition::Stuck, Condition::Hung] {
                 let setup = Setup { workers, policy, ..Setup::default() };
                 let [usual, worst] =
                     World::new(setup).worst_with_silent_joins(joining, condition, SECOND * 4).unwrap();
@@ -87,6 +94,42 @@ fn workers_that_join_and_never_answer_delay_no_frame() {
                     "{policy}, {workers} and {joining} {condition:?}: {worst} ms after {usual} ms"
                 );
             }
+        }
+    }
+}
+
+/// A farm whose only worker takes 200 s for each of ten bands, after a run until one frame is complete or 4000 s have
+/// passed. The worker gets into `condition` after 30 s.
+fn after_a_heavy_frame(policy: SegmentPolicy, condition: Condition) -> World {
+    let setup = Setup {
+        workers: 1,
+        threads: 1,
+        spread: 1.0,
+        size: (64, 160),
+        tile_rows: 16,
+        costs: CostProfile::Flat,
+        frame_seconds: 2000.0,
+        policy,
+        ..Setup::default()
+    };
+    let mut world = World::new(setup);
+    world.checking = true;
+    world.begin();
+    world.run(30 * SECOND, |_| false);
+    world.machines.values_mut().for_each(|machine| machine.condition = condition);
+    world.run(4000 * SECOND, |world| world.counters.frames >= 1);
+    assert_eq!(world.violation, None, "{policy}");
+    world
+}
+
+#[test]
+fn a_slow_worker_completes_a_heavy_frame_and_a_hung_one_is_disconnected() {
+    for policy in [SegmentPolicy::Adaptive, SegmentPolicy::Static(16), SegmentPolicy::Static(80)] {
+        let slow = after_a_heavy_frame(policy, Condition::Healthy);
+        assert_eq!((slow.counters.frames, slow.machines.len()), (1, 1), "{policy}");
+        for (condition, connected) in [(Condition::Hung, 0), (Condition::Stuck, 0), (Condition::Endless, 1)] {
+            let hung = after_a_heavy_frame(policy, condition);
+            assert_eq!((hung.counters.frames, hung.machines.len()), (0, connected), "{policy} {condition:?}");
         }
     }
 }
