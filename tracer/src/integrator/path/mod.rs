@@ -30,6 +30,8 @@ mod delta;
 mod group;
 mod media;
 mod queue;
+#[cfg(test)]
+mod tests;
 mod vertex;
 
 use std::ops::Range;
