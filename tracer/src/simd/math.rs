@@ -139,6 +139,16 @@ pub(crate) fn atan2<S: Simd>(simd: S, y: f32x16<S>, x: f32x16<S>) -> f32x16<S> {
     select(y.simd_lt(zero), -angle, angle)
 }
 
+/// c_0 + c_1 x + c_2 x^2 + c_3 x^3.
+#[inline(always)]
+fn series<S: Simd>(simd: S, x: f32x16<S>, coefficients: [f32; 4]) -> f32x16<S> {
+    let mut sum = splat(simd, coefficients[3]);
+    for i in 0..3 {
+        sum = sum * x + splat(simd, coefficients[2 - i]);
+    }
+    sum
+}
+
 /// Sine and cosine of angles of at most 8 pi, in radians; error below 2e-7.
 ///
 /// The angle is reduced to [-pi / 4, pi / 4] by the nearest multiple of pi / 2, which is subtracted in three parts (Cody and Waite), and the
@@ -151,22 +161,17 @@ pub(crate) fn sin_cos<S: Simd>(simd: S, angle: f32x16<S>) -> [f32x16<S>; 2] {
     let r = r - quadrant * splat(simd, 4.837_513e-4);
     let r = r - quadrant * splat(simd, 7.549_789_4e-8);
     let r2 = r * r;
-    let series = |coefficients: [f32; 4]| {
-        let mut sum = splat(simd, coefficients[3]);
-        for i in 0..3 {
-            sum = sum * r2 + splat(simd, coefficients[2 - i]);
-        }
-        sum
-    };
     let one = splat(simd, 1.0);
-    let sine = r + r * r2 * series([-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
-    let cosine = one + r2 * series([-0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0]);
+    let of_sine = series(simd, r2, [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
+    let of_cosine = series(simd, r2, [-0.5, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0]);
+    let (sine, cosine) = (r + r * r2 * of_sine, one + r2 * of_cosine);
     let turns = simd.cvt_i32_f32x16(quadrant);
-    let odd = (turns & i32x16::splat(simd, 1)).simd_eq(i32x16::splat(simd, 1));
-    let second = |shift: i32| (turns + i32x16::splat(simd, shift)) & i32x16::splat(simd, 2);
-    let negative = |shift: i32| second(shift).simd_eq(i32x16::splat(simd, 2));
+    let (first, second) = (i32x16::splat(simd, 1), i32x16::splat(simd, 2));
+    let odd = (turns & first).simd_eq(first);
+    let sine_is_negative = (turns & second).simd_eq(second);
+    let cosine_is_negative = ((turns + first) & second).simd_eq(second);
     let (sin, cos) = (select(odd, cosine, sine), select(odd, sine, cosine));
-    [select(negative(0), -sin, sin), select(negative(1), -cos, cos)]
+    [select(sine_is_negative, -sin, sin), select(cosine_is_negative, -cos, cos)]
 }
 
 /// The power of two that scales each number into [1, 2), exactly. Numbers must not be negative; the result is unusable for

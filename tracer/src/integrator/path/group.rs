@@ -13,8 +13,8 @@ use crate::frame::{CameraRays, PreparedFrame};
 use crate::intersect::tile;
 use crate::light::table::{LightTable, Selection};
 use crate::rays::{
-    BATCH, BLOCKS, EyeTile, HitBlock, ParallelTile, PictureTile, RayBatch, RayCounts, RaySource, SIDE,
-    TileRays, TileSamples, place,
+    BATCH, BLOCKS, EyeTile, HitBlock, ParallelTile, PictureTile, RayBatch, RayBlock, RayCounts, RaySource,
+    SIDE, TileRays, TileSamples, place,
 };
 use crate::sampler::{Dimension, pair_of, pixel_seed};
 use crate::scene::PathSettings;
@@ -46,9 +46,12 @@ pub(super) struct Group<'a> {
     pub(super) hits: [HitBlock; BLOCKS],
     pub(super) surfaces: Surfaces,
     pub(super) scratch: tile::Scratch,
-    /// The paths of the current batch, and those that go on.
-    pub(super) current: Vec<Path>,
+    /// The paths of the current generation, and those that go on.
+    current: Vec<Path>,
     pub(super) next: Vec<Path>,
+    /// Index of the first path of the current batch.
+    base: usize,
+    pub(super) shadow_rays: RayBlock<'a>,
     /// Radiance of each sample, by its number in the group and its place in the tile.
     pub(super) radiance: Vec<[f32; 3]>,
     pub(super) counts: RayCounts,
@@ -83,6 +86,8 @@ impl<'a> Group<'a> {
             scratch: tile::Scratch::new(),
             current: Vec::new(),
             next: Vec::new(),
+            base: 0,
+            shadow_rays: RayBlock::new(frame),
             radiance: Vec::new(),
             counts: RayCounts::default(),
         })
@@ -130,17 +135,16 @@ impl<'a> Group<'a> {
             watch.enter(Stage::Shading);
             self.shade(simd, 0, watch);
         }
-        let mut queue = Vec::new();
         for bounce in 1..=u32::from(self.frame.view().quality.max_depth) {
             if self.next.is_empty() {
                 break;
             }
-            std::mem::swap(&mut queue, &mut self.next);
+            std::mem::swap(&mut self.current, &mut self.next);
             self.next.clear();
-            for paths in queue.chunks(BATCH) {
+            for base in (0..self.current.len()).step_by(BATCH) {
                 self.poll()?;
                 watch.enter(Stage::Secondary);
-                self.find_hits(simd, paths);
+                self.find_hits(simd, base);
                 watch.enter(Stage::Shading);
                 self.shade(simd, bounce, watch);
             }
@@ -162,6 +166,12 @@ impl<'a> Group<'a> {
                 }
             }
         }
+    }
+
+    /// A path of the current batch.
+    #[inline(always)]
+    pub(super) fn path(&self, block: usize, lane: usize) -> &Path {
+        &self.current[self.base + block * LANES + lane]
     }
 
     /// Number in its pixel, and seed of the pixel, of a sample of the group.
@@ -217,6 +227,7 @@ impl<'a> Group<'a> {
 
     /// Makes the paths of the first rays; `sample` is their number in the group.
     fn begin_paths(&mut self, sample: usize) {
+        self.base = 0;
         self.current.clear();
         self.current.extend((0..BATCH).map(|index| Path {
             ray: self.batch.ray(index / LANES, index % LANES),
@@ -229,13 +240,12 @@ impl<'a> Group<'a> {
     }
 
     /// Finds the hits and surface points of paths that go on.
-    fn find_hits<S: Simd>(&mut self, simd: S, paths: &[Path]) {
-        self.current.clear();
-        self.current.extend_from_slice(paths);
+    fn find_hits<S: Simd>(&mut self, simd: S, base: usize) {
+        self.base = base;
         self.batch.clear();
         self.batch.of_camera = false;
         self.batch.neighbours = false;
-        for (index, path) in paths.iter().enumerate() {
+        for (index, path) in self.current[base..].iter().take(BATCH).enumerate() {
             self.batch.set(index, path.ray, f64::INFINITY, path.starts_on);
         }
         for (block, hits) in self.hits.iter_mut().enumerate() {

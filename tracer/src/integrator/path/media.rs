@@ -27,14 +27,14 @@ impl Group<'_> {
         if !material.is_transparent() || material.thin {
             return 1.0;
         }
-        let media = &self.current[block * LANES + lane].media;
+        let media = &self.path(block, lane).media;
         media.interface(&self.frame.scene().materials, index, front).eta as f32
     }
 
     /// The bodies around a path behind the surface that it hits.
     pub(super) fn media_behind(&self, block: usize, lane: usize) -> Media {
         let (material, index, front) = self.hit_side(block, lane);
-        let media = self.current[block * LANES + lane].media;
+        let media = self.path(block, lane).media;
         if material.thin {
             media
         } else {
@@ -50,7 +50,7 @@ impl Group<'_> {
         let mut any = false;
         for lane in each_bit(hit) {
             let (material, index, front) = self.hit_side(block, lane);
-            let media = &self.current[block * LANES + lane].media;
+            let media = &self.path(block, lane).media;
             if !media.may_absorb(materials, material) {
                 continue;
             }

@@ -6,7 +6,7 @@ use super::group::Group;
 use super::queue::Path;
 use crate::bsdf::scattering::{Evaluated, Scattering, Setting};
 use crate::light::SHADOW_T_MAX;
-use crate::rays::{BLOCKS, Ray, RayBlock, RaySource, SurfaceSource};
+use crate::rays::{BLOCKS, Ray, RaySource, SurfaceSource};
 use crate::sampler::{Dimension, Vertex, pair};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{
@@ -79,7 +79,7 @@ impl Group<'_> {
         let mut density = Lanes([1.0; LANES]);
         let (mut seeds, mut numbers) = (Indices::ZERO, Indices::ZERO);
         for lane in each_bit(live) {
-            let path = &self.current[block * LANES + lane];
+            let path = self.path(block, lane);
             for channel in 0..3 {
                 weight[channel].0[lane] = path.weight[channel];
             }
@@ -109,7 +109,7 @@ impl Group<'_> {
         let light = if limit > 0.0 && scattered > 1 { limited(simd, light, limit) } else { light };
         let light = three!(channel => Lanes(light.0[channel].to_array()));
         for lane in each_bit(lanes) {
-            let sample = self.current[block * LANES + lane].sample as usize;
+            let sample = self.path(block, lane).sample as usize;
             for channel in 0..3 {
                 self.radiance[sample][channel] += light[channel].0[lane];
             }
@@ -208,9 +208,9 @@ impl Group<'_> {
         if self.table.is_some() {
             self.add_selected_light(simd, bounce, block, lanes, (incoming, &setting, &scattering), watch);
         }
-        let numbers = |vertex: Vertex| self.numbers(simd, incoming, Dimension::of(bounce, vertex));
-        let [part, roulette] = numbers(Vertex::Lobe);
-        let scattered = scattering.sample(simd, part, numbers(Vertex::Direction));
+        let [part, roulette] = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Lobe));
+        let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Direction));
+        let scattered = scattering.sample(simd, part, at);
         let mut weight = incoming.weight.mul(scattered.weight);
         let zero = splat(simd, 0.0);
         let along = setting.geometric.dot(scattered.direction);
@@ -230,7 +230,7 @@ impl Group<'_> {
         let (origins, directions) = (arrays(origins), arrays(scattered.direction));
         let (weights, densities) = (arrays(weight), scattered.density.to_array());
         for lane in each_bit(alive) {
-            let path = &self.current[block * LANES + lane];
+            let path = self.path(block, lane);
             let mut next = Path {
                 ray: Ray { origin: vector(&origins, lane), direction: vector(&directions, lane) },
                 starts_on: self.hits[block].primitive(lane),
@@ -288,17 +288,11 @@ impl Group<'_> {
         watch: &mut W,
     ) {
         let Some(table) = self.table else { return };
-        let numbers = |vertex: Vertex| self.numbers(simd, incoming, Dimension::of(bounce, vertex));
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
-        let [select_by, _] = numbers(Vertex::Light);
-        let mut samples = table.sample(
-            simd,
-            self.frame,
-            (points, lanes),
-            self.selection(bounce),
-            select_by,
-            numbers(Vertex::LightPoint),
-        );
+        let [select_by, _] = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Light));
+        let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::LightPoint));
+        let mut samples =
+            table.sample(simd, self.frame, (points, lanes), self.selection(bounce), select_by, at);
         if samples.live == 0 {
             return;
         }
@@ -330,7 +324,7 @@ impl Group<'_> {
             let side = self.surfaces.to_shadow_origins(simd, block, along);
             let origins = arrays(points.add(setting.geometric.scale(side)));
             let (points, to_light) = (arrays(points), arrays(to_light));
-            let mut rays = RayBlock::new(self.frame);
+            self.shadow_rays.clear();
             for lane in each_bit(shadowed) {
                 let origin = vector(&origins, lane);
                 let way = vector(&to_light, lane) * samples.distance[lane];
@@ -343,10 +337,10 @@ impl Group<'_> {
                 } else {
                     (Ray { origin, direction: vector(&to_light, lane) }, f64::INFINITY)
                 };
-                rays.set(lane, ray, end, self.hits[block].primitive(lane));
+                self.shadow_rays.set(lane, ray, end, self.hits[block].primitive(lane));
             }
             self.counts.shadow += u64::from(shadowed.count_ones());
-            visible &= !self.frame.any_hits_of(&rays);
+            visible &= !self.frame.any_hits_of(&self.shadow_rays);
             watch.enter(Stage::Shading);
         }
         self.add(simd, block, visible, bounce + 1, light);
