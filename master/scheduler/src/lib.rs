@@ -56,13 +56,9 @@ mod worker;
 #[cfg(test)]
 mod scenarios;
 #[cfg(test)]
-mod service_scenarios;
-#[cfg(test)]
 mod sizes_tests;
 #[cfg(test)]
 mod transcript;
-#[cfg(test)]
-mod verification_scenarios;
 
 pub use action::Action;
 pub use event::{Event, HostId, WorkerId};

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::accounting::duration_text;
-use crate::farm::FarmStatus;
-use crate::farm::Reachable;
 use crate::log_bar::{show_below_log, show_nothing_below_log};
+use rayfarm_farm::FarmStatus;
+use rayfarm_farm::Reachable;
+use rayfarm_farm::accounting::duration_text;
 
 /// Interval of the lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);

@@ -2,7 +2,7 @@
 
 use super::canvas::RowTint;
 use super::overlay::legend::Entry;
-use crate::accounting::{FrameAccount, SegmentNote, WorkerAccount};
+use rayfarm_farm::accounting::{FrameAccount, SegmentNote, WorkerAccount};
 
 /// Meaning of the tints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -15,8 +15,8 @@ use super::tint::Coloring;
 use super::watch::WindowWatch;
 use super::worker_selection::{self, WorkerSelection};
 use super::{Display, DisplayError, SceneInfo};
-use crate::farm::FarmStatus;
 use crate::viewer::{InputAction, PresentedFrame, Statistics, ViewerHandle};
+use rayfarm_farm::FarmStatus;
 
 /// Interval at which the figures are compared with those on the screen, and drawn if they differ.
 const FIGURES_EVERY: Duration = Duration::from_millis(200);

@@ -1,8 +1,8 @@
 //! Selection of workers in the window, and the commands of keys to them.
 
 use super::input::InputEvents;
-use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
 use crate::viewer::WorkerCommand;
+use rayfarm_farm::{FarmStatus, WorkerState, WorkerStatus};
 
 /// State of the panel of workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

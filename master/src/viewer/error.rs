@@ -1,7 +1,7 @@
 //! Errors that end a viewer.
 
 use super::frame_log::FrameLogError;
-use crate::farm::FarmError;
+use rayfarm_farm::FarmError;
 
 /// Reason for which a viewer ended before its displays did.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::input_action::InputAction;
 use super::statistics::Statistics;
-use crate::farm::{FarmStatus, FinishedFrame};
+use rayfarm_farm::{FarmStatus, FinishedFrame};
 
 /// Actions that wait for the viewer at most. Further ones are dropped until it has caught up.
 const MAX_WAITING_ACTIONS: usize = 256;

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayfarm_tracer::scene::rotation::sin_cos_degrees;
 use rayfarm_tracer::scene::{Camera, FrameView};
 
-use crate::farm::ViewRequest;
+use rayfarm_farm::ViewRequest;
 
 /// Movements without input, as the command line offers them.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::LOCAL_WORKER;
 use super::values::{listen_address, thread_count, worker_count};
-use crate::farm::{FarmOptions, LocalWorkerCommand, SegmentPolicy};
+use rayfarm_farm::{FarmOptions, LocalWorkerCommand, SegmentPolicy};
 
 /// Workers, and how frames are divided among them.
 #[derive(Clone, Debug, Args)]

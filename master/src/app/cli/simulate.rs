@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::values::{Size, frame_count, size};
-use crate::farm::SegmentPolicy;
 use crate::measure::simulator::{DistributionSetup, Setup};
+use rayfarm_farm::SegmentPolicy;
 
 /// Largest number of simulated workers.
 const MAX_WORKERS: i64 = 4096;

@@ -6,7 +6,7 @@ use rayfarm_tracer::scene::{
 };
 
 use super::*;
-use crate::farm::SegmentPolicy;
+use rayfarm_farm::SegmentPolicy;
 
 fn parse(line: &str) -> Result<Invocation, clap::Error> {
     Invocation::parse(line.split_whitespace().map(OsString::from))

@@ -13,10 +13,10 @@ use crate::app::cli::BenchArgs;
 use crate::app::reports::{BenchReport, Knobs, MsPerFrame, print_json};
 use crate::display::numbers::{counted, grouped};
 use crate::error::CommandError;
-use crate::farm::ViewRequest;
 use crate::in_process::{all_cores, trace};
 use crate::quantile::round_to_us;
 use crate::viewer::frame_counts::RaysPerFrame;
+use rayfarm_farm::ViewRequest;
 
 /// Measures the frames of a scene and prints the figures on standard output.
 ///

@@ -2,11 +2,11 @@
 
 use tokio_util::sync::CancellationToken;
 
-use crate::accounting::{TimelineError, TimelineFile};
 use crate::app::cli::ObservabilityArgs;
 use crate::app::control::{self, Console, Place};
 use crate::error::CommandError;
-use crate::farm::Farm;
+use rayfarm_farm::Farm;
+use rayfarm_farm::accounting::{TimelineError, TimelineFile};
 
 /// Timeline and control, as the command line requests them.
 pub(super) struct Observability {

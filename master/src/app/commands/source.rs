@@ -10,8 +10,8 @@ use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
-use crate::farm::ViewRequest;
 use crate::viewer::orbit::Animation;
+use rayfarm_farm::ViewRequest;
 
 /// Scene without a file on the command line, in a folder of models.
 const DEFAULT_SCENE: &str = "room.toml";

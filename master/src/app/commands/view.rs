@@ -13,11 +13,11 @@ use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
 use crate::display::{Display, SceneInfo, WindowDisplay};
 use crate::error::CommandError;
-use crate::farm::as_text;
-use crate::farm::{Farm, FarmControl, FarmScene};
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
 };
+use rayfarm_farm::as_text;
+use rayfarm_farm::{Farm, FarmControl, FarmScene};
 
 /// Frames of one turn of `--orbit` without `--frames`.
 const FRAMES_PER_ORBIT: u32 = 360;

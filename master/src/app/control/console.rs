@@ -8,8 +8,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::command::{COMMANDS, Command, WorkerSelector};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
-use crate::farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
 use crate::viewer::KICK_REASON;
+use rayfarm_farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
 
 /// Executor of the commands of one or more connections.
 #[derive(Clone)]

@@ -11,9 +11,9 @@ use super::command::{Command, WorkerSelector};
 use super::console::Then;
 use super::lines::{Line, LineSplitter, MAX_LINE_BYTES};
 use super::*;
-use crate::fake_worker::{self, Script};
-use crate::farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
-use crate::test_scene::{scene, view};
+use rayfarm_farm::testing::fake_worker::{self, Script};
+use rayfarm_farm::testing::test_scene::{scene, view};
+use rayfarm_farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(60);

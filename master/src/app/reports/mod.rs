@@ -8,11 +8,11 @@ use std::time::Duration;
 pub(crate) use knobs::Knobs;
 use serde::Serialize;
 
-use crate::accounting::AccountReport;
 use crate::error::CommandError;
-use crate::farm::Verification;
 use crate::quantile::{percentile, round_to_us};
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame};
+use rayfarm_farm::Verification;
+use rayfarm_farm::accounting::AccountReport;
 
 /// Report of a `render` run; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]

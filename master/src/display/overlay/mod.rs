@@ -9,8 +9,8 @@ use legend::Entry;
 
 use super::canvas::{Canvas, GLYPH, Rect};
 use super::numbers::{counted, three_digits};
-use crate::farm::BannedWorker;
-use crate::farm::Reachable;
+use rayfarm_farm::BannedWorker;
+use rayfarm_farm::Reachable;
 
 pub(super) mod accounts;
 mod kicked;

@@ -2,7 +2,7 @@
 
 use super::setup::Corruption;
 use super::world::World;
-use crate::scheduler::{Lease, WorkerId};
+use rayfarm_scheduler::{Lease, WorkerId};
 
 impl World {
     /// The error value of the pixels that a worker sends for a lease: 0 where they are right.

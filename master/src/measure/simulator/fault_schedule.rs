@@ -7,7 +7,7 @@ use super::machine::Condition;
 use super::rng::Rng;
 use super::setup::{Corruption, Setup};
 use super::world::World;
-use crate::scheduler::{Event, FrameId, SegmentPolicy, WorkerId};
+use rayfarm_scheduler::{Event, FrameId, SegmentPolicy, WorkerId};
 
 /// Longest safety phase.
 const MAX_FAULT_PHASE: u64 = 40 * SECOND;

@@ -3,7 +3,7 @@
 use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::Condition;
 use super::world::World;
-use crate::scheduler::{Event, FrameId, WorkerId};
+use rayfarm_scheduler::{Event, FrameId, WorkerId};
 
 /// Longest time between two faults.
 const MAX_FAULT_INTERVAL: u64 = SECOND / 2;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::clock::MasterMessage;
 use super::link::{Lane, Order};
-use crate::scheduler::{FrameId, Lease};
+use rayfarm_scheduler::{FrameId, Lease};
 
 /// State of one worker's machine.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use super::link::bytes;
 use super::machine::Condition;
 use super::shell::ReplyOutcome;
 use super::world::World;
-use crate::scheduler::{Event, WorkerId};
+use rayfarm_scheduler::{Event, WorkerId};
 
 impl World {
     pub(super) fn at_worker(&mut self, id: WorkerId, message: MasterMessage) {

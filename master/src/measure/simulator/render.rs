@@ -3,7 +3,7 @@
 use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::{Band, Condition};
 use super::world::World;
-use crate::scheduler::{Cost, FrameId, Lease, WorkerId};
+use rayfarm_scheduler::{Cost, FrameId, Lease, WorkerId};
 
 impl World {
     /// Gives rows to idle threads.

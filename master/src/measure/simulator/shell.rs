@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::pictures::Picture;
 use super::setup::Corruption;
-use crate::farm::{LeaseBook, LeaseStatus};
-use crate::scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
+use rayfarm_farm::{LeaseBook, LeaseStatus};
+use rayfarm_scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
 
 /// State that the driver keeps in the real master.
 #[derive(Debug, Default)]

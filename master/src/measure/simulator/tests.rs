@@ -6,7 +6,7 @@ use super::clock::SECOND;
 use super::machine::Condition;
 use super::world::World;
 use super::{Corruption, CostProfile, Schedule, Setup, measure, run_schedule};
-use crate::scheduler::SegmentPolicy;
+use rayfarm_scheduler::SegmentPolicy;
 
 #[test]
 fn invariants_hold_in_fixed_schedules() {

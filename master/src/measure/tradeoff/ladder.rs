@@ -4,8 +4,8 @@ use rayfarm_tracer::scene::RenderScale;
 
 use super::setting::MeasuredSetting;
 use super::table::{Row, Table};
-use crate::farm::ViewRequest;
 use crate::viewer::quality_controller::{Ladder, Origin, Rung, bytes, continued};
+use rayfarm_farm::ViewRequest;
 
 /// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
 /// losses are differences to its mean FLIP error.
@@ -92,7 +92,7 @@ mod tests {
     }
 
     fn resting(samples: u32) -> ViewRequest {
-        let view = FrameView { samples, ..crate::test_scene::view() };
+        let view = FrameView { samples, ..rayfarm_farm::testing::test_scene::view() };
         ViewRequest { view, scale: RenderScale::Full }
     }
 

@@ -22,7 +22,7 @@ use super::quality_controller::QualityController;
 use super::requests::{Answered, RequestPolicy, Requests, ViewState};
 use super::sequence::{FrameSequence, SequenceFrame, SequencePlan, SequenceSender};
 use super::statistics::ViewerState;
-use crate::farm::{Farm, FarmError, FinishedFrame, ViewRequest};
+use rayfarm_farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 
 /// Interval at which displays receive the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(100);

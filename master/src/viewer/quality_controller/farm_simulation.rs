@@ -9,11 +9,11 @@ use rayfarm_tracer::scene::{
 };
 
 use super::*;
-use crate::accounting::{Parts, WorkerAccount};
 use crate::measure::simulator::Rng;
 use crate::measure::tradeoff::ladder::ladder as measured_ladder;
 use crate::measure::tradeoff::table::Table;
-use crate::test_scene;
+use rayfarm_farm::accounting::{Parts, WorkerAccount};
+use rayfarm_farm::testing::test_scene;
 
 const ROOM: &[u8] = include_bytes!("../../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;

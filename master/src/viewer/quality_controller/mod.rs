@@ -34,8 +34,8 @@ pub(crate) use small_scales::continued;
 use stillness::{Motion, Stillness};
 pub(crate) use wire::bytes;
 
-use crate::accounting::FrameAccount;
-use crate::farm::ViewRequest;
+use rayfarm_farm::ViewRequest;
+use rayfarm_farm::accounting::FrameAccount;
 
 /// Quality at which a frame is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

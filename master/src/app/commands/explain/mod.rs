@@ -21,8 +21,8 @@ use super::source::Source;
 use crate::app::cli::ExplainArgs;
 use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
-use crate::farm::{Assets, ViewRequest};
 use crate::measure::ray_bounds::RayBounds;
+use rayfarm_farm::{Assets, ViewRequest};
 
 /// Explanation of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]

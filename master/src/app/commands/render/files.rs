@@ -15,8 +15,8 @@ use crate::app::plan::Plan;
 use crate::app::progress::Progress;
 use crate::display::{Display, DisplayError};
 use crate::error::CommandError;
-use crate::farm::{FinishedFrame, ViewRequest};
 use crate::viewer::{FrameSequence, SequenceFrame, Slot, ViewerHandle};
+use rayfarm_farm::{FinishedFrame, ViewRequest};
 
 /// Interval at which the progress display shows the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(200);

@@ -21,9 +21,9 @@ use crate::app::progress::Progress;
 use crate::app::reports::{RenderReport, print_json};
 use crate::display::Display;
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 use crate::viewer::orbit::Animation;
 use crate::viewer::{FrameLogFile, Viewer};
+use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 
 mod files;
 mod repair;

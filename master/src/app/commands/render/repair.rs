@@ -7,9 +7,9 @@ use tokio_util::sync::CancellationToken;
 
 use super::Run;
 use crate::app::reports::VerificationReport;
-use crate::farm::as_text;
-use crate::farm::{Farm, FarmError, FinishedFrame, FrameId};
 use crate::viewer::OPEN_REQUESTS;
+use rayfarm_farm::as_text;
+use rayfarm_farm::{Farm, FarmError, FinishedFrame, FrameId};
 
 /// Time for the remaining verification after the last frame is complete.
 const VERIFICATION_TIMEOUT: Duration = Duration::from_secs(30);

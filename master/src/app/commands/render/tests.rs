@@ -9,7 +9,7 @@ use tokio::task::JoinHandle;
 
 use super::*;
 use crate::app::cli::Invocation;
-use crate::fake_worker::{self, Script};
+use rayfarm_farm::testing::fake_worker::{self, Script};
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(120);

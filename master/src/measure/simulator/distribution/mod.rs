@@ -11,8 +11,8 @@ use serde::Serialize;
 use super::clock::SECOND;
 use super::link::{Lane, bytes};
 use super::rng::Rng;
-use crate::farm::{AssetRouting, AssetSource};
-use crate::scheduler::WorkerId;
+use rayfarm_farm::{AssetRouting, AssetSource};
+use rayfarm_scheduler::WorkerId;
 
 const ASSET: AssetId = AssetId([1; 32]);
 /// All workers request the asset within this time, in nanoseconds.
