@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use rayfarm_scheduler::{Action, Event, FrameId, HostId, Lease, Scheduler, WorkerId, check};
+
 use super::clock::{Clock, MasterMessage, SECOND, SimEvent};
 use super::counters::{Counters, Measured};
 use super::link::Lane;
@@ -10,7 +12,6 @@ use super::rng::Rng;
 use super::setup::Setup;
 use super::shell::Shell;
 use crate::viewer::OPEN_REQUESTS;
-use rayfarm_scheduler::{Action, Event, FrameId, HostId, Lease, Scheduler, WorkerId, check};
 
 /// Longest virtual time of a measurement.
 const MAX_VIRTUAL_TIME: u64 = 3600 * SECOND;
