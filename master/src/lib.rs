@@ -1,7 +1,8 @@
 //! The master of rayfarm: owns the scene and the screen, hands out segments, assembles frames.
 //!
-//! [`rayfarm_farm::Farm`] is the boundary between displays and rendering. The code above it (application, viewer, displays) requests
-//! frames and shows them. The code below it (scheduler, sessions, framebuffers, local worker processes) completes each one.
+//! [`rayfarm_farm::Farm`] is the boundary between displays and rendering. The code above it (application, viewer, displays)
+//! requests frames and shows them. The code below it (scheduler, sessions, framebuffers, local worker processes) completes each
+//! one.
 
 mod app;
 mod display;
@@ -21,6 +22,7 @@ use std::process::ExitCode;
 
 use app::cli::Invocation;
 use app::{commands, logging};
+pub use measure::simulator;
 
 /// Runs the program for a command line, program name first. Errors are printed on standard error.
 ///

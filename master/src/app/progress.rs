@@ -5,11 +5,11 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-
-use crate::log_bar::{show_below_log, show_nothing_below_log};
 use rayfarm_farm::FarmStatus;
 use rayfarm_farm::Reachable;
 use rayfarm_farm::accounting::duration_text;
+
+use crate::log_bar::{show_below_log, show_nothing_below_log};
 
 /// Interval of the lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);

@@ -1,8 +1,9 @@
 //! Selection of workers in the window, and the commands of keys to them.
 
+use rayfarm_farm::{FarmStatus, WorkerState, WorkerStatus};
+
 use super::input::InputEvents;
 use crate::viewer::WorkerCommand;
-use rayfarm_farm::{FarmStatus, WorkerState, WorkerStatus};
 
 /// State of the panel of workers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

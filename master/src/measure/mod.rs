@@ -3,5 +3,5 @@
 
 pub(crate) mod plot;
 pub(crate) mod ray_bounds;
-pub(crate) mod simulator;
+pub mod simulator;
 pub(crate) mod tradeoff;

@@ -1,7 +1,8 @@
 //! Errors that end a viewer.
 
-use super::frame_log::FrameLogError;
 use rayfarm_farm::FarmError;
+
+use super::frame_log::FrameLogError;
 
 /// Reason for which a viewer ended before its displays did.
 #[derive(Debug, thiserror::Error)]

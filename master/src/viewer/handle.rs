@@ -4,11 +4,11 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Instant;
 
+use rayfarm_farm::{FarmStatus, FinishedFrame};
 use tokio::sync::{mpsc, watch};
 
 use super::input_action::InputAction;
 use super::statistics::Statistics;
-use rayfarm_farm::{FarmStatus, FinishedFrame};
 
 /// Actions that wait for the viewer at most. Further ones are dropped until it has caught up.
 const MAX_WAITING_ACTIONS: usize = 256;

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use rayfarm_farm::SegmentPolicy;
 
 use super::values::{Size, frame_count, size};
 use crate::measure::simulator::{DistributionSetup, Setup};
-use rayfarm_farm::SegmentPolicy;
 
 /// Largest number of simulated workers.
 const MAX_WORKERS: i64 = 4096;

@@ -1,12 +1,12 @@
 use std::net::SocketAddr;
 
+use rayfarm_farm::SegmentPolicy;
 use rayfarm_tracer::scene::knobs::KNOBS;
 use rayfarm_tracer::scene::{
     ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Setting, Shading, Up,
 };
 
 use super::*;
-use rayfarm_farm::SegmentPolicy;
 
 fn parse(line: &str) -> Result<Invocation, clap::Error> {
     Invocation::parse(line.split_whitespace().map(OsString::from))

@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
@@ -16,7 +17,6 @@ use crate::error::CommandError;
 use crate::in_process::{all_cores, trace};
 use crate::quantile::round_to_us;
 use crate::viewer::frame_counts::RaysPerFrame;
-use rayfarm_farm::ViewRequest;
 
 /// Measures the frames of a scene and prints the figures on standard output.
 ///

@@ -1,12 +1,12 @@
 //! Timeline and control of a run: `--timeline` and `--control`.
 
+use rayfarm_farm::Farm;
+use rayfarm_farm::accounting::{TimelineError, TimelineFile};
 use tokio_util::sync::CancellationToken;
 
 use crate::app::cli::ObservabilityArgs;
 use crate::app::control::{self, Console, Place};
 use crate::error::CommandError;
-use rayfarm_farm::Farm;
-use rayfarm_farm::accounting::{TimelineError, TimelineFile};
 
 /// Timeline and control, as the command line requests them.
 pub(super) struct Observability {

@@ -3,13 +3,14 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use rayfarm_farm::ViewRequest;
+
 use super::source::Source;
 use crate::app::cli::{ErrorArgs, QualityControlArgs};
 use crate::error::CommandError;
 use crate::measure::tradeoff::ladder::ladder as measured_ladder;
 use crate::measure::tradeoff::table::Table;
 use crate::viewer::quality_controller::{Ladder, QualityController, prior_ladder};
-use rayfarm_farm::ViewRequest;
 
 /// Request of a view at rest, and the quality controller for its motion. With a rate to hold, the largest error applies to
 /// moving pictures; without one, to all.

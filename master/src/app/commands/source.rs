@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene, Setting};
@@ -11,7 +12,6 @@ use rayfarm_tracer::texture::Texture;
 use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
-use rayfarm_farm::ViewRequest;
 
 /// Scene without a file on the command line, in a folder of models.
 const DEFAULT_SCENE: &str = "room.toml";

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use rayfarm_farm::as_text;
+use rayfarm_farm::{Farm, FarmControl, FarmScene};
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
@@ -16,8 +18,6 @@ use crate::error::CommandError;
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
 };
-use rayfarm_farm::as_text;
-use rayfarm_farm::{Farm, FarmControl, FarmScene};
 
 /// Frames of one turn of `--orbit` without `--frames`.
 const FRAMES_PER_ORBIT: u32 = 360;

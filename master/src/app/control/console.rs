@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use rayfarm_farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
 use rayfarm_text::printable;
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
@@ -9,7 +10,6 @@ use tokio_util::sync::CancellationToken;
 use super::command::{COMMANDS, Command, WorkerSelector};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
 use crate::viewer::KICK_REASON;
-use rayfarm_farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
 
 /// Executor of the commands of one or more connections.
 #[derive(Clone)]

@@ -2,6 +2,9 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use proptest::prelude::*;
+use rayfarm_farm::testing::fake_worker::{self, Script};
+use rayfarm_farm::testing::test_scene::{scene, view};
+use rayfarm_farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
 use serde_json::Value;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
@@ -11,9 +14,6 @@ use super::command::{Command, WorkerSelector};
 use super::console::Then;
 use super::lines::{Line, LineSplitter, MAX_LINE_BYTES};
 use super::*;
-use rayfarm_farm::testing::fake_worker::{self, Script};
-use rayfarm_farm::testing::test_scene::{scene, view};
-use rayfarm_farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(60);

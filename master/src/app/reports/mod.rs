@@ -6,13 +6,13 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 pub(crate) use knobs::Knobs;
+use rayfarm_farm::Verification;
+use rayfarm_farm::accounting::AccountReport;
 use serde::Serialize;
 
 use crate::error::CommandError;
 use crate::quantile::{percentile, round_to_us};
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame};
-use rayfarm_farm::Verification;
-use rayfarm_farm::accounting::AccountReport;
 
 /// Report of a `render` run; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,10 +1,11 @@
 //! Panel of workers: the use of each worker's time, and the selected worker.
 
+use rayfarm_farm::accounting::{Fading, PART_COUNT, Smoothed};
+use rayfarm_farm::{FarmStatus, Verification, WorkerState};
+
 use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, kicked};
 use crate::display::canvas::Canvas;
 use crate::display::numbers::grouped;
-use rayfarm_farm::accounting::{Fading, PART_COUNT, Smoothed};
-use rayfarm_farm::{FarmStatus, Verification, WorkerState};
 
 /// Names of the parts of thread time, from wide to narrow layouts.
 const WORDS: [&str; PART_COUNT] = ["trace", "wait", "encode", "send", "decode", "tail", "scene"];

@@ -1,9 +1,10 @@
 //! Random faults.
 
+use rayfarm_scheduler::{Event, FrameId, WorkerId};
+
 use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::Condition;
 use super::world::World;
-use rayfarm_scheduler::{Event, FrameId, WorkerId};
 
 /// Longest time between two faults.
 const MAX_FAULT_INTERVAL: u64 = SECOND / 2;

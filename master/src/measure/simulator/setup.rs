@@ -1,7 +1,8 @@
 //! Setup of a simulation: workers, links, costs of rows and corruption.
 
-use super::costs::CostProfile;
 use rayfarm_scheduler::SegmentPolicy;
+
+use super::costs::CostProfile;
 
 /// What is simulated. The defaults are the workload of the reports: 1024x768 pixels, frames of one second of work,
 /// gigabit links, 0.2 ms round trip, speeds spread 4 to 1.

@@ -3,10 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::pictures::Picture;
-use super::setup::Corruption;
 use rayfarm_farm::{LeaseBook, LeaseStatus};
 use rayfarm_scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
+
+use super::pictures::Picture;
+use super::setup::Corruption;
 
 /// State that the driver keeps in the real master.
 #[derive(Debug, Default)]

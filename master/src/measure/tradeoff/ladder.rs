@@ -1,11 +1,11 @@
 //! The ladder of a measured scene: from a table of `tradeoff`.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::RenderScale;
 
 use super::setting::MeasuredSetting;
 use super::table::{Row, Table};
 use crate::viewer::quality_controller::{Ladder, Origin, Rung, bytes, continued};
-use rayfarm_farm::ViewRequest;
 
 /// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
 /// losses are differences to its mean FLIP error.

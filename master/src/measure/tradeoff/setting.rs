@@ -1,9 +1,8 @@
 //! Measured settings: combinations of knobs, named by the slugs of the table of knobs.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::knobs::{KNOBS, KnobValue};
 use rayfarm_tracer::scene::{FrameView, RenderScale, SceneFeatures, Setting};
-
-use rayfarm_farm::ViewRequest;
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.

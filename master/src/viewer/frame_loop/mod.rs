@@ -8,6 +8,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 use rayfarm_tracer::image::MAX_SIDE;
 use rayfarm_tracer::scene::FrameView;
 use tokio_util::sync::CancellationToken;
@@ -22,7 +23,6 @@ use super::quality_controller::QualityController;
 use super::requests::{Answered, RequestPolicy, Requests, ViewState};
 use super::sequence::{FrameSequence, SequenceFrame, SequencePlan, SequenceSender};
 use super::statistics::ViewerState;
-use rayfarm_farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 
 /// Interval at which displays receive the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(100);

@@ -4,16 +4,16 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use rayfarm_farm::accounting::FrameAccount;
+use rayfarm_farm::testing::fake_worker::{self, Script, is_picture};
+use rayfarm_farm::testing::test_scene::{scene, view};
+use rayfarm_farm::{FarmOptions, FarmScene, FarmStatus};
 use rayfarm_tracer::scene::{Camera, FrameView, RenderScale};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::*;
 use crate::viewer::quality_controller::{QualityMode, prior_ladder};
-use rayfarm_farm::accounting::FrameAccount;
-use rayfarm_farm::testing::fake_worker::{self, Script, is_picture};
-use rayfarm_farm::testing::test_scene::{scene, view};
-use rayfarm_farm::{FarmOptions, FarmScene, FarmStatus};
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -5,12 +5,12 @@
 //! 99,938 triangles, and ten instances of it. Losses are FLIP against the same picture without the loss. Scenes differ by a
 //! factor of four and more. The scales 1/3 and 1/4 have a table of their own, `small-scales.csv`.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobValue};
 use rayfarm_tracer::scene::{Scene, SceneFeatures, Setting};
 
 use super::ladder::{Ladder, Origin, Rung};
 use super::wire::bytes;
-use rayfarm_farm::ViewRequest;
 
 /// Effect of one knob: factor of time, and added mean FLIP error.
 #[derive(Clone, Copy, Debug)]

@@ -2,11 +2,11 @@
 
 use std::cell::RefCell;
 
+use rayfarm_farm::testing::test_scene;
 use rayfarm_tracer::scene::RenderScale;
 
 use super::*;
 use crate::viewer::quality_controller::{Ladder, Origin};
-use rayfarm_farm::testing::test_scene;
 
 const STILL: Animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };
 const SPINNING: Animation = Animation { spin: 1.0, ..STILL };

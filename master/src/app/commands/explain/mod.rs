@@ -9,6 +9,7 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 
 use bytes::Bytes;
+use rayfarm_farm::{Assets, ViewRequest};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
 use rayfarm_tracer::scene::knobs::KNOBS;
@@ -22,7 +23,6 @@ use crate::app::cli::ExplainArgs;
 use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
 use crate::measure::ray_bounds::RayBounds;
-use rayfarm_farm::{Assets, ViewRequest};
 
 /// Explanation of a scene; `--json` prints it as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]

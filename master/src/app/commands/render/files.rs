@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use rayfarm_farm::{FinishedFrame, ViewRequest};
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::{FrameView, RenderScale};
 use tokio::runtime::Runtime;
@@ -16,7 +17,6 @@ use crate::app::progress::Progress;
 use crate::display::{Display, DisplayError};
 use crate::error::CommandError;
 use crate::viewer::{FrameSequence, SequenceFrame, Slot, ViewerHandle};
-use rayfarm_farm::{FinishedFrame, ViewRequest};
 
 /// Interval at which the progress display shows the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(200);

@@ -7,6 +7,7 @@ use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
 use files::{FileDisplay, FrameFiles};
+use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 use repair::named;
 use totals::Totals;
 
@@ -23,7 +24,6 @@ use crate::display::Display;
 use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
 use crate::viewer::{FrameLogFile, Viewer};
-use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 
 mod files;
 mod repair;

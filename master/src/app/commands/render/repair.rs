@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::as_text;
+use rayfarm_farm::{Farm, FarmError, FinishedFrame, FrameId};
 use tokio_util::sync::CancellationToken;
 
 use super::Run;
 use crate::app::reports::VerificationReport;
 use crate::viewer::OPEN_REQUESTS;
-use rayfarm_farm::as_text;
-use rayfarm_farm::{Farm, FarmError, FinishedFrame, FrameId};
 
 /// Time for the remaining verification after the last frame is complete.
 const VERIFICATION_TIMEOUT: Duration = Duration::from_secs(30);

@@ -4,12 +4,12 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use rayfarm_farm::testing::fake_worker::{self, Script};
 use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 use tokio::task::JoinHandle;
 
 use super::*;
 use crate::app::cli::Invocation;
-use rayfarm_farm::testing::fake_worker::{self, Script};
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(120);

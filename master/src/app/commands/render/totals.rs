@@ -2,14 +2,15 @@
 
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::ViewRequest;
+use rayfarm_farm::accounting::RunAccount;
+
 use crate::app::plan::Plan;
 use crate::app::reports::{Knobs, MsPerFrame, RenderReport, VerificationReport};
 use crate::display::numbers::three_digits;
 use crate::error::CommandError;
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame, mean};
 use crate::viewer::{FrameLine, FrameLogFile, FrameRate, PresentedFrame};
-use rayfarm_farm::ViewRequest;
-use rayfarm_farm::accounting::RunAccount;
 
 /// Sums over the frames of a run.
 pub(super) struct Totals {

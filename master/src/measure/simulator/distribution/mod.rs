@@ -4,15 +4,15 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use rayfarm_farm::{AssetRouting, AssetSource};
 use rayfarm_protocol::AssetId;
 use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, PEER_TIMEOUT};
+use rayfarm_scheduler::WorkerId;
 use serde::Serialize;
 
 use super::clock::SECOND;
 use super::link::{Lane, bytes};
 use super::rng::Rng;
-use rayfarm_farm::{AssetRouting, AssetSource};
-use rayfarm_scheduler::WorkerId;
 
 const ASSET: AssetId = AssetId([1; 32]);
 /// All workers request the asset within this time, in nanoseconds.
