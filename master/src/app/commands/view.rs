@@ -91,9 +91,9 @@ async fn start(
     if let Some(frames) = args.frames {
         farm.expect_frames(frames.into());
     }
-    observability.begin(&farm, stop)?;
     let control = farm.control();
     let (viewer, handle) = Viewer::interactive(farm, config);
+    observability.begin(viewer.farm(), Some(handle.knob_sender()), stop)?;
     Ok((viewer, handle, control))
 }
 

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use rayfarm_farm::testing::fake_worker::{self, Script};
 use rayfarm_farm::testing::test_scene::{scene, view};
 use rayfarm_farm::{Farm, FarmOptions, FarmScene, SegmentPolicy};
+use rayfarm_tracer::scene::{RenderScale, Setting};
 use serde_json::Value;
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
@@ -14,6 +15,8 @@ use super::command::{Command, WorkerSelector};
 use super::console::Then;
 use super::lines::{Line, LineSplitter, MAX_LINE_BYTES};
 use super::*;
+use crate::viewer::orbit::Animation;
+use crate::viewer::{CameraControl, RequestPolicy, Viewer, ViewerConfig};
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -37,7 +40,7 @@ async fn until_workers(farm: &Farm, count: usize) {
 
 fn console(farm: &Farm) -> (Console, CancellationToken) {
     let quit = CancellationToken::new();
-    (Console::new(farm.control(), quit.clone()), quit)
+    (Console::new(farm.control(), None, quit.clone()), quit)
 }
 
 fn ask(console: &Console, line: &str) -> Value {
@@ -73,6 +76,74 @@ fn lines_are_parsed_as_documented() {
         let error = Command::parse(line).unwrap_err();
         assert!(error.contains(words), "{line}: {error}");
     }
+}
+
+#[test]
+fn a_knob_is_set_by_its_option_or_its_name() {
+    let parsed = |line: &str| match Command::parse(line) {
+        Ok(Command::Set(change)) => {
+            let mut setting = Setting::FULL;
+            change.value.apply(&mut setting);
+            (change.knob.name, setting)
+        }
+        other => panic!("{line}: {other:?}"),
+    };
+    assert_eq!(parsed("set samples 4"), ("samples", Setting { samples: 4, ..Setting::FULL }));
+    assert_eq!(parsed(" set  scale  1/2 "), ("scale", Setting { scale: RenderScale::Half, ..Setting::FULL }));
+    assert_eq!(parsed("set shadow-samples 4"), parsed("set shadow_samples 4"));
+    assert_eq!(parsed("set adaptive on").0, "adaptive");
+    for (line, facts) in [
+        ("set", &["samples", "adaptive"][..]),
+        ("set fly 3", &["fly", "samples"]),
+        ("set samples", &["samples", "16"]),
+        ("set samples 3", &["samples", "16"]),
+        ("set adaptive perhaps", &["adaptive", "on", "off"]),
+        ("set max-depth 99999999", &["max-depth"]),
+    ] {
+        let error = Command::parse(line).unwrap_err();
+        assert!(facts.iter().all(|fact| error.contains(fact)), "{line}: {error}");
+    }
+}
+
+#[tokio::test]
+async fn a_run_without_a_view_refuses_to_set_knobs() {
+    let farm = farm().await;
+    let (console, _quit) = console(&farm);
+    assert_eq!(ask(&console, "set samples 4")["ok"], false);
+    farm.shut_down().await;
+}
+
+#[tokio::test]
+async fn a_set_knob_is_in_the_next_frame_of_the_view() {
+    let farm = farm().await;
+    fake_worker::start(farm.address(), Script::Correct).await;
+    let control = farm.control();
+    let animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };
+    let config = ViewerConfig {
+        request: view().into(),
+        camera: CameraControl::new(view().camera, None),
+        policy: RequestPolicy { animation, limit: None, continuous: false },
+        log: None,
+        controller: None,
+    };
+    let (viewer, mut handle) = Viewer::interactive(farm, config);
+    let stop = CancellationToken::new();
+    let console = Console::new(control, Some(handle.knob_sender()), stop.clone());
+    let running = {
+        let stop = stop.clone();
+        tokio::spawn(async move { viewer.run(&stop).await })
+    };
+    assert_eq!(ask(&console, "set samples 9")["knob"], "samples");
+    let wait = async {
+        while handle.new_frame().is_none_or(|frame| frame.frame.view.samples != 9) {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    };
+    tokio::time::timeout(PATIENCE, wait).await.expect("no frame has nine samples");
+    stop.cancel();
+    running.await.unwrap().0.shut_down().await;
+    drop(handle);
+    assert_eq!(ask(&console, "set samples 4")["ok"], false, "the view has ended");
 }
 
 #[test]

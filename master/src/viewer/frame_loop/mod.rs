@@ -99,6 +99,11 @@ impl Viewer {
         (viewer, handle, sequence)
     }
 
+    /// The farm that renders the view.
+    pub(crate) fn farm(&self) -> &Farm {
+        &self.farm
+    }
+
     /// Renders until `stop` is cancelled, a display quits, no display is left, or the last frame is complete. Returns the
     /// farm, still running.
     ///
@@ -217,6 +222,13 @@ fn apply(
         }
         InputAction::SetVisible(visible) => state.hidden = !visible,
         InputAction::Presented { latency } => figures.presented(latency),
+        InputAction::Set(change) => {
+            let request = change.applied(state.request);
+            match request.view.validate() {
+                Ok(()) => state.request = request,
+                Err(problem) => tracing::warn!("{} is not changed: {problem}", change.knob.name),
+            }
+        }
         InputAction::Worker(command) => command.perform(&farm.control()),
         InputAction::Quit => return ControlFlow::Break(()),
     }

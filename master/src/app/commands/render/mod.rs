@@ -118,7 +118,7 @@ impl Run {
         interrupted: &CancellationToken,
     ) -> Result<Farm, CommandError> {
         let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
-        if let Err(error) = self.observability.begin(&farm, interrupted) {
+        if let Err(error) = self.observability.begin(&farm, None, interrupted) {
             farm.shut_down().await;
             return Err(error);
         }
