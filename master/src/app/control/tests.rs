@@ -65,16 +65,16 @@ fn lines_are_parsed_as_documented() {
     ] {
         assert_eq!(Command::parse(line), Ok(command));
     }
-    for (line, words) in [
-        ("", "help lists"),
-        ("kik 3", "\"kik\""),
-        ("kick", "kick needs an argument"),
-        ("drain ", "drain needs an argument"),
-        ("allow", "number or name of a worker"),
-        ("quit now", "takes no argument"),
+    for (line, fact) in [
+        ("", "help"),
+        ("kik 3", "kik"),
+        ("kick", "kick"),
+        ("drain ", "drain"),
+        ("allow", "allow"),
+        ("quit now", "now"),
     ] {
         let error = Command::parse(line).unwrap_err();
-        assert!(error.contains(words), "{line}: {error}");
+        assert!(error.contains(fact), "{line}: {error}");
     }
 }
 
@@ -212,7 +212,7 @@ async fn workers_are_listed_paused_resumed_kicked_and_allowed() {
     assert_eq!(ask(&console, "status")["kicked"], serde_json::json!(["fake"]));
     assert_eq!(ask(&console, "allow fake")["allowed"], 1);
     assert!(ask(&console, "allow fake")["error"].as_str().unwrap().contains("fake"));
-    assert!(ask(&console, "kick fake")["error"].as_str().unwrap().contains("no worker \"fake\""));
+    assert!(ask(&console, "kick fake")["error"].as_str().unwrap().contains("fake"));
     assert_eq!(ask(&console, "help")["ok"], true);
     assert_eq!(console.answer(&Line::Text("quit".to_owned())).then, Then::Quit);
     assert!(!quit.is_cancelled(), "the answer is written first");
