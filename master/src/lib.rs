@@ -1,7 +1,8 @@
 //! The master of rayfarm: owns the scene and the screen, hands out segments, assembles frames.
 //!
-//! [`farm::Farm`] is the boundary between displays and rendering. The code above it (application, viewer, displays) requests
-//! frames and shows them. The code below it (scheduler, sessions, framebuffers, local worker processes) completes each one.
+//! [`rayfarm_farm::Farm`] is the boundary between displays and rendering. The code above it (application, viewer, displays)
+//! requests frames and shows them. The code below it (scheduler, sessions, framebuffers, local worker processes) completes each
+//! one.
 
 mod app;
 mod display;
@@ -16,18 +17,12 @@ mod quantile;
 )]
 mod viewer;
 
-pub use rayfarm_farm as farm;
-pub use rayfarm_scheduler as scheduler;
-
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use app::cli::Invocation;
 use app::{commands, logging};
 pub use measure::simulator;
-use rayfarm_farm::accounting;
-#[cfg(test)]
-use rayfarm_farm::testing::{fake_worker, test_scene};
 
 /// Runs the program for a command line, program name first. Errors are printed on standard error.
 ///

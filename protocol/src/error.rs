@@ -58,7 +58,7 @@ pub enum ProtocolError {
     /// The peer began something and did not finish it in time.
     #[error("the peer did not finish {what} within {seconds} s", seconds = .limit.as_secs())]
     Deadline {
-        /// What the peer began.
+        /// Exchange that the peer has not finished.
         what: &'static str,
         /// The time limit.
         limit: Duration,

@@ -44,7 +44,7 @@ impl fmt::Display for FrameId {
 /// Assignment of one segment of a frame to a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Lease {
-    /// The frame.
+    /// Frame of which the lease is a part.
     pub frame: FrameId,
     /// Number of the segment within the frame.
     pub segment: u32,

@@ -30,13 +30,13 @@ pub const MAX_CHUNK_BYTES: usize = 256 << 10;
 /// Most peers to which a worker sends assets at a time. More connections wait.
 pub const MAX_PEER_CLIENTS: usize = 8;
 
-/// How long a worker keeps a complete asset for its peers after the last request for it.
+/// Time for which a worker keeps a complete asset for its peers after the last request for it.
 pub const PEER_CACHE_TIME: Duration = Duration::from_secs(20);
 
 /// Most bytes of complete assets that a worker keeps for its peers (512 MiB).
 pub const MAX_PEER_CACHE_BYTES: usize = 512 << 20;
 
-/// How long a peer may take to accept a connection.
+/// Time within which a peer must accept a connection.
 pub const PEER_CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Interval of the keepalives that a worker sends to a peer while it waits for bytes of an asset itself.
@@ -45,7 +45,7 @@ pub const PEER_KEEPALIVE_INTERVAL: Duration = Duration::from_millis(500);
 /// Most consecutive keepalives without a chunk between them.
 pub const MAX_PEER_KEEPALIVES: u32 = 240;
 
-/// How long a peer may be silent in the middle of a transfer.
+/// Longest silence of a peer in the middle of a transfer.
 pub const PEER_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Most pixel bytes of one segment (32 MiB: a whole frame of 3840 x 2160 pixels fits).
@@ -69,8 +69,8 @@ pub const INBOX_BYTES: usize = 2 * (MAX_PIXELS_BYTES + MAX_CONTROL_BYTES);
 /// Time limit from the first byte of the preamble to the end of the handshake.
 pub const HANDSHAKE_DEADLINE: Duration = Duration::from_secs(5);
 
-/// How long a session reads on after its writer has failed or has written a disconnect: the peer's own disconnect may be
-/// in the receive buffer.
+/// Time for which a session reads on after its writer has failed or has written a disconnect: the peer's own disconnect
+/// may be in the receive buffer.
 pub const CLOSE_GRACE: Duration = Duration::from_millis(500);
 
 /// Lowest data rate that is accepted in the middle of an envelope.

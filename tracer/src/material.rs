@@ -75,7 +75,7 @@ pub struct Checker {
     pub colors: [Vec3; 2],
     /// Side of a cell: in world units, or in repeats of texture coordinates.
     pub size: f32,
-    /// What the cells are laid in.
+    /// Space in which the cells are laid out.
     pub space: CheckerSpace,
 }
 

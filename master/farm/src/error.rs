@@ -49,7 +49,7 @@ pub enum FarmError {
          rayfarm-worker --master {address}"
     )]
     NoWorkers {
-        /// How the last local worker ended.
+        /// Reason for which the last local worker ended.
         reason: String,
         /// The address where workers connect.
         address: SocketAddr,

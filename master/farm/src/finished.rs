@@ -39,6 +39,6 @@ pub struct FinishedFrame {
     pub received_bytes: u64,
     /// The part of `sent_bytes` that describes what to draw: frame announcements and assets.
     pub scene_bytes: u64,
-    /// How the workers' thread time was spent since the previous frame, and which worker rendered which rows.
+    /// Thread time of the workers since the previous frame, by use, and the worker of each row.
     pub account: FrameAccount,
 }

@@ -25,7 +25,7 @@ pub struct FarmOptions {
     pub local_worker: LocalWorkerCommand,
     /// Render threads of each local worker; `None` divides the cores among them, at least one each.
     pub threads: Option<usize>,
-    /// How frames are cut into segments.
+    /// Policy by which frames are cut into segments.
     pub policy: SegmentPolicy,
     /// Whether each frame starts only when its predecessor is complete. Otherwise workers without work in one frame start
     /// the next: more frames per second, each with an older camera.

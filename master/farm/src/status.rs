@@ -57,11 +57,11 @@ pub struct RunTotals {
 /// A banned worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BannedWorker {
-    /// Its number in its last session.
+    /// Number of the worker in its last session.
     pub id: u64,
-    /// Its name.
+    /// Name of the worker.
     pub name: String,
-    /// The address from which it connected; `None` for a local worker.
+    /// Address from which the worker connected; `None` for a local worker.
     pub address: Option<IpAddr>,
 }
 
@@ -70,7 +70,7 @@ pub struct BannedWorker {
 pub struct WorkerStatus {
     /// Number assigned by this master; never reused.
     pub id: u64,
-    /// Its name. Not unique: any worker may choose any name.
+    /// Name of the worker. Not unique: any worker may choose any name.
     pub name: String,
     /// Whether this master has started it.
     pub local: bool,

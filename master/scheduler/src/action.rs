@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{Cost, FrameId, Lease, Reconnect, WorkerId};
 
-/// What the shell performs, in the order given.
+/// Action of the scheduler. The shell performs actions in the order in which they are polled.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Begin a requested frame: allocate its framebuffer. Comes before the frame's first lease.
@@ -103,7 +103,7 @@ pub enum Action {
         worker: WorkerId,
         /// For the log and for the worker.
         reason: String,
-        /// When the worker may connect again.
+        /// Whether the worker may connect again, and to which master.
         reconnect: Reconnect,
     },
     /// Notify a worker that it drains: it finishes its leases and gets no more.

@@ -15,7 +15,7 @@ pub(super) struct ActiveLease {
     pub(super) bands: u32,
     /// Predicted arrival of the pixels; `None` before the worker's speed is measured.
     pub(super) expected_at: Option<Duration>,
-    /// When the lease is overdue and its rows go back to the queue.
+    /// Time at which the lease is overdue and its rows go back to the queue.
     pub(super) deadline: Option<Duration>,
     /// Whether it is a second rendering, of rows that are in their picture already.
     pub(super) verifies: bool,

@@ -19,7 +19,7 @@ impl fmt::Display for WorkerId {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct HostId(pub u128);
 
-/// What the shell reports. The scheduler ignores events of unknown workers and of frames that are over, so the shell
+/// Event that the shell reports. The scheduler ignores events of unknown workers and of frames that are over, so the shell
 /// need not track either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -100,7 +100,7 @@ pub enum Event {
         frame: FrameId,
         /// The number of the verification in that frame.
         segment: u32,
-        /// Which renderings differ from the master's.
+        /// Renderings that differ from the master's.
         result: ArbiterResult,
     },
     /// Rows of a frame in flight have left its picture, because the worker that rendered them was banned.

@@ -57,15 +57,11 @@ mod worker;
 #[cfg(test)]
 mod scenarios;
 #[cfg(test)]
-mod service_scenarios;
-#[cfg(test)]
 mod sizes_tests;
 #[cfg(test)]
 mod stall_scenarios;
 #[cfg(test)]
 mod transcript;
-#[cfg(test)]
-mod verification_scenarios;
 
 pub use action::Action;
 pub use event::{Event, HostId, WorkerId};
@@ -129,7 +125,7 @@ pub struct Scheduler {
     overrun: f64,
     /// Time from the first lease to the last row of the last complete frame.
     last_frame: Duration,
-    /// When an idle worker may have reason to start a backup task.
+    /// Time from which a backup task on an idle worker may pay.
     recheck_at: Option<Duration>,
     handled_at: Duration,
 }
@@ -230,7 +226,7 @@ impl Scheduler {
         self.actions.pop_front()
     }
 
-    /// When [`Event::Woken`] is due; `None` while only other events can change anything.
+    /// Time at which [`Event::Woken`] is due; `None` while only other events can change anything.
     pub fn poll_timeout(&self) -> Option<Duration> {
         let timers = self.workers.values().flat_map(|worker| {
             let keepalive = worker.next_ping_at().min(worker.silence_deadline());

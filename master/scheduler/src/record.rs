@@ -9,13 +9,13 @@ use super::{FrameId, Scheduler, WorkerId};
 /// Record of one worker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorkerRecord {
-    /// The worker.
+    /// Worker that the record describes.
     pub worker: WorkerId,
-    /// Segments that it has finished.
+    /// Number of segments that the worker has finished.
     pub segments_done: u64,
     /// Speed in rows of average cost per second; 0 before it is measured.
     pub speed: f64,
-    /// Whether it gets leases, or why not.
+    /// Whether the worker gets leases, or the reason why not.
     pub state: WorkerState,
 }
 
@@ -49,11 +49,11 @@ impl fmt::Display for WorkerState {
 /// Progress of the oldest frame in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// The frame.
+    /// Frame that the record describes.
     pub frame: FrameId,
-    /// Its finished rows.
+    /// Number of finished rows of the frame.
     pub rows_done: u32,
-    /// Its rows.
+    /// Number of rows of the frame.
     pub rows: u32,
 }
 

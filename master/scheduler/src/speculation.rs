@@ -95,7 +95,7 @@ impl Scheduler {
         counted.filter(|task| task.holders < MAX_HOLDERS)
     }
 
-    /// When a backup task pays, and by how much earlier the segment would then be done. It pays now if this worker is
+    /// Time from which a backup task pays, and the time that the segment would gain by it. It pays now if this worker is
     /// predicted to finish first, or if nothing can be predicted; otherwise once the holder is late by the time that
     /// the backup task takes.
     fn backup_gain(

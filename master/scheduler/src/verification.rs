@@ -55,7 +55,7 @@ pub enum Finding {
     Unknown,
 }
 
-/// Which renderings of a segment differ from the master's.
+/// Renderings of a segment that differ from the master's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ArbiterResult {
     /// Whether the master rendered the segment and knew the digest of the first rendering.

@@ -3,6 +3,7 @@
 pub(crate) mod cli;
 pub(crate) mod commands;
 pub(crate) mod control;
+mod knob_values;
 pub(crate) mod logging;
 pub(crate) mod output;
 pub(crate) mod plan;

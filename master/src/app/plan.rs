@@ -259,7 +259,7 @@ mod tests {
         std::fs::remove_file(pattern.path(1).unwrap()).unwrap();
         std::fs::create_dir(pattern.path(2).unwrap()).unwrap();
         let problem = Plan::new(0, 3, SIZE, &pattern).unwrap_err().to_string();
-        assert!(problem.contains("f02.png") && problem.contains("not a regular file"), "{problem}");
+        assert!(problem.contains("f02.png"), "{problem}");
     }
 
     #[test]

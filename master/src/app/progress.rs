@@ -5,10 +5,10 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use rayfarm_farm::FarmStatus;
+use rayfarm_farm::Reachable;
+use rayfarm_farm::accounting::duration_text;
 
-use crate::accounting::duration_text;
-use crate::farm::FarmStatus;
-use crate::farm::Reachable;
 use crate::log_bar::{show_below_log, show_nothing_below_log};
 
 /// Interval of the lines without a terminal.

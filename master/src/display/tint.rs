@@ -1,8 +1,9 @@
 //! Tints over the picture: by the worker that rendered each row, or by its cost. Only the window shows them.
 
+use rayfarm_farm::accounting::{FrameAccount, SegmentNote, WorkerAccount};
+
 use super::canvas::RowTint;
 use super::overlay::legend::Entry;
-use crate::accounting::{FrameAccount, SegmentNote, WorkerAccount};
 
 /// Meaning of the tints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use minifb::Window;
+use rayfarm_farm::FarmStatus;
 use rayfarm_tracer::image::MAX_SIDE;
 
 use super::canvas::{Canvas, Picture};
@@ -15,7 +16,6 @@ use super::tint::Coloring;
 use super::watch::WindowWatch;
 use super::worker_selection::{self, WorkerSelection};
 use super::{Display, DisplayError, SceneInfo};
-use crate::farm::FarmStatus;
 use crate::viewer::{InputAction, PresentedFrame, Statistics, ViewerHandle};
 
 /// Interval at which the figures are compared with those on the screen, and drawn if they differ.

@@ -1,7 +1,8 @@
 //! Selection of workers in the window, and the commands of keys to them.
 
+use rayfarm_farm::{FarmStatus, WorkerState, WorkerStatus};
+
 use super::input::InputEvents;
-use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
 use crate::viewer::WorkerCommand;
 
 /// State of the panel of workers.

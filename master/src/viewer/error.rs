@@ -1,7 +1,8 @@
 //! Errors that end a viewer.
 
+use rayfarm_farm::FarmError;
+
 use super::frame_log::FrameLogError;
-use crate::farm::FarmError;
 
 /// Reason for which a viewer ended before its displays did.
 #[derive(Debug, thiserror::Error)]

@@ -5,9 +5,10 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::Duration;
 
+use rayfarm_farm::FinishedFrame;
+use rayfarm_farm::accounting::{PART_COUNT, PART_NAMES};
+
 use super::frame_counts::{BytesPerFrame, RaysPerFrame};
-use crate::accounting::{PART_COUNT, PART_NAMES};
-use crate::farm::FinishedFrame;
 
 /// Columns before those of [`PART_NAMES`], which are per cent of thread time, and `latency_ms`.
 const CSV_HEADER: &str =

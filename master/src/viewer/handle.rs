@@ -4,11 +4,12 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Instant;
 
+use rayfarm_farm::{FarmStatus, FinishedFrame};
 use tokio::sync::{mpsc, watch};
 
 use super::input_action::InputAction;
+use super::knob_change::KnobChange;
 use super::statistics::Statistics;
-use crate::farm::{FarmStatus, FinishedFrame};
 
 /// Actions that wait for the viewer at most. Further ones are dropped until it has caught up.
 const MAX_WAITING_ACTIONS: usize = 256;
@@ -72,6 +73,11 @@ impl ViewerHandle {
         !self.input.is_closed()
     }
 
+    /// A sender of knob changes, which does not keep the viewer running.
+    pub(crate) fn knob_sender(&self) -> KnobSender {
+        KnobSender(self.input.downgrade())
+    }
+
     /// Sends actions of one moment together, without waiting. Returns `false` where the viewer has ended or is too far
     /// behind; then none of the actions is sent.
     pub(crate) fn send(&self, actions: Vec<InputAction>) -> bool {
@@ -82,6 +88,26 @@ impl ViewerHandle {
             }
             Err(_) => false,
         }
+    }
+}
+
+/// Sender of knob changes to a viewer, which ends regardless of it.
+#[derive(Clone, Debug)]
+pub(crate) struct KnobSender(mpsc::WeakSender<InputAction>);
+
+impl KnobSender {
+    /// Sends a change, without waiting.
+    ///
+    /// # Errors
+    /// A viewer that has ended, or that has too many actions to apply.
+    pub(crate) fn send(&self, change: KnobChange) -> Result<(), String> {
+        let input = self.0.upgrade().ok_or("the view has ended")?;
+        input.try_send(InputAction::Set(change)).map_err(|error| match error {
+            mpsc::error::TrySendError::Full(_) => {
+                "the view has too many actions to apply; try again".to_owned()
+            }
+            mpsc::error::TrySendError::Closed(_) => "the view has ended".to_owned(),
+        })
     }
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 
+use super::knob_change::KnobChange;
 use super::worker_command::WorkerCommand;
 
 /// One input of a display. The display decides which key or gesture means which action; the viewer decides its effect.
@@ -67,6 +68,8 @@ pub(crate) enum InputAction {
         /// Time from the input that the frame answers to its presentation.
         latency: Duration,
     },
+    /// Gives a knob of the view another value.
+    Set(KnobChange),
     /// Commands workers.
     Worker(WorkerCommand),
     /// Ends the viewer.

@@ -3,10 +3,9 @@
 //! Sines and cosines are the tracer's own, so the same command line gives the same pictures on every platform.
 
 use glam::DVec3;
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::rotation::sin_cos_degrees;
 use rayfarm_tracer::scene::{Camera, FrameView};
-
-use crate::farm::ViewRequest;
 
 /// Movements without input, as the command line offers them.
 #[derive(Clone, Copy, Debug, PartialEq)]

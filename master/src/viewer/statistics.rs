@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::FinishedFrame;
+use rayfarm_farm::accounting::Fading;
 use serde::Serialize;
 
 use super::frame_log::FrameLine;
 use super::frame_rate::FrameRate;
 use super::latency::Latency;
-use crate::accounting::Fading;
-use crate::farm::FinishedFrame;
 
 /// The picture is at rest when nothing has been requested for this long: between two frames of a moving camera there may
 /// be a moment without a request.

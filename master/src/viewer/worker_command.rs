@@ -1,6 +1,6 @@
 //! Commands to workers, as displays send them.
 
-use crate::farm::{FarmControl, UnknownWorker};
+use rayfarm_farm::{FarmControl, UnknownWorker};
 
 /// Reason that a kicked worker receives.
 pub(crate) const KICK_REASON: &str = "it was kicked by the master's user";

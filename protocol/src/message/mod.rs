@@ -45,14 +45,14 @@ pub enum Reconnect {
     Never,
     /// At once: the session failed, and the master continues.
     Now,
-    /// When another master listens at the address: this one ends.
+    /// To the next master that listens at the address: this one ends.
     NextMaster,
 }
 
 /// Announcement of a frame whose leases may follow. `view` is serialised once, and its bytes go to every worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameAnnounce {
-    /// The frame.
+    /// Frame that the message announces.
     pub frame: FrameId,
     /// The scene body that the frame shows.
     pub scene: AssetId,

@@ -28,7 +28,7 @@ pub use crate::token::{ShareKey, Token};
 /// Request of a worker for an asset of another worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PeerRequest {
-    /// The asset.
+    /// Asset that is requested.
     pub id: AssetId,
     /// Token of the asset at the other worker.
     pub token: Token,

@@ -15,7 +15,7 @@ use crate::{Cost, FrameId, Lease, ProtocolError};
 /// Number of bytes of [`PixelsHeader`] on the wire.
 pub(crate) const PIXELS_HEAD_BYTES: usize = 88;
 
-/// How the pixels of a segment are written.
+/// Encoding of the pixels of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Rows from top to bottom without gaps, in the format [`PixelFormat::SEGMENT`](super::PixelFormat::SEGMENT).
@@ -55,7 +55,7 @@ impl Encoding {
 pub struct PixelsHeader {
     /// The lease that the pixels answer.
     pub lease: Lease,
-    /// How the pixels are written.
+    /// Encoding of the pixels.
     pub encoding: Encoding,
     /// Time and rays that the segment has taken.
     pub cost: Cost,

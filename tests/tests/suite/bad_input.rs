@@ -145,7 +145,7 @@ fn foreign_connections_do_not_disturb_a_run() {
     master.wait_for("127.0.0.1");
     let outcome = master.finish().expect_success();
     assert!(!outcome.stderr.contains("panicked"), "{}", outcome.stderr);
-    assert!(outcome.stderr.contains("version 999"), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("999"), "{}", outcome.stderr);
 }
 
 #[test]
@@ -158,8 +158,9 @@ fn a_worker_reports_another_program_at_the_masters_address() {
         let _ = stream.read(&mut [0; 512]);
     });
     let mut command = worker();
-    command.args(["--master", &format!("127.0.0.1:{port}"), "--no-reconnect"]);
-    Running::start(&mut command).finish().expect_failure(1, &["127.0.0.1", "no rayfarm master"]);
+    let address = format!("127.0.0.1:{port}");
+    command.args(["--master", &address, "--no-reconnect"]);
+    Running::start(&mut command).finish().expect_failure(1, &[&address, "HTTP"]);
     web_server.join().unwrap();
     let mut wrong = worker();
     wrong.args(["--master", "no port here"]);

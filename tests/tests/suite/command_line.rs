@@ -1,5 +1,7 @@
 //! Tests of the commands' output: files, standard output, standard error.
 
+use std::net::SocketAddr;
+
 use rayfarm_tests::{Outcome, Running, Scenes, master};
 use rayfarm_tracer::image::{RgbImage, load};
 
@@ -99,7 +101,7 @@ fn a_compiled_model_renders_like_its_source() {
     let scenes = Scenes::new();
     scenes.write("triangle.obj", TRIANGLE);
     let outcome = run(&scenes, "compile triangle.obj -o triangle.rfm").expect_success();
-    assert!(outcome.stdout.contains("triangle.rfm: 1 triangle,"), "{outcome:?}");
+    assert!(outcome.stdout.contains("triangle.rfm") && outcome.stdout.contains("1 triangle"), "{outcome:?}");
     run(&scenes, "render triangle.obj -o source.ppm --size 40x30").expect_success();
     run(&scenes, "render triangle.rfm -o compiled.ppm --size 40x30").expect_success();
     assert!(picture(&scenes, "source.ppm") == picture(&scenes, "compiled.ppm"));
@@ -110,7 +112,7 @@ fn standard_output_has_the_requested_report_only() {
     let scenes = Scenes::new();
     let outcome = run(&scenes, "render small.toml -o a.png").expect_success();
     assert_eq!(outcome.stdout, "");
-    assert!(outcome.stderr.contains("1 of 1 "), "{outcome:?}");
+    assert!(outcome.stderr.contains("1 of 1"), "{outcome:?}");
     let quiet = run(&scenes, "render small.toml -o a.png --quiet").expect_success();
     assert_eq!((quiet.stdout.as_str(), quiet.stderr.as_str()), ("", ""));
 }
@@ -128,10 +130,17 @@ fn an_output_folder_is_checked_before_the_scene_is_read() {
 fn a_master_that_listens_at_all_addresses_lists_reachable_ones() {
     let scenes = Scenes::new();
     let outcome = run(&scenes, "render small.toml -o a.png --size 16x12 --listen 0.0.0.0:0").expect_success();
-    let line = outcome.stderr.lines().find(|line| line.contains("workers connect to ")).unwrap();
-    assert!(!line.contains("0.0.0.0"), "{line}");
-    let is_alone = line.contains("no address that others can reach");
-    assert_eq!(line.contains("127.0.0.1"), is_alone, "{line}");
+    // The first line with addresses; later ones name those of workers.
+    let addresses_of = |line: &str| -> Vec<SocketAddr> {
+        let words = line.split_whitespace().map(|word| word.trim_matches([',', ';', '.', '(', ')']));
+        words.filter_map(|word| word.parse().ok()).collect()
+    };
+    let addresses = outcome.stderr.lines().map(addresses_of).find(|addresses| !addresses.is_empty()).unwrap();
+    for address in &addresses {
+        assert!(!address.ip().is_unspecified() && address.port() != 0, "{outcome:?}");
+        // An address of this machine alone is listed where there is no other one.
+        assert!(addresses.len() == 1 || !address.ip().is_loopback(), "{outcome:?}");
+    }
     let outcome = run(&scenes, "render small.toml -o a.png --listen [fe80::1%nothere0]:7117");
     outcome.expect_failure(2, &["nothere0"]);
     let outcome = run(&scenes, "render small.toml -o a.png --control [fe80::1%nothere0]:7117");

@@ -83,12 +83,12 @@ fn commands_on_standard_input_have_replies_on_standard_output() {
     });
     assert_eq!(send(&mut run, "help")["ok"], true);
     let wrong = send(&mut run, "fly");
-    assert!(wrong["ok"] == false && wrong["error"].as_str().unwrap().contains("\"fly\""), "{wrong}");
+    assert!(wrong["ok"] == false && wrong["error"].as_str().unwrap().contains("fly"), "{wrong}");
     assert_eq!(send(&mut run, "pause")["ok"], true);
     assert_eq!(send(&mut run, "workers")["workers"][0]["state"], "paused");
     assert_eq!(send(&mut run, "resume")["ok"], true);
     assert_eq!(send(&mut run, "quit")["ok"], true);
-    run.finish().expect_failure(1, &["of 1000000"]);
+    run.finish().expect_failure(1, &["1000000"]);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn workers_are_paused_drained_and_kicked_over_a_connection() {
         frame().is_some_and(|now| now > then.unwrap() + 3)
     });
     assert_eq!(client.command("quit")["ok"], true);
-    let outcome = run.finish().expect_failure(1, &["of 1000000", "--resume"]);
+    let outcome = run.finish().expect_failure(1, &["1000000", "--resume"]);
     let drained: Vec<_> = outcome.stderr.lines().filter(|line| line.contains("barn")).collect();
     assert!(drained.len() >= 2, "the log has the beginning and the end of a session: {outcome:?}");
     assert!(

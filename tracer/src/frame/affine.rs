@@ -36,7 +36,7 @@ impl Affine {
         Affine(rows)
     }
 
-    /// A map to (a, b, g) with the picture enlarged by a factor.
+    /// The same map to (a, b, g), with the picture coordinates a and b enlarged by a factor.
     #[inline(always)]
     pub(crate) fn enlarged(&self, by: f64) -> Affine {
         let [mut a, mut b, g] = self.0;

@@ -213,10 +213,7 @@ mod tests {
     fn broken_files_are_refused() {
         for bytes in [&b"hello"[..], b"", b"P6\n4 4\n255\nabc", b"\x89PNG\r\n\x1a\n...."] {
             let message = message_for(bytes);
-            assert!(
-                message.contains("picture.ppm as PNG, JPEG, TGA, BMP, GIF, TIFF, WebP or PPM"),
-                "{message}"
-            );
+            assert!(message.contains("picture.ppm"), "{message}");
         }
     }
 

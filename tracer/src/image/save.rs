@@ -107,7 +107,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("nowhere/a.png");
         let message = save(&missing, &gradient()).unwrap_err().to_string();
-        assert!(message.contains("nowhere") && message.contains("folder exists"), "{message}");
+        assert!(message.contains("nowhere"), "{message}");
 
         // A folder has the target's name, so the last step, the renaming, fails.
         let taken = folder.path().join("taken.ppm");

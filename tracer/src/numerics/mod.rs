@@ -49,7 +49,7 @@ pub use scenes::built_in;
 pub struct Subject {
     /// Name for tables.
     pub name: String,
-    /// The scene.
+    /// Scene that is checked.
     pub scene: Scene,
     /// Meshes of the scene.
     pub meshes: Vec<Arc<CompiledMesh>>,
@@ -108,7 +108,7 @@ impl fmt::Display for Check {
 /// Counts of one case of a check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcome {
-    /// The check.
+    /// Check that has the outcome.
     pub check: Check,
     /// The case: light, place or level.
     pub case: String,

@@ -97,7 +97,7 @@ pub(crate) trait PictureTile: RaySource {
     fn starts(&self) -> Option<&Starts>;
 }
 
-/// Where the rays of a tile start: on one primitive, at depths of their own.
+/// Starts of the rays of a tile: on one primitive, at depths of their own.
 pub(crate) struct Starts {
     pub primitive: PrimitiveId,
     /// Bounds of the closeness of the starts.

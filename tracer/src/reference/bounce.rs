@@ -59,7 +59,7 @@ impl Oracle {
         sum
     }
 
-    /// What a ray sees of the background.
+    /// Radiance of the background along a ray that hits nothing.
     fn seen_without_hit(&self, traced: &TracedRay, bounced: bool) -> DVec3 {
         let direction = traced.ray.direction;
         let seen = if bounced { self.background(direction) } else { self.background_of_camera(direction) };

@@ -48,7 +48,7 @@ pub(super) struct BandPixels {
     pub(super) block: Option<Vec<u8>>,
 }
 
-/// How a frame is cut into bands.
+/// Division of a frame into bands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BandShape {
     /// Number of rows of a band. Bands begin at its multiples.

@@ -55,7 +55,7 @@ pub(crate) struct SessionConfig {
     pub(crate) peer_server: Option<PeerServer>,
 }
 
-/// How a session ended.
+/// End of a session.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum SessionEnd {
     /// The master disconnected for good, for this reason.

@@ -14,7 +14,7 @@ use super::span::{Mark, Span, What, laid_out};
 /// Workers that disconnect during one frame and keep an account of their own; beyond that, they share one.
 const MAX_DISCONNECTED: usize = 1024;
 
-/// How the workers' thread time was spent while a frame was made; see [`crate::accounting`].
+/// Thread time of the workers while a frame was made, by use; see [`crate::accounting`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameAccount {
     /// Each worker that was connected, in the order in which they connected.

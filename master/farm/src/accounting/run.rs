@@ -16,7 +16,7 @@ pub struct RunAccount {
     workers: BTreeMap<u64, WorkerAccount>,
 }
 
-/// How the thread time of a run was spent.
+/// Thread time of a run, by use.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AccountReport {
     /// All workers together.
@@ -25,14 +25,14 @@ pub struct AccountReport {
     pub workers: Vec<WorkerReport>,
 }
 
-/// How the thread time of one worker was spent.
+/// Thread time of one worker, by use.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorkerReport {
     /// Number assigned by the master.
     pub id: u64,
-    /// Its name.
+    /// Name of the worker.
     pub name: String,
-    /// Its render threads.
+    /// Number of its render threads.
     pub threads: u32,
     /// Its thread time, in parts.
     pub percent: Percent,

@@ -26,7 +26,7 @@ pub(crate) struct Span {
     pub(crate) what: What,
 }
 
-/// What a span shows.
+/// Kind of activity that a span shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum What {
     /// A frame: from the end of the previous frame or its own start, whichever is later, to its end.

@@ -303,7 +303,7 @@ mod tests {
         assert!(TimelineFile::create(folder.path()).is_err());
         if cfg!(unix) {
             let error = TimelineFile::create(Path::new("/dev/null")).err().unwrap().to_string();
-            assert!(error.contains("/dev/null") && error.contains("regular file"), "{error}");
+            assert!(error.contains("/dev/null"), "{error}");
         }
     }
 }

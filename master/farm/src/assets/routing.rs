@@ -33,7 +33,7 @@ pub enum AssetSource {
 #[derive(Clone, Copy, Debug)]
 struct Copy {
     source: AssetSource,
-    /// When it became complete; `None` while it is in transfer.
+    /// Time at which the asset became complete; `None` while it is in transfer.
     complete: Option<Duration>,
 }
 

@@ -94,7 +94,7 @@ struct Run {
     /// Frames of the whole run, where known.
     frames: Option<u64>,
     done: u64,
-    /// When the first frame was requested.
+    /// Time at which the first frame was requested.
     begun: Option<Duration>,
     pace: Pace,
 }

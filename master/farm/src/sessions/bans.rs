@@ -52,7 +52,7 @@ impl Bans {
         self.banned.iter()
     }
 
-    /// Remembers a worker whose session has ended.
+    /// Records a worker whose session has ended.
     pub(crate) fn add_disconnected(&mut self, worker: WorkerId, identity: Identity) {
         push_bounded(&mut self.disconnected, PastWorker { worker, identity }, MAX_DISCONNECTED);
     }

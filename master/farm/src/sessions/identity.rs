@@ -9,7 +9,7 @@ use std::net::IpAddr;
 use blake3::Hash;
 use rayfarm_scheduler::HostId;
 
-/// What identifies a worker when it reconnects.
+/// Identity by which a worker is recognised when it reconnects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Identity {
     /// A process that this master has started: the number of its slot, from 1.

@@ -25,7 +25,7 @@ pub(crate) struct Session {
     pub(crate) leases: LeaseBook,
     /// Why it last failed to render a frame.
     pub(crate) last_failure: Option<String>,
-    /// Where it serves assets to other workers, and the key that its tokens are made with.
+    /// Address at which the worker serves assets to other workers, and the key of its tokens.
     pub(crate) peer_server: Option<(SocketAddr, ShareKey)>,
     /// Assets that it has requested.
     pub(crate) transfers: Transfers,

@@ -19,7 +19,7 @@ pub(crate) use slots::LocalSlots;
 /// The command line of a local worker.
 #[derive(Clone, Debug, Default)]
 pub struct LocalWorkerCommand {
-    /// The program.
+    /// Program of the local workers.
     pub program: PathBuf,
     /// Arguments before those of a worker.
     pub args: Vec<OsString>,

@@ -110,7 +110,7 @@ impl Worker {
         self.unanswered_since.is_some_and(|since| since + SUSPECT_AFTER <= now)
     }
 
-    /// When it becomes suspect if it stays silent; `None` if it is suspect already.
+    /// Time at which the worker becomes suspect if it stays silent; `None` if it is suspect already.
     pub(super) fn suspect_at(&self, now: Duration) -> Option<Duration> {
         self.unanswered_since.map(|since| since + SUSPECT_AFTER).filter(|&at| at > now)
     }
@@ -175,7 +175,7 @@ impl Worker {
         work
     }
 
-    /// How much later than predicted a lease may finish: `takes` is its predicted time, `overrun` the recent
+    /// Time by which a lease may finish later than predicted: `takes` is its predicted time, `overrun` the recent
     /// overrun factor, `frame_interval` the time between two complete frames. Where predictions are right, acting a
     /// third of a frame late is early enough.
     pub(super) fn slack(&self, takes: Duration, overrun: f64, frame_interval: Duration) -> Duration {
@@ -186,12 +186,12 @@ impl Worker {
         slack.unwrap_or(Duration::MAX).max(frames).max(MIN_SLACK)
     }
 
-    /// When it finished its last lease, or joined.
+    /// Time at which the worker finished its last lease, or joined.
     pub(super) fn last_done_at(&self) -> Duration {
         self.last_done_at
     }
 
-    /// When the first of its leases becomes overdue.
+    /// Time at which the first lease of the worker becomes overdue.
     pub(super) fn next_deadline(&self) -> Option<Duration> {
         self.leases.values().filter_map(|active| active.deadline).min()
     }
@@ -286,7 +286,7 @@ impl Worker {
         }
     }
 
-    /// Revokes all of its leases for good.
+    /// Revokes all leases of the worker for good, and returns them by frame and segment.
     pub(super) fn revoke_all(&mut self) -> BTreeMap<(FrameId, u32), ActiveLease> {
         self.overdue.clear();
         self.stall = None;
@@ -318,7 +318,7 @@ impl Worker {
         }
     }
 
-    /// When the next ping is due.
+    /// Time at which the next ping of the worker is due.
     pub(super) fn next_ping_at(&self) -> Duration {
         self.pinged_at + PING_INTERVAL
     }
@@ -328,7 +328,7 @@ impl Worker {
         self.unanswered_since.get_or_insert(now);
     }
 
-    /// When it is disconnected if it stays silent.
+    /// Time at which the worker is disconnected if it stays silent.
     pub(super) fn silence_deadline(&self) -> Duration {
         self.last_alive_at + SILENCE_TIMEOUT
     }
@@ -347,7 +347,7 @@ impl Worker {
         true
     }
 
-    /// When its back-off ends, if it is backing off.
+    /// Time at which the back-off of the worker ends, if it is backing off.
     pub(super) fn backoff_until(&self, now: Duration) -> Option<Duration> {
         self.backoff_until.filter(|&until| until > now)
     }

@@ -3,10 +3,10 @@
 use std::net::SocketAddr;
 
 use clap::Args;
+use rayfarm_farm::{FarmOptions, LocalWorkerCommand, SegmentPolicy};
 
 use super::LOCAL_WORKER;
 use super::values::{listen_address, thread_count, worker_count};
-use crate::farm::{FarmOptions, LocalWorkerCommand, SegmentPolicy};
 
 /// Workers, and how frames are divided among them.
 #[derive(Clone, Debug, Args)]

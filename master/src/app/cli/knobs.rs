@@ -5,10 +5,9 @@ use std::sync::LazyLock;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use rayfarm_tracer::scene::Setting;
-use rayfarm_tracer::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, NumberRange};
+use rayfarm_tracer::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm};
 
-/// Words of a switch.
-const SWITCH: [&str; 2] = ["on", "off"];
+use crate::app::knob_values;
 
 /// Syntax of each knob's value in help, in the order of the table.
 static VALUE_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| KNOBS.iter().map(value_name).collect());
@@ -73,10 +72,11 @@ impl FromArgMatches for QualityArgs {
 fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
     let arg = Arg::new(knob.option).long(knob.option).value_name(value_name).help(help(knob.summary));
     let arg = match knob.form {
-        KnobForm::Count => arg.value_parser(move |text: &str| count(knob, text)),
-        KnobForm::Number(range) => arg.value_parser(move |text: &str| number(range, text)),
+        KnobForm::Count | KnobForm::Number(_) => {
+            arg.value_parser(move |text: &str| knob_values::parse(knob, text))
+        }
         KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => {
-            let words = PossibleValuesParser::new(words(knob));
+            let words = PossibleValuesParser::new(knob_values::words(knob));
             let known = move |text: String| knob.value(&text).map(GivenValue::Listed).ok_or("unknown word");
             arg.value_parser(words.try_map(known))
         }
@@ -89,40 +89,9 @@ fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
     }
 }
 
-/// All words and aliases that an option accepts.
-fn words(knob: &'static Knob) -> Vec<&'static str> {
-    match knob.form {
-        KnobForm::Switch => SWITCH.to_vec(),
-        KnobForm::Word | KnobForm::Fraction | KnobForm::Count | KnobForm::Number(_) => {
-            let values = knob.values.iter().rev().chain(knob.apart);
-            values.flat_map(|value| value.word.iter().chain(value.aliases).copied()).collect()
-        }
-    }
-}
-
-/// The value with this number, which may have leading zeros.
-fn count(knob: &'static Knob, text: &str) -> Result<GivenValue, String> {
-    let number = text.parse::<u32>().ok().map(|number| number.to_string());
-    number.and_then(|number| knob.value(&number)).map(GivenValue::Listed).ok_or_else(|| {
-        let numbers: Vec<&str> = knob.values.iter().filter_map(|value| value.word).collect();
-        format!("expected one of {}", numbers.join(", "))
-    })
-}
-
-/// A number of a range; whole ones may have leading zeros.
-fn number(range: &'static NumberRange, text: &str) -> Result<GivenValue, String> {
-    let parsed: Option<f64> =
-        if range.whole { text.parse::<u32>().ok().map(f64::from) } else { text.parse().ok() };
-    let number = parsed.filter(|number| range.contains(*number));
-    number.map(|number| GivenValue::Number(range, number as f32)).ok_or_else(|| {
-        let kind = if range.whole { "whole number" } else { "number" };
-        format!("expected a {kind} from {} to {}", range.least, range.most)
-    })
-}
-
 fn value_name(knob: &Knob) -> String {
     match knob.form {
-        KnobForm::Switch => SWITCH.join("|"),
+        KnobForm::Switch => knob_values::SWITCH.join("|"),
         KnobForm::Count => "N".to_owned(),
         KnobForm::Number(range) => if range.whole { "N" } else { "X" }.to_owned(),
         KnobForm::Word | KnobForm::Fraction => knob.words().collect::<Vec<_>>().join("|"),

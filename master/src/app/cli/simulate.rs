@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use rayfarm_farm::SegmentPolicy;
 
 use super::values::{Size, frame_count, size};
-use crate::farm::SegmentPolicy;
 use crate::measure::simulator::{DistributionSetup, Setup};
 
 /// Largest number of simulated workers.

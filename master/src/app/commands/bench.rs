@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::FrameView;
 use rayfarm_tracer::{CompiledScene, PreparedFrame, RayCounts};
@@ -13,7 +14,6 @@ use crate::app::cli::BenchArgs;
 use crate::app::reports::{BenchReport, Knobs, MsPerFrame, print_json};
 use crate::display::numbers::{counted, grouped};
 use crate::error::CommandError;
-use crate::farm::ViewRequest;
 use crate::in_process::{all_cores, trace};
 use crate::quantile::round_to_us;
 use crate::viewer::frame_counts::RaysPerFrame;

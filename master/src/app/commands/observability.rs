@@ -1,12 +1,13 @@
 //! Timeline and control of a run: `--timeline` and `--control`.
 
+use rayfarm_farm::Farm;
+use rayfarm_farm::accounting::{TimelineError, TimelineFile};
 use tokio_util::sync::CancellationToken;
 
-use crate::accounting::{TimelineError, TimelineFile};
 use crate::app::cli::ObservabilityArgs;
 use crate::app::control::{self, Console, Place};
 use crate::error::CommandError;
-use crate::farm::Farm;
+use crate::viewer::KnobSender;
 
 /// Timeline and control, as the command line requests them.
 pub(super) struct Observability {
@@ -27,18 +28,23 @@ impl Observability {
         Ok(Self { timeline, control: args.control.clone(), over: CancellationToken::new() })
     }
 
-    /// Records the timeline of a farm from now on, and accepts commands for it. The command `quit` cancels `quit`. Must be called
-    /// inside a runtime.
+    /// Records the timeline of a farm from now on, and accepts commands for it and for the knobs of `view`. The command `quit`
+    /// cancels `quit`. Must be called inside a runtime.
     ///
     /// # Errors
     /// A place at which the process cannot listen.
-    pub(super) fn begin(&self, farm: &Farm, quit: &CancellationToken) -> Result<(), CommandError> {
+    pub(super) fn begin(
+        &self,
+        farm: &Farm,
+        view: Option<KnobSender>,
+        quit: &CancellationToken,
+    ) -> Result<(), CommandError> {
         if let Some(timeline) = &self.timeline {
             farm.record_timeline(timeline.sink());
         }
         match &self.control {
             Some(place) => {
-                let console = Console::new(farm.control(), quit.clone());
+                let console = Console::new(farm.control(), view, quit.clone());
                 control::start(place, console, self.over.clone())
             }
             None => Ok(()),

@@ -3,10 +3,11 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
+use rayfarm_farm::ViewRequest;
+
 use super::source::Source;
 use crate::app::cli::{ErrorArgs, QualityControlArgs};
 use crate::error::CommandError;
-use crate::farm::ViewRequest;
 use crate::measure::tradeoff::ladder::ladder as measured_ladder;
 use crate::measure::tradeoff::table::Table;
 use crate::viewer::quality_controller::{Ladder, QualityController, prior_ladder};

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene, Setting};
@@ -10,7 +11,6 @@ use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
-use crate::farm::ViewRequest;
 use crate::viewer::orbit::Animation;
 
 /// Scene without a file on the command line, in a folder of models.

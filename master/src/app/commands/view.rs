@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use rayfarm_farm::as_text;
+use rayfarm_farm::{Farm, FarmControl, FarmScene};
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
@@ -13,8 +15,6 @@ use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
 use crate::display::{Display, SceneInfo, WindowDisplay};
 use crate::error::CommandError;
-use crate::farm::as_text;
-use crate::farm::{Farm, FarmControl, FarmScene};
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
 };
@@ -91,9 +91,9 @@ async fn start(
     if let Some(frames) = args.frames {
         farm.expect_frames(frames.into());
     }
-    observability.begin(&farm, stop)?;
     let control = farm.control();
     let (viewer, handle) = Viewer::interactive(farm, config);
+    observability.begin(viewer.farm(), Some(handle.knob_sender()), stop)?;
     Ok((viewer, handle, control))
 }
 

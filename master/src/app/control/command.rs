@@ -1,9 +1,13 @@
 //! Commands and their syntax.
 
 use rayfarm_text::printable;
+use rayfarm_tracer::scene::knobs::KNOBS;
+
+use crate::app::knob_values;
+use crate::viewer::KnobChange;
 
 /// A command of one line.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Command {
     /// Lists the workers.
     Workers,
@@ -23,6 +27,8 @@ pub(super) enum Command {
     Resume(WorkerSelector),
     /// Admits a kicked worker again, by number or by name.
     Allow(String),
+    /// Gives a knob of the view another value.
+    Set(KnobChange),
 }
 
 /// Workers that a command applies to.
@@ -35,7 +41,7 @@ pub(super) enum WorkerSelector {
 }
 
 /// Syntax and effect of each command.
-pub(super) const COMMANDS: [(&str, &str); 9] = [
+pub(super) const COMMANDS: [(&str, &str); 10] = [
     ("workers", "list the connected workers"),
     ("status", "report the progress of the run"),
     ("drain ID|NAME", "disconnect a worker after it has finished its leases"),
@@ -43,6 +49,7 @@ pub(super) const COMMANDS: [(&str, &str); 9] = [
     ("allow ID|NAME", "admit a kicked worker again"),
     ("pause [ID|NAME]", "grant a worker, or all, no more leases"),
     ("resume [ID|NAME]", "grant a paused worker, or all, leases again"),
+    ("set KNOB VALUE", "give a knob of the view another value"),
     ("help", "print this list"),
     ("quit", "end the run"),
 ];
@@ -64,6 +71,7 @@ impl Command {
             "drain" => return Ok(Self::Drain(one(word, rest)?)),
             "kick" => return Ok(Self::Kick(one(word, rest)?)),
             "allow" => return kicked(word, rest).map(Self::Allow),
+            "set" => return knob_change(rest).map(Self::Set),
             "pause" => return Ok(Self::Pause(one_or_all(rest))),
             "resume" => return Ok(Self::Resume(one_or_all(rest))),
             "" => return Err("an empty line; help lists the commands".to_owned()),
@@ -78,6 +86,22 @@ impl Command {
             Err(format!("{word} takes no argument, but \"{}\" follows it", printable(rest)))
         }
     }
+}
+
+/// Parses `KNOB VALUE`. A knob is named by its option, or by its name in reports.
+fn knob_change(text: &str) -> Result<KnobChange, String> {
+    let (name, value) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    let Some(knob) = KNOBS.iter().find(|knob| knob.option == name || knob.name == name) else {
+        let knobs: Vec<_> = KNOBS.iter().map(|knob| knob.option).collect();
+        return Err(format!(
+            "set: there is no knob \"{}\"; expected one of {}",
+            printable(name),
+            knobs.join(", ")
+        ));
+    };
+    let value = knob_values::parse(knob, value.trim());
+    let value = value.map_err(|expected| format!("set {}: {expected}", knob.option))?;
+    Ok(KnobChange { knob, value })
 }
 
 fn kicked(word: &str, rest: &str) -> Result<String, String> {

@@ -2,19 +2,21 @@
 
 use std::borrow::Cow;
 
+use rayfarm_farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
 use rayfarm_text::printable;
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
 use super::command::{COMMANDS, Command, WorkerSelector};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
-use crate::farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
-use crate::viewer::KICK_REASON;
+use crate::viewer::{KICK_REASON, KnobSender};
 
 /// Executor of the commands of one or more connections.
 #[derive(Clone)]
 pub(crate) struct Console {
     farm: FarmControl,
+    /// `None` in a run without a view.
+    view: Option<KnobSender>,
     quit: CancellationToken,
 }
 
@@ -38,9 +40,9 @@ pub(super) enum Then {
 }
 
 impl Console {
-    /// An executor for `farm`. Cancels `quit` at the command of that name.
-    pub(crate) fn new(farm: FarmControl, quit: CancellationToken) -> Self {
-        Self { farm, quit }
+    /// An executor for `farm` and the knobs of `view`. Cancels `quit` at the command of that name.
+    pub(crate) fn new(farm: FarmControl, view: Option<KnobSender>, quit: CancellationToken) -> Self {
+        Self { farm, view, quit }
     }
 
     /// Executes a line.
@@ -77,6 +79,11 @@ impl Console {
             Command::Pause(workers) => self.to_each(&status, workers, FarmControl::pause)?,
             Command::Resume(workers) => self.to_each(&status, workers, FarmControl::resume)?,
             Command::Kick(workers) => self.to_each(&status, workers, |farm, id| farm.ban(id, KICK_REASON))?,
+            Command::Set(change) => {
+                let view = self.view.as_ref().ok_or("set needs a view, and this run writes files")?;
+                view.send(*change)?;
+                json!({ "ok": true, "knob": change.knob.name })
+            }
             Command::Allow(worker) => {
                 let worker = find_kicked(&status, worker)?;
                 json!({ "ok": true, "allowed": usize::from(self.farm.allow_worker(worker)) })

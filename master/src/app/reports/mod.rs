@@ -6,11 +6,11 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 pub(crate) use knobs::Knobs;
+use rayfarm_farm::Verification;
+use rayfarm_farm::accounting::AccountReport;
 use serde::Serialize;
 
-use crate::accounting::AccountReport;
 use crate::error::CommandError;
-use crate::farm::Verification;
 use crate::quantile::{percentile, round_to_us};
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame};
 

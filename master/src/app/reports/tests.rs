@@ -1,8 +1,8 @@
+use rayfarm_farm::ViewRequest;
+use rayfarm_farm::testing::test_scene;
 use rayfarm_tracer::scene::RenderScale;
 
 use super::*;
-use crate::farm::ViewRequest;
-use crate::test_scene;
 
 fn ms(values: &[u64]) -> Vec<Duration> {
     values.iter().copied().map(Duration::from_millis).collect()

@@ -1,10 +1,11 @@
 //! Panel of workers: the use of each worker's time, and the selected worker.
 
+use rayfarm_farm::accounting::{Fading, PART_COUNT, Smoothed};
+use rayfarm_farm::{FarmStatus, Verification, WorkerState};
+
 use super::{GLYPH, LINE, MARGIN, Panel, SOFT, WHITE, kicked};
-use crate::accounting::{Fading, PART_COUNT, Smoothed};
 use crate::display::canvas::Canvas;
 use crate::display::numbers::grouped;
-use crate::farm::{FarmStatus, Verification, WorkerState};
 
 /// Names of the parts of thread time, from wide to narrow layouts.
 const WORDS: [&str; PART_COUNT] = ["trace", "wait", "encode", "send", "decode", "tail", "scene"];
@@ -169,8 +170,8 @@ impl AccountPanel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accounting::{FrameAccount, Parts, WorkerAccount};
-    use crate::farm::WorkerStatus;
+    use rayfarm_farm::WorkerStatus;
+    use rayfarm_farm::accounting::{FrameAccount, Parts, WorkerAccount};
     use std::time::Duration;
 
     fn status(count: u64) -> FarmStatus {
@@ -247,7 +248,7 @@ mod tests {
     #[test]
     fn workers_that_were_kicked_are_named_with_the_key_that_brings_them_back() {
         let kicked = ["mill", "barn"]
-            .map(|name| crate::farm::BannedWorker { id: 1, name: name.to_owned(), address: None })
+            .map(|name| rayfarm_farm::BannedWorker { id: 1, name: name.to_owned(), address: None })
             .to_vec();
         let status = FarmStatus { banned: kicked, ..status(1) };
         let lines = lines(&Layout::of(120), &status, &accounts(), None, 20);

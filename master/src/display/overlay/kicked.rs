@@ -1,6 +1,6 @@
 //! Text about kicked workers, and how to bring them back.
 
-use crate::farm::BannedWorker;
+use rayfarm_farm::BannedWorker;
 
 /// Largest number of names in the list.
 const MAX_NAMES: usize = 4;

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use accounts::AccountPanel;
 use legend::Entry;
+use rayfarm_farm::BannedWorker;
+use rayfarm_farm::Reachable;
 
 use super::canvas::{Canvas, GLYPH, Rect};
 use super::numbers::{counted, three_digits};
-use crate::farm::BannedWorker;
-use crate::farm::Reachable;
 
 pub(super) mod accounts;
 mod kicked;

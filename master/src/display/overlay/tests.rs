@@ -106,8 +106,8 @@ fn contrast(a: u32, b: u32) -> f64 {
 /// The dots of letters are all pixels that are neither of the picture nor of a panel.
 #[test]
 fn text_is_legible_on_any_picture_and_below_messages() {
-    use crate::accounting::Fading;
-    use crate::farm::{FarmStatus, WorkerState, WorkerStatus};
+    use rayfarm_farm::accounting::Fading;
+    use rayfarm_farm::{FarmStatus, WorkerState, WorkerStatus};
     let worker = |id, state| WorkerStatus {
         id,
         name: format!("mill-{id}"),
@@ -221,6 +221,6 @@ fn the_waiting_message_says_how_to_start_a_worker() {
     assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
 }
 
-fn kicked(name: &str) -> crate::farm::BannedWorker {
-    crate::farm::BannedWorker { id: 1, name: name.to_owned(), address: None }
+fn kicked(name: &str) -> rayfarm_farm::BannedWorker {
+    rayfarm_farm::BannedWorker { id: 1, name: name.to_owned(), address: None }
 }

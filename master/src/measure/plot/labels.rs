@@ -178,7 +178,7 @@ mod tests {
     }
 
     proptest! {
-        /// Where points crowd, labels may overlap: places are chosen greedily.
+        /// Labels of crowded points may overlap, because places are chosen greedily.
         #[test]
         fn every_point_has_a_label(points in prop::collection::vec((100..900_i32, 50..600_i32), 0..12)) {
             prop_assert_eq!(placed(&points).len(), points.len());

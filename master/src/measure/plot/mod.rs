@@ -52,7 +52,7 @@ pub(crate) struct Axis {
 pub(crate) struct Series {
     /// Name in the legend.
     pub(crate) name: String,
-    /// How its points are joined.
+    /// Lines between the points of the series.
     pub(crate) line: Line,
     /// Points in the order of the line.
     pub(crate) points: Vec<Point>,
@@ -60,7 +60,7 @@ pub(crate) struct Series {
     pub(crate) level: Option<f64>,
 }
 
-/// How the points of a series are joined.
+/// Lines between the points of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Line {
     /// A solid line with marks.

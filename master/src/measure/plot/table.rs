@@ -27,7 +27,7 @@ pub(crate) struct Columns {
     pub(crate) x: String,
     /// Numbers; rows where it is empty are skipped.
     pub(crate) y: String,
-    /// Rows that agree in all of these columns are one series.
+    /// Columns of the series: rows with equal values in all of them are one series.
     pub(crate) series: Vec<String>,
     /// Text at points.
     pub(crate) label: Option<String>,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::scheduler::{ArbiterResult, Cost, FrameId, Lease, WorkerId};
+use rayfarm_scheduler::{ArbiterResult, Cost, FrameId, Lease, WorkerId};
 
 /// Nanoseconds per second.
 pub(crate) const SECOND: u64 = 1_000_000_000;

@@ -1,8 +1,9 @@
 //! Simulated workers that send wrong pixels.
 
+use rayfarm_scheduler::{Lease, WorkerId};
+
 use super::setup::Corruption;
 use super::world::World;
-use crate::scheduler::{Lease, WorkerId};
 
 impl World {
     /// The error value of the pixels that a worker sends for a lease: 0 where they are right.

@@ -1,5 +1,7 @@
 //! Fault schedules: a safety phase with faults, then a liveness phase without.
 
+use rayfarm_scheduler::{Event, FrameId, SegmentPolicy, WorkerId};
+
 use super::clock::{SECOND, SimEvent};
 use super::costs::CostProfile;
 #[cfg(test)]
@@ -7,7 +9,6 @@ use super::machine::Condition;
 use super::rng::Rng;
 use super::setup::{Corruption, Setup};
 use super::world::World;
-use crate::scheduler::{Event, FrameId, SegmentPolicy, WorkerId};
 
 /// Longest safety phase.
 const MAX_FAULT_PHASE: u64 = 40 * SECOND;

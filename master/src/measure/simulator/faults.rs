@@ -1,10 +1,11 @@
 //! Random faults.
 
+use rayfarm_scheduler::{Event, FrameId, WorkerId};
+
 use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::Condition;
 use super::rng::Rng;
 use super::world::World;
-use crate::scheduler::{Event, FrameId, WorkerId};
 
 /// Longest time between two faults.
 const MAX_FAULT_INTERVAL: u64 = SECOND / 2;

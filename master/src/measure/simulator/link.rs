@@ -9,7 +9,7 @@ pub(crate) struct Lane {
 }
 
 impl Lane {
-    /// When a message that is sent at `now` has passed the link, at `bytes_per_second`.
+    /// Time, in nanoseconds, at which a message that is sent at `now` has passed the link, at `bytes_per_second`.
     pub(crate) fn pass(&mut self, now: u64, bytes: f64, bytes_per_second: f64) -> u64 {
         self.free_at = self.free_at.max(now) + (bytes / bytes_per_second * SECOND as f64) as u64;
         self.free_at
@@ -23,7 +23,7 @@ pub(crate) struct Order {
 }
 
 impl Order {
-    /// When a message arrives that would arrive at `at` if it were alone.
+    /// Time, in nanoseconds, at which a message arrives that would arrive at `at` if it were alone.
     pub(crate) fn arrive(&mut self, at: u64) -> u64 {
         self.last_at = self.last_at.max(at);
         self.last_at

@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
+use rayfarm_scheduler::{FrameId, Lease};
+
 use super::clock::MasterMessage;
 use super::link::{Lane, Order};
-use crate::scheduler::{FrameId, Lease};
 
 /// State of one worker's machine.
 #[derive(Debug)]

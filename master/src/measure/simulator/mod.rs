@@ -1,9 +1,9 @@
-//! A farm in virtual time: the real [`Scheduler`](crate::scheduler::Scheduler) and lease book, with simulated
+//! A farm in virtual time: the real [`Scheduler`](rayfarm_scheduler::Scheduler) and lease book, with simulated
 //! workers, links and faults. Everything follows from a seed.
 //!
 //! [`measure`] renders frames with healthy workers and reports how much of their power became picture.
 //! [`run_schedule`] runs a phase with faults and a phase without: the invariants of
-//! [`check`](crate::scheduler::check) hold after every event, and every request completes.
+//! [`check`](rayfarm_scheduler::check) hold after every event, and every request completes.
 //!
 //! Time is in nanoseconds. The unit of work is a second of an average worker: a frame has `frame_seconds` of it,
 //! and a worker of speed 2 does two units per second.

@@ -1,11 +1,12 @@
 //! Messages over the links, into workers and into the master.
 
+use rayfarm_scheduler::{Event, WorkerId};
+
 use super::clock::{MasterMessage, SECOND, SimEvent, WorkerMessage};
 use super::link::bytes;
 use super::machine::Condition;
 use super::shell::ReplyOutcome;
 use super::world::World;
-use crate::scheduler::{Event, WorkerId};
 
 impl World {
     pub(super) fn at_worker(&mut self, id: WorkerId, message: MasterMessage) {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::scheduler::{Lease, WorkerId};
+use rayfarm_scheduler::{Lease, WorkerId};
 
 /// Owner of a row's pixels, and their error value: 0 where they are right.
 type Pixels = (WorkerId, u64);

@@ -1,9 +1,10 @@
 //! Rendering of simulated workers: rows of each thread, and their duration.
 
+use rayfarm_scheduler::{Cost, FrameId, Lease, WorkerId};
+
 use super::clock::{SECOND, SimEvent, WorkerMessage};
 use super::machine::{Band, Condition};
 use super::world::World;
-use crate::scheduler::{Cost, FrameId, Lease, WorkerId};
 
 impl World {
     /// Gives rows to idle threads.

@@ -1,9 +1,10 @@
 //! Setup of a simulation: workers, links, costs of rows and corruption.
 
-use super::costs::CostProfile;
-use crate::scheduler::SegmentPolicy;
+use rayfarm_scheduler::SegmentPolicy;
 
-/// What is simulated. The defaults are the workload of the reports: 1024x768 pixels, frames of one second of work,
+use super::costs::CostProfile;
+
+/// Simulated farm and workload. The defaults are the workload of the reports: 1024x768 pixels, frames of one second of work,
 /// gigabit links, 0.2 ms round trip, speeds spread 4 to 1.
 #[derive(Clone, Debug)]
 pub struct Setup {
@@ -13,7 +14,7 @@ pub struct Setup {
     pub threads: u32,
     /// Ratio of the fastest worker's speed to the slowest one's; the average is 1.
     pub spread: f64,
-    /// How frames are cut into segments.
+    /// Policy by which frames are cut into segments.
     pub policy: SegmentPolicy,
     /// Whether idle workers begin the next frame.
     pub pipeline: bool,
@@ -46,7 +47,7 @@ pub struct Setup {
     pub verify_percent: u8,
     /// Number of workers that send wrong pixels: the first to join.
     pub corrupt_workers: u32,
-    /// How they send wrong pixels.
+    /// Pattern in which corrupt workers send wrong pixels.
     pub corruption: Corruption,
     /// Number of workers on one shared machine: the first to join. Each other worker has its own machine.
     pub colocated_workers: u32,
@@ -88,7 +89,7 @@ impl Default for Setup {
     }
 }
 
-/// When a corrupt worker sends wrong pixels, and how it evades verification.
+/// Pattern in which a corrupt worker sends wrong pixels, and by which it evades verification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Corruption {
     /// Half of its segments are wrong, at random.

@@ -3,10 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayfarm_farm::{LeaseBook, LeaseStatus};
+use rayfarm_scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
+
 use super::pictures::Picture;
 use super::setup::Corruption;
-use crate::farm::{LeaseBook, LeaseStatus};
-use crate::scheduler::{ArbiterResult, Event, Finding, FrameId, Lease, WorkerId};
 
 /// State that the driver keeps in the real master.
 #[derive(Debug, Default)]

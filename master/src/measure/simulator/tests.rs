@@ -1,12 +1,12 @@
 //! Fault schedules with fixed and random seeds; efficiency; cost of lost and corrupt workers.
 
 use proptest::prelude::*;
+use rayfarm_scheduler::SegmentPolicy;
 
 use super::clock::SECOND;
 use super::machine::Condition;
 use super::world::World;
 use super::{Corruption, CostProfile, Schedule, Setup, measure, run_schedule};
-use crate::scheduler::SegmentPolicy;
 
 #[test]
 fn invariants_hold_in_fixed_schedules() {

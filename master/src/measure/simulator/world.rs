@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use rayfarm_scheduler::{Action, Event, FrameId, HostId, Lease, Scheduler, WorkerId, check};
+
 use super::clock::{Clock, MasterMessage, SECOND, SimEvent};
 use super::counters::{Counters, Measured};
 use super::link::Lane;
@@ -9,7 +11,7 @@ use super::machine::Machine;
 use super::rng::Rng;
 use super::setup::Setup;
 use super::shell::Shell;
-use crate::scheduler::{Action, Event, FrameId, HostId, Lease, Scheduler, WorkerId, check};
+use crate::viewer::OPEN_REQUESTS;
 
 /// Longest virtual time of a measurement.
 const MAX_VIRTUAL_TIME: u64 = 3600 * SECOND;
@@ -19,8 +21,6 @@ const MAX_STEPS_AT_ONCE: u32 = 100_000;
 const MAX_SEGMENT_BYTES: u64 = 32 << 20;
 /// Time in which the master renders a segment itself.
 const ARBITRATION_TIME: u64 = SECOND / 10;
-/// Open requests: the frame being rendered and the one after it.
-const OPEN_REQUESTS: u64 = 2;
 
 /// A requested frame that has not ended.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,10 @@
 //! The ladder of a measured scene: from a table of `tradeoff`.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::RenderScale;
 
 use super::setting::MeasuredSetting;
 use super::table::{Row, Table};
-use crate::farm::ViewRequest;
 use crate::viewer::quality_controller::{Ladder, Origin, Rung, bytes, continued};
 
 /// Front of a table, for pictures that are at rest as in `wanted`. Costs are parts of the time of the row for that picture,
@@ -92,7 +92,7 @@ mod tests {
     }
 
     fn resting(samples: u32) -> ViewRequest {
-        let view = FrameView { samples, ..crate::test_scene::view() };
+        let view = FrameView { samples, ..rayfarm_farm::testing::test_scene::view() };
         ViewRequest { view, scale: RenderScale::Full }
     }
 

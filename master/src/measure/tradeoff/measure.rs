@@ -15,7 +15,7 @@ use crate::quantile::{percentile, round_to_us};
 
 /// A scene with the view and the threads that it is measured with.
 pub(crate) struct MeasureContext<'a> {
-    /// The scene.
+    /// Scene that is measured.
     pub(crate) scene: Arc<CompiledScene>,
     /// Camera and size of the finished pictures.
     pub(crate) view: FrameView,
@@ -27,11 +27,11 @@ pub(crate) struct MeasureContext<'a> {
 
 /// A setting's picture compared with the reference.
 pub(crate) struct Compared {
-    /// The picture.
+    /// Picture rendered at the setting.
     pub(crate) picture: RgbImage,
-    /// Where it differs visibly from the reference.
+    /// FLIP error of each pixel against the reference.
     pub(crate) errors: FlipMap,
-    /// How much it differs, without times.
+    /// Row of the table with the errors of the picture, without times.
     pub(crate) row: Row,
 }
 

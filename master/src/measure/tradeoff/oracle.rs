@@ -99,7 +99,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::test_scene;
+    use rayfarm_farm::testing::test_scene;
 
     #[test]
     fn sampled_pixels_are_inside_and_different() {

@@ -1,9 +1,8 @@
 //! Measured settings: combinations of knobs, named by the slugs of the table of knobs.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::knobs::{KNOBS, KnobValue};
 use rayfarm_tracer::scene::{FrameView, RenderScale, SceneFeatures, Setting};
-
-use crate::farm::ViewRequest;
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.
@@ -186,7 +185,7 @@ mod tests {
 
     #[test]
     fn a_scene_with_all_features_has_all_settings() {
-        let view = crate::test_scene::view();
+        let view = rayfarm_farm::testing::test_scene::view();
         assert_eq!(MeasuredSetting::applicable(&EVERYTHING, &view).len(), NAMES.len());
         assert!(MeasuredSetting::applicable(&NOTHING, &view).contains(&MeasuredSetting::plain()));
     }
@@ -194,7 +193,7 @@ mod tests {
     #[test]
     fn a_scene_without_highlights_shadows_or_textures_has_no_knobs_for_them() {
         let names = |features| {
-            let settings = MeasuredSetting::applicable(&features, &crate::test_scene::view());
+            let settings = MeasuredSetting::applicable(&features, &rayfarm_farm::testing::test_scene::view());
             settings.iter().map(|setting| setting.name).collect::<Vec<_>>()
         };
         let bare = names(NOTHING);
@@ -211,7 +210,7 @@ mod tests {
 
     #[test]
     fn every_setting_gives_a_different_request_for_the_same_camera() {
-        let view = crate::test_scene::view();
+        let view = rayfarm_farm::testing::test_scene::view();
         let turned =
             FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
         let pictures: Vec<ViewRequest> = all().map(|setting| setting.applied_to(&turned)).collect();
@@ -232,7 +231,7 @@ mod tests {
             smooth_terminator: false,
             ..Quality::default()
         };
-        let view = FrameView { quality: own, ..crate::test_scene::view() };
+        let view = FrameView { quality: own, ..rayfarm_farm::testing::test_scene::view() };
         let full = Quality { shadows: true, smooth_terminator: true, ..own };
         assert_eq!(MeasuredSetting::plain().applied_to(&view).view.quality, full);
         let named = |name| MeasuredSetting::named(name).unwrap().applied_to(&view).view.quality;
@@ -256,7 +255,7 @@ mod tests {
     #[test]
     fn pictures_without_light_are_measured_as_they_are() {
         let quality = Quality { shading: Shading::Normals, ..Quality::default() };
-        let view = FrameView { quality, ..crate::test_scene::view() };
+        let view = FrameView { quality, ..rayfarm_farm::testing::test_scene::view() };
         let settings = MeasuredSetting::applicable(&EVERYTHING, &view);
         assert!(settings.iter().all(|one| one.applied_to(&view).view.quality.shading == Shading::Normals));
         let names: Vec<_> = settings.iter().map(|setting| setting.name).collect();

@@ -8,6 +8,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 use rayfarm_tracer::image::MAX_SIDE;
 use rayfarm_tracer::scene::FrameView;
 use tokio_util::sync::CancellationToken;
@@ -22,7 +23,6 @@ use super::quality_controller::QualityController;
 use super::requests::{Answered, RequestPolicy, Requests, ViewState};
 use super::sequence::{FrameSequence, SequenceFrame, SequencePlan, SequenceSender};
 use super::statistics::ViewerState;
-use crate::farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 
 /// Interval at which displays receive the state of the farm.
 const STATUS_EVERY: Duration = Duration::from_millis(100);
@@ -97,6 +97,11 @@ impl Viewer {
             sequence: Some(sender),
         };
         (viewer, handle, sequence)
+    }
+
+    /// The farm that renders the view.
+    pub(crate) fn farm(&self) -> &Farm {
+        &self.farm
     }
 
     /// Renders until `stop` is cancelled, a display quits, no display is left, or the last frame is complete. Returns the
@@ -217,6 +222,13 @@ fn apply(
         }
         InputAction::SetVisible(visible) => state.hidden = !visible,
         InputAction::Presented { latency } => figures.presented(latency),
+        InputAction::Set(change) => {
+            let request = change.applied(state.request);
+            match request.view.validate() {
+                Ok(()) => state.request = request,
+                Err(problem) => tracing::warn!("{} is not changed: {problem}", change.knob.name),
+            }
+        }
         InputAction::Worker(command) => command.perform(&farm.control()),
         InputAction::Quit => return ControlFlow::Break(()),
     }

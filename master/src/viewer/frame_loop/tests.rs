@@ -4,15 +4,15 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use rayfarm_farm::accounting::FrameAccount;
+use rayfarm_farm::testing::fake_worker::{self, Script, is_picture};
+use rayfarm_farm::testing::test_scene::{scene, view};
+use rayfarm_farm::{FarmOptions, FarmScene, FarmStatus};
 use rayfarm_tracer::scene::{Camera, FrameView, RenderScale};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 use super::*;
-use crate::accounting::FrameAccount;
-use crate::fake_worker::{self, Script, is_picture};
-use crate::farm::{FarmOptions, FarmScene, FarmStatus};
-use crate::test_scene::{scene, view};
 use crate::viewer::quality_controller::{QualityMode, prior_ladder};
 
 /// Far beyond what any of these tests takes.

@@ -4,7 +4,7 @@
 //! threads wait for it: it is then their working time plus their waiting time. Where they do not wait, the wire takes at most
 //! the time of the threads.
 
-use crate::accounting::FrameAccount;
+use rayfarm_farm::accounting::FrameAccount;
 
 /// Bottleneck of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ impl Balance {
 
     /// Adds a frame with `cost` times the work of the full picture, and `wire` times its bytes.
     pub(super) fn observe(&mut self, cost: f64, wire: f64, account: &FrameAccount) {
-        let sum = |part: fn(&crate::accounting::Parts) -> u64| {
+        let sum = |part: fn(&rayfarm_farm::accounting::Parts) -> u64| {
             account.workers.iter().map(|worker| part(&worker.parts) as f64).sum::<f64>()
         };
         let (busy, waited) = (sum(|parts| parts.trace.saturating_add(parts.encode)), sum(|parts| parts.send));
@@ -105,7 +105,7 @@ impl Limit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accounting::{Parts, WorkerAccount};
+    use rayfarm_farm::accounting::{Parts, WorkerAccount};
 
     fn account(trace: u64, send: u64) -> FrameAccount {
         let parts = Parts { trace, send, ..Parts::default() };

@@ -4,16 +4,16 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3};
+use rayfarm_farm::accounting::{Parts, WorkerAccount};
+use rayfarm_farm::testing::test_scene;
 use rayfarm_tracer::scene::{
     Attenuation, ColorDepth, FrameView, Light, LightKind, RenderScale, Shading, Sphere,
 };
 
 use super::*;
-use crate::accounting::{Parts, WorkerAccount};
 use crate::measure::simulator::Rng;
 use crate::measure::tradeoff::ladder::ladder as measured_ladder;
 use crate::measure::tradeoff::table::Table;
-use crate::test_scene;
 
 const ROOM: &[u8] = include_bytes!("../../../../models/tradeoff/room.csv");
 const SETTLING: usize = 300;

@@ -13,7 +13,7 @@ const SETTLE: u32 = 60;
 /// Consecutive frames in which a better rung must be predicted to hold, and frames since the last change, before a climb.
 const PATIENCE: u32 = 3;
 const DWELL: u32 = 8;
-/// Where no rung holds, factor of time below which another rung is worth a change.
+/// Factor of time below which another rung is worth a change, where no rung holds.
 const NOTABLY: f64 = 0.95;
 /// Consecutive frames in which no rung is predicted to hold before that is reported.
 const BEATEN_FOR: u32 = 10;

@@ -30,12 +30,11 @@ use governor::Governor;
 use ladder::Loss;
 pub(crate) use ladder::{Ladder, Origin, Rung};
 pub(crate) use prior::ladder as prior_ladder;
+use rayfarm_farm::ViewRequest;
+use rayfarm_farm::accounting::FrameAccount;
 pub(crate) use small_scales::continued;
 use stillness::{Motion, Stillness};
 pub(crate) use wire::bytes;
-
-use crate::accounting::FrameAccount;
-use crate::farm::ViewRequest;
 
 /// Quality at which a frame is requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,12 +5,12 @@
 //! 99,938 triangles, and ten instances of it. Losses are FLIP against the same picture without the loss. Scenes differ by a
 //! factor of four and more. The scales 1/3 and 1/4 have a table of their own, `small-scales.csv`.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobValue};
 use rayfarm_tracer::scene::{Scene, SceneFeatures, Setting};
 
 use super::ladder::{Ladder, Origin, Rung};
 use super::wire::bytes;
-use crate::farm::ViewRequest;
 
 /// Effect of one knob: factor of time, and added mean FLIP error.
 #[derive(Clone, Copy, Debug)]
@@ -130,7 +130,7 @@ mod tests {
     ];
 
     fn wanted(samples: u32) -> ViewRequest {
-        let view = FrameView { samples, ..crate::test_scene::view() };
+        let view = FrameView { samples, ..rayfarm_farm::testing::test_scene::view() };
         ViewRequest { view, scale: RenderScale::Full }
     }
 
@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn adaptive_sampling_is_the_first_rung_that_saves_half_the_time() {
-        let rungs = ladder(&crate::test_scene::scene(), &wanted(16));
+        let rungs = ladder(&rayfarm_farm::testing::test_scene::scene(), &wanted(16));
         let first = rungs.rungs().iter().find(|rung| rung.cost < 0.5).unwrap();
         let first = wanted(16).at_most(&first.setting);
         assert!(first.view.quality.adaptive && first.view.samples == 16, "{first:?}");
@@ -223,7 +223,8 @@ mod tests {
 
     #[test]
     fn the_ladder_ends_at_one_sample_and_a_quarter_of_the_size() {
-        let last = wanted(256).at_most(&ladder(&crate::test_scene::scene(), &wanted(256)).cheapest());
+        let last = wanted(256)
+            .at_most(&ladder(&rayfarm_farm::testing::test_scene::scene(), &wanted(256)).cheapest());
         assert_eq!((last.view.samples, last.scale), (1, RenderScale::Quarter));
     }
 }

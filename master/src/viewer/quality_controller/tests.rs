@@ -1,7 +1,7 @@
+use rayfarm_farm::testing::test_scene;
 use rayfarm_tracer::scene::{ExponentPrecision, FrameView, Quality, RenderScale, Setting, Shading};
 
 use super::*;
-use crate::test_scene;
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -1,8 +1,7 @@
 //! Size of pictures on the wire.
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::ColorDepth;
-
-use crate::farm::ViewRequest;
 
 /// Bytes of a pixel with reduced colours, as a part of those with full ones: two thirds, and less after compression; the mean
 /// of the measured scenes.

@@ -4,11 +4,12 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::accounting::FrameAccount;
+use rayfarm_farm::{Farm, FrameId, ViewRequest};
+
 use super::orbit::Animation;
 use super::quality_controller::{QualityController, QualityMode};
 use super::sequence::{SequencePlan, Slot};
-use crate::accounting::FrameAccount;
-use crate::farm::{Farm, FrameId, ViewRequest};
 
 /// Requests in flight: the frame being rendered, and the next one, which workers begin when the first has no rows left.
 pub(crate) const OPEN_REQUESTS: usize = 2;

@@ -2,10 +2,10 @@
 
 use std::cell::RefCell;
 
+use rayfarm_farm::testing::test_scene;
 use rayfarm_tracer::scene::RenderScale;
 
 use super::*;
-use crate::test_scene;
 use crate::viewer::quality_controller::{Ladder, Origin};
 
 const STILL: Animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };

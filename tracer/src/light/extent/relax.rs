@@ -88,7 +88,7 @@ fn within_ball(point: DVec3) -> DVec3 {
     if length > 1.0 { point / length } else { point }
 }
 
-/// Where points should be along any direction, in ascending order.
+/// Quantiles of the distribution of points along any direction, in ascending order.
 struct Quantiles {
     within: Vec<f64>,
     together: Vec<f64>,

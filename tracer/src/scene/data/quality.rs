@@ -52,7 +52,7 @@ impl Default for Quality {
     }
 }
 
-/// What a picture shows: light, by all or some terms of the shading equation, or a property of the surfaces. Those pictures have a
+/// Content of a picture: light, by all or some terms of the shading equation, or a property of the surfaces. Those pictures have a
 /// black background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Shading {

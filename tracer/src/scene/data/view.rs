@@ -54,7 +54,7 @@ impl RenderSettings {
 /// A camera. `look_at` differs from `position`, and `up` is not parallel to the view direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// How points are projected.
+    /// Projection of points to the picture.
     pub kind: CameraKind,
     /// World position.
     pub position: DVec3,
@@ -140,7 +140,7 @@ pub enum Background {
 /// A sky: a picture all around the scene, infinitely far away.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sky {
-    /// The picture.
+    /// Picture of the sky.
     pub picture: SkyPicture,
     /// Degrees by which the sky is rotated about +Y, in the sense of [`crate::scene::Model::rotate`].
     pub rotate: f64,

@@ -113,6 +113,6 @@ mod tests {
     fn files_beyond_the_limit_are_refused() {
         let (_folder, path) = file("a", b"12345");
         assert_eq!(bytes(&path, 5).unwrap(), b"12345");
-        assert!(bytes(&path, 4).unwrap_err().to_string().contains("larger than 4 bytes"));
+        assert!(bytes(&path, 4).unwrap_err().to_string().contains("4 bytes"));
     }
 }

@@ -43,7 +43,7 @@ pub struct Knob {
     pub option: &'static str,
     /// One line for help and documentation.
     pub summary: &'static str,
-    /// How a value is written.
+    /// Notation of a value.
     pub form: KnobForm,
     /// The values in their order, the cheapest first. The last one is the best: as a limit it changes no setting. A knob with a
     /// [`NumberRange`] also has the numbers between them.
@@ -59,7 +59,7 @@ pub struct Knob {
     matters: fn(&SceneFeatures, &Setting) -> bool,
 }
 
-/// How the values of a knob are written in scene files and on command lines.
+/// Notation of a knob's values in scene files and on command lines.
 #[derive(Clone, Copy, Debug)]
 pub enum KnobForm {
     /// `true` or `false` in a scene file, `on` or `off` on the command line, where the option alone means `on`.

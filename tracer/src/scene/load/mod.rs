@@ -27,7 +27,7 @@ use crate::texture::Texture;
 /// A scene with all meshes and textures that it refers to.
 #[derive(Debug)]
 pub struct LoadedScene {
-    /// The scene.
+    /// Loaded scene.
     pub scene: Scene,
     /// Every mesh of the scene, once.
     pub meshes: Vec<Arc<CompiledMesh>>,

@@ -28,7 +28,7 @@ pub(crate) struct BackgroundText {
     pub(crate) visible: bool,
 }
 
-/// What rays see that hit nothing.
+/// Radiance of rays that hit nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum RadianceText {
     /// Colours, with the strength as a factor.

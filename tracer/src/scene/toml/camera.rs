@@ -23,7 +23,7 @@ const VIEW_HEIGHT: f64 = 2.0;
 /// A camera of the file. Its aim may be a direction: the point is chosen once the scene's bounds are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CameraText {
-    /// How points are projected.
+    /// Projection of points to the picture.
     pub(crate) kind: CameraKind,
     /// World position.
     pub(crate) position: DVec3,

@@ -17,7 +17,7 @@ pub(super) const ESCAPES: &str = "a back slash in double quotes begins an escape
 /// A value and the key it belongs to.
 #[derive(Clone, Copy)]
 pub(super) struct Value<'t> {
-    /// The key.
+    /// Name of the key.
     pub(super) name: &'t str,
     /// The table of the key, as named in messages: `[camera]`.
     pub(super) owner: &'t str,

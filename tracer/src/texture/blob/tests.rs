@@ -98,7 +98,7 @@ fn sizes_are_checked_before_memory_is_allocated() {
         assert_eq!(announced(width, height), TextureError::TooLarge { width, height });
     }
     assert_eq!(announced(0, 7), TextureError::Empty { width: 0, height: 7 });
-    assert!(announced(8192, 8192).to_string().contains("announces 201326608 bytes, there are 16"));
+    assert!(announced(8192, 8192).to_string().contains("201326608"));
     assert!(Texture::new(&picture(0, 0)).unwrap_err().to_string().contains("needs at least one"));
 }
 

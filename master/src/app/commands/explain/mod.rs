@@ -9,6 +9,7 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 
 use bytes::Bytes;
+use rayfarm_farm::{Assets, ViewRequest};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
 use rayfarm_tracer::scene::knobs::KNOBS;
@@ -21,7 +22,6 @@ use super::source::Source;
 use crate::app::cli::ExplainArgs;
 use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
-use crate::farm::{Assets, ViewRequest};
 use crate::measure::ray_bounds::RayBounds;
 
 /// Explanation of a scene; `--json` prints it as one line.

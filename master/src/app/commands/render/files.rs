@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use rayfarm_farm::{FinishedFrame, ViewRequest};
 use rayfarm_tracer::image::RgbImage;
 use rayfarm_tracer::scene::{FrameView, RenderScale};
 use tokio::runtime::Runtime;
@@ -15,7 +16,6 @@ use crate::app::plan::Plan;
 use crate::app::progress::Progress;
 use crate::display::{Display, DisplayError};
 use crate::error::CommandError;
-use crate::farm::{FinishedFrame, ViewRequest};
 use crate::viewer::{FrameSequence, SequenceFrame, Slot, ViewerHandle};
 
 /// Interval at which the progress display shows the state of the farm.

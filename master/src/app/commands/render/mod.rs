@@ -7,6 +7,7 @@ use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
 use files::{FileDisplay, FrameFiles};
+use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 use repair::named;
 use totals::Totals;
 
@@ -21,7 +22,6 @@ use crate::app::progress::Progress;
 use crate::app::reports::{RenderReport, print_json};
 use crate::display::Display;
 use crate::error::CommandError;
-use crate::farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 use crate::viewer::orbit::Animation;
 use crate::viewer::{FrameLogFile, Viewer};
 
@@ -118,7 +118,7 @@ impl Run {
         interrupted: &CancellationToken,
     ) -> Result<Farm, CommandError> {
         let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
-        if let Err(error) = self.observability.begin(&farm, interrupted) {
+        if let Err(error) = self.observability.begin(&farm, None, interrupted) {
             farm.shut_down().await;
             return Err(error);
         }

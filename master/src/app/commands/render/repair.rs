@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
+use rayfarm_farm::as_text;
+use rayfarm_farm::{Farm, FarmError, FinishedFrame, FrameId};
 use tokio_util::sync::CancellationToken;
 
 use super::Run;
 use crate::app::reports::VerificationReport;
-use crate::farm::as_text;
-use crate::farm::{Farm, FarmError, FinishedFrame, FrameId};
 use crate::viewer::OPEN_REQUESTS;
 
 /// Time for the remaining verification after the last frame is complete.

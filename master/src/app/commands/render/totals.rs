@@ -2,12 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use crate::accounting::RunAccount;
+use rayfarm_farm::ViewRequest;
+use rayfarm_farm::accounting::RunAccount;
+
 use crate::app::plan::Plan;
 use crate::app::reports::{Knobs, MsPerFrame, RenderReport, VerificationReport};
 use crate::display::numbers::three_digits;
 use crate::error::CommandError;
-use crate::farm::ViewRequest;
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame, mean};
 use crate::viewer::{FrameLine, FrameLogFile, FrameRate, PresentedFrame};
 

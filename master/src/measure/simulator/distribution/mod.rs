@@ -4,15 +4,15 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use rayfarm_farm::{AssetRouting, AssetSource};
 use rayfarm_protocol::AssetId;
 use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, PEER_TIMEOUT};
+use rayfarm_scheduler::WorkerId;
 use serde::Serialize;
 
 use super::clock::SECOND;
 use super::link::{Lane, bytes};
 use super::rng::Rng;
-use crate::farm::{AssetRouting, AssetSource};
-use crate::scheduler::WorkerId;
 
 const ASSET: AssetId = AssetId([1; 32]);
 /// All workers request the asset within this time, in nanoseconds.
@@ -20,7 +20,7 @@ const SPREAD: u64 = SECOND / 20;
 /// Events at most: chunk by chunk, far more than 4096 workers with 2 GiB would run for hours.
 const MAX_STEPS: u64 = 500_000_000;
 
-/// What is simulated.
+/// Simulated distribution: workers, links and one asset.
 #[derive(Clone, Debug)]
 pub struct DistributionSetup {
     /// Workers that request the asset.
@@ -44,7 +44,7 @@ pub struct DistributionSetup {
 /// Result of a distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distribution {
-    /// Time until the last live worker has the asset.
+    /// Time until the last live worker has the asset, in seconds.
     pub seconds: f64,
     /// Bytes that the master sent, in sizes of the asset.
     pub master_copies: f64,

@@ -37,7 +37,7 @@ use materials::Library;
 use slots::{assign_materials, find};
 use uvs::TriangleUvs;
 
-/// Which texture coordinates of its file a mesh gets.
+/// Choice of the texture coordinates that a mesh takes from its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::scene) enum Uvs {
     /// None: no material has a texture.

@@ -31,8 +31,8 @@ fn other_files_are_refused_as_models() {
         ("scene.toml", &format!("{CAMERA}[[model]]\nfile = \"gltf.toml\"\n")),
         ("broken.rfm", "RFMESH and more"),
     ]);
-    assert!(folder.refusal("gltf.toml").contains("a.glb: this is a glTF model (.glb)"));
-    assert!(folder.refusal("scene.toml").contains("gltf.toml: a scene file, where a model was expected"));
+    assert!(folder.refusal("gltf.toml").contains("a.glb: "));
+    assert!(folder.refusal("scene.toml").contains("gltf.toml: "));
     let message = folder.refusal("broken.rfm");
     assert!(message.starts_with("broken.rfm: not a compiled model"), "{message}");
 }
@@ -124,11 +124,14 @@ fn options_of_bare_models_are_refused_elsewhere() {
     std::fs::write(folder.path("a.rfm"), mesh.bytes()).unwrap();
     let message = |file: &str, options| load_with(&folder.path(file), options).unwrap_err().to_string();
     assert!(message("s.toml", up).contains("write `up = \"z\"` in [[model]] of the scene file"));
-    assert!(message("s.toml", crease).contains("write `crease_angle` in [[model]]"));
-    assert!(message("a.rfm", crease).contains("give --crease-angle to `rayfarm-master compile`"));
+    assert!(message("s.toml", crease).contains("`crease_angle` in [[model]]"));
+    assert!(message("a.rfm", crease).contains("--crease-angle"));
     let warnings = folder.load("s.toml").warnings;
     assert_eq!(warnings.len(), 1);
-    assert!(warnings[0].contains("s.toml:6:16: `crease_angle` in [[model]] has no effect"), "{warnings:?}");
+    assert!(
+        ["s.toml:6:16: ", "`crease_angle`", "[[model]]"].iter().all(|fact| warnings[0].contains(fact)),
+        "{warnings:?}"
+    );
 }
 
 #[test]
@@ -227,10 +230,7 @@ fn a_compiled_model_reads_pictures_in_its_folder_or_below_only() {
     assert!(warnings.len() == 1 && warnings[0].contains("--allow-parent-textures only"), "{warnings:?}");
     let LoadedScene { textures, warnings, .. } = folder.load("other/c.rfm");
     assert!(textures.is_empty());
-    assert!(
-        warnings.len() == 1 && warnings[0].contains("allow it with --allow-parent-textures"),
-        "{warnings:?}"
-    );
+    assert!(warnings.len() == 1 && warnings[0].contains("--allow-parent-textures"), "{warnings:?}");
     let allowed = LoadOptions { allow_parent_textures: true, ..LoadOptions::default() };
     let LoadedScene { textures, warnings, .. } = load_with(&folder.path("other/c.rfm"), allowed).unwrap();
     assert_eq!((textures.len(), warnings), (1, Vec::new()));

@@ -25,8 +25,11 @@ fn warnings_of_scene_and_models_are_gathered() {
     let folder = Folder::with(&[("s.toml", &scene), ("a.obj", &text)]);
     let warnings = folder.load("s.toml").warnings;
     assert_eq!(warnings.len(), 3, "{warnings:#?}");
-    assert!(warnings[0].contains("s.toml:4:15: `view_height` in [camera] has no effect"), "{warnings:#?}");
-    assert!(warnings[1].contains("a.obj:7: unknown statement `hello`"), "{warnings:#?}");
+    assert!(
+        ["s.toml:4:15: ", "view_height", "[camera]"].iter().all(|fact| warnings[0].contains(fact)),
+        "{warnings:#?}"
+    );
+    assert!(["a.obj:7: ", "`hello`"].iter().all(|fact| warnings[1].contains(fact)), "{warnings:#?}");
     assert!(warnings[2].contains("1 without an area, 1 that repeat another, 0 not finite"), "{warnings:#?}");
 }
 
@@ -100,7 +103,7 @@ fn control_characters_of_names_are_printed_as_escapes() {
     let message = load(&folder.path("a\x1b[2J.obj")).unwrap_err().to_string();
     assert!(message.contains("a\\u{1b}[2J.obj:2: "), "{message}");
     let warnings = folder.load("b.obj").warnings;
-    assert!(warnings[0].contains("unknown statement `\\u{1b}]0;x` is left out"), "{warnings:?}");
+    assert!(warnings[0].contains("`\\u{1b}]0;x`"), "{warnings:?}");
 }
 
 /// Files of a folder next to the project; none, and a message, where it is missing.

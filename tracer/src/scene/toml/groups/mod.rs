@@ -101,7 +101,7 @@ pub(super) struct Objects {
     names: Vec<(Name, Target)>,
 }
 
-/// What a name means: an index of a list, or a range of triangles.
+/// Meaning of a name: an index of a list, or a range of triangles.
 #[derive(Clone, Debug)]
 enum Target {
     Model(usize),

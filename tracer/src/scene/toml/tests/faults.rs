@@ -220,5 +220,5 @@ fn lists_are_counted_before_they_are_built() {
 fn a_text_of_too_many_values_is_refused_before_it_is_parsed() {
     let text = format!("a = [{}]", "{},".repeat(MAX_VALUES / 2));
     let fault = read(&text).unwrap_err();
-    assert!(fault.message.contains("more than 16777216 values"), "{}", fault.message);
+    assert!(fault.message.contains("16777216"), "{}", fault.message);
 }

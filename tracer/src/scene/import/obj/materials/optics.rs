@@ -39,7 +39,7 @@ pub(super) struct Optics {
     ior: Option<f32>,
 }
 
-/// What of the rest of a material matters here.
+/// Properties of the rest of a material that affect its optics.
 #[derive(Clone, Copy)]
 pub(super) struct Rest {
     /// Whether there is no highlight: `Ks` does not count.

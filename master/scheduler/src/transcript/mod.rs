@@ -10,6 +10,12 @@
 //! - `pong W NONCE`, `pong W NONCE progress` (its threads have made progress since its previous pong), `receiving W`, `wake`
 //!
 //! The policy may be followed by `, verify PERCENT KEY`.
+//!
+//! `recorded` compares transcripts with files.
+
+mod recorded;
+
+pub(crate) use recorded::{check, folder};
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -47,6 +53,11 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
     let number = |word: &str| word.parse::<u64>().unwrap();
     let pair = |word: &str, by| word.split_once(by).map(|(a, b)| (number(a), number(b) as u32)).unwrap();
     let worker = WorkerId(words.get(1).and_then(|word| word.parse().ok()).unwrap_or(0));
+    let lease = |segment: &str| {
+        let (frame, number) = pair(segment, '.');
+        let lease = granted.get(&(worker, FrameId(frame), number));
+        *lease.unwrap_or_else(|| panic!("{command}: the worker has had no lease {segment}"))
+    };
     match words[..] {
         ["frame", frame, size] => {
             let (width, height) = pair(size, 'x');
@@ -67,13 +78,11 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
         ["pause", _] => Event::PauseRequested { worker },
         ["resume", _] => Event::ResumeRequested { worker },
         ["done", _, segment] => {
-            let (frame, segment) = pair(segment, '.');
-            let lease = granted[&(worker, FrameId(frame), segment)];
+            let lease = lease(segment);
             Event::SegmentDone { worker, lease, cost: Cost { primary: 1, ..Cost::default() } }
         }
         ["verified", _, segment, finding] => {
-            let (frame, segment) = pair(segment, '.');
-            let lease = granted[&(worker, FrameId(frame), segment)];
+            let lease = lease(segment);
             let finding = if finding == "same" { Finding::Same } else { Finding::Different };
             Event::SegmentVerified { worker, lease, cost: Cost::default(), finding }
         }
@@ -133,12 +142,4 @@ fn described(action: &Action) -> String {
         }
         Action::Drain { worker } => format!("{}: drain", worker.0),
     }
-}
-
-/// Compares without regard to indentation.
-#[track_caller]
-pub(super) fn expect(policy: &str, script: &str, expected: &str) {
-    let expected: String = expected.trim().lines().map(|line| format!("{}\n", line.trim())).collect();
-    let actual = transcript(policy, script);
-    assert_eq!(actual, expected, "\nthe transcript was:\n{actual}");
 }
