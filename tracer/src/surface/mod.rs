@@ -141,11 +141,12 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// Surfaces for [`Surfaces::find`] to set.
+    /// Surfaces for [`Surfaces::find`] to set. Inlined, and with the steps that may unwind first: they are built in place.
+    #[inline(always)]
     pub(crate) fn empty(frame: &PreparedFrame) -> Self {
-        let blocks = std::array::from_fn(|_| SurfaceBlock::EMPTY);
         let (texels, lifts) = (Texels::for_scene(frame), Lifts::for_frame(frame));
         let (cone, untilted) = (Cone::for_frame(frame), Untilted::for_frame(frame));
+        let blocks = std::array::from_fn(|_| SurfaceBlock::EMPTY);
         Self { blocks, texels, cone, lifts, untilted, facets: Facets::new() }
     }
 

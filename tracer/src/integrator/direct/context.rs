@@ -41,12 +41,12 @@ impl<'a, W: Watch> TileContext<'a, W> {
         // First: what is built before a step that may unwind is built elsewhere, and copied.
         let bounces = Bounces::for_frame(frame);
         Self {
+            surfaces: Surfaces::empty(frame),
             frame,
             counts: RayCounts::default(),
             watch,
             cancelled,
             hits: std::array::from_fn(|_| HitBlock::NONE),
-            surfaces: Surfaces::empty(frame),
             tile: tile::Scratch::new(),
             direct: Scratch::new(),
             bounces,
@@ -72,17 +72,18 @@ impl<'a, W: Watch> TileContext<'a, W> {
     /// same one, because it takes long to compile.
     #[inline(never)]
     fn trace_eye<S: Simd>(&mut self, simd: S, tile: &EyeTile<'_>) -> Result<(), Cancelled> {
-        self.begin_tile(tile)?;
         simd.vectorize(
             #[inline(always)]
-            || {
+            || -> Result<(), Cancelled> {
+                self.begin_tile(tile)?;
                 tile::find_closest(simd, tile, &mut self.hits, &mut self.tile);
                 self.watch.enter(Stage::Surfaces);
                 self.surfaces.find(simd, tile, &self.hits);
                 self.watch.enter(Stage::Shading);
                 shade(simd, tile, self);
+                Ok(())
             },
-        );
+        )?;
         self.add_bounces(simd, tile)
     }
 

@@ -26,26 +26,34 @@ pub(crate) struct Occlusion {
 }
 
 impl ShadowTile<'_> {
-    /// Bits of the live points that are occluded, and of others with a surface in their way that light may pass. A function of its
-    /// own on each level: all kinds of shadows call the same one, because it takes long to compile.
-    #[inline(never)]
-    pub(crate) fn occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Occlusion {
-        simd.vectorize(
-            #[inline(always)]
-            || self.occluded_here(simd, scratch),
-        )
+    /// What is between the live points and the light.
+    pub(crate) fn occlusion<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Occlusion {
+        let occluded = *self.occluded(simd, scratch);
+        let undecided = std::array::from_fn(|block| scratch.points.undecided[block] & !occluded[block]);
+        Occlusion { occluded, undecided }
     }
 
+    /// Bits of the live points that are occluded. Those behind surfaces that light may pass are not: see [`ShadowTile::occlusion`].
+    /// A function of its own on each level: all kinds of shadows call the same one, because it takes long to compile.
+    #[inline(never)]
+    pub(crate) fn occluded<'s, S: Simd>(&self, simd: S, scratch: &'s mut Scratch) -> &'s [u32; BLOCKS] {
+        simd.vectorize(
+            #[inline(always)]
+            || self.find_occluded(simd, scratch),
+        );
+        &scratch.points.occluded
+    }
+
+    /// Sets the bits of the points that are occluded, and of those behind surfaces that light may pass.
     #[inline(always)]
-    fn occluded_here<S: Simd>(&self, simd: S, scratch: &mut Scratch) -> Occlusion {
+    fn find_occluded<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
         let Scratch { scene_frontier, mesh_frontier, projected, shadow_rays: rays, points, .. } = scratch;
         points.open = self.live;
         points.occluded = [0; BLOCKS];
         points.undecided = [0; BLOCKS];
         let extent = Extent::of(simd, self.points, self.grid, &self.live);
         let Some(projection) = extent.projection(self.light) else {
-            OcclusionQuery::new(self, rays, points).test_scene();
-            return Occlusion { occluded: points.occluded, undecided: points.undecided };
+            return OcclusionQuery::new(self, rays, points).test_scene();
         };
         points.project(simd, self.points, &extent, &projection, rays);
         let picture = Picture { projection: &projection, rays };
@@ -64,7 +72,5 @@ impl ShadowTile<'_> {
             query.turn_to(self.frame.items.first_plane() + plane);
             query.test_item();
         }
-        let undecided = std::array::from_fn(|block| points.undecided[block] & !points.occluded[block]);
-        Occlusion { occluded: points.occluded, undecided }
     }
 }

@@ -53,7 +53,7 @@ pub(in crate::integrator) fn occluded<S: Simd, R: SurfaceSource>(
         if live != [0; BLOCKS] {
             shadow.live = live;
             // Without surfaces that light may pass: see `is_partial`.
-            let found = shadow.occluded(simd, scratch).occluded;
+            let found = shadow.occluded(simd, scratch);
             for block in 0..BLOCKS {
                 occluded[block] |= found[block];
             }

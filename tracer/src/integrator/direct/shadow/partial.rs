@@ -154,7 +154,7 @@ impl Points<'_> {
             live: *lanes,
         };
         let Occlusion { occluded, undecided } = if self.neighbours {
-            shadow.occluded(simd, self.scratch)
+            shadow.occlusion(simd, self.scratch)
         } else if self.frame.has_translucent_items() {
             Occlusion { occluded: [0; BLOCKS], undecided: occluded_one_by_one(&shadow) }
         } else {

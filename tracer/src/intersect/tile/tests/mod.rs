@@ -395,7 +395,7 @@ fn occluded<S: Simd>(
     let grid = &TileRays::grid(simd);
     let t_max = if matches!(light, ShadowTarget::Parallel(_)) { f64::INFINITY } else { SHADOW_T_MAX };
     let tile = ShadowTile { frame, light, t_max, grid, points, hits, live };
-    tile.occluded(simd, &mut Scratch::new()).occluded
+    *tile.occluded(simd, &mut Scratch::new())
 }
 
 /// Checks, on each level, the occluded points among triangles that are hard to test against the rays to a light.
