@@ -9,12 +9,16 @@
 //!   affine     the maps
 //!   instance   placed meshes
 //!   rounding   error bounds of placed geometry
+//!   few        the primitives of scenes with few of them
+//!   sources    the lights that paths select from
 //! ```
 
 mod affine;
 mod camera;
+mod few;
 mod instance;
 mod rounding;
+mod sources;
 
 use std::sync::Arc;
 
@@ -34,6 +38,7 @@ use crate::texture::Texture;
 pub(crate) use affine::Affine;
 pub use camera::Basis;
 pub(crate) use camera::{CameraRays, FisheyeRay, FisheyeRays, ParallelRays, PinholeRays};
+pub(crate) use few::{Few, FewSphere, FewTriangle};
 pub(crate) use instance::Instance;
 use instance::ToEye;
 use rounding::placement_rounding;
@@ -61,6 +66,8 @@ pub struct PreparedFrame {
     /// Largest error bound of any surface, in eye units.
     pub(crate) coarsest: f64,
     pub(crate) lights: Vec<EyeLight>,
+    /// The primitives, if these are few; only in frames whose rays bounce.
+    pub(crate) few: Option<Few>,
     /// The lights that paths select from; only in frames of the path integrator.
     pub(crate) light_table: Option<LightTable>,
     /// The background as rays of the camera see it.
@@ -141,6 +148,7 @@ impl PreparedFrame {
             planes,
             coarsest,
             lights: lights(source, &view.quality, &to_eye),
+            few: None,
             light_table: None,
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
@@ -153,7 +161,9 @@ impl PreparedFrame {
         go_on(cancelled)?;
         frame.make_pyramids();
         go_on(cancelled)?;
-        frame.light_table = view.integrator.path().and_then(|_| LightTable::of(&frame));
+        let bounces = frame.features.bounces || view.integrator.path().is_some();
+        frame.few = bounces.then(|| Few::of(&frame)).flatten();
+        frame.light_table = view.integrator.path().and_then(|_| sources::light_table(&frame));
         frame.translucent = frame.find_translucent();
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)

@@ -1,6 +1,6 @@
 //! Batches: up to 256 rays of any origins and directions, as sixteen blocks, so that they are shaded as a tile is.
 
-use super::block::LocalBlock;
+use super::block::ToMesh;
 use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
@@ -103,7 +103,7 @@ impl SurfaceSource for RayBatch<'_> {
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalBatch {
-        LocalBatch(Box::new(std::array::from_fn(|block| self.blocks[block].local(instance))))
+        LocalBatch(instance.map(ToMesh::of))
     }
 
     fn are_of_camera(&self) -> bool {
@@ -127,17 +127,24 @@ impl SurfaceSource for RayBatch<'_> {
     }
 }
 
-/// A batch of rays in the space of a mesh, rounded.
-pub(crate) struct LocalBatch(Box<[LocalBlock; BLOCKS]>);
+/// The space of a mesh, or eye space. Rays are transformed block by block, when they are needed: those of bounces hit many items, and each
+/// of them in few blocks.
+pub(crate) struct LocalBatch(Option<ToMesh>);
 
 impl LocalRays<RayBatch<'_>> for LocalBatch {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
-        self.0[block].origins(simd)
+    fn origins<S: Simd>(&self, simd: S, rays: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+        match &self.0 {
+            None => rays.blocks[block].origins(simd),
+            Some(to_mesh) => rays.blocks[block].origins_in(simd, to_mesh),
+        }
     }
 
     #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
-        self.0[block].directions(simd)
+    fn directions<S: Simd>(&self, simd: S, rays: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+        match &self.0 {
+            None => rays.blocks[block].directions(simd),
+            Some(to_mesh) => rays.blocks[block].directions_in(simd, to_mesh),
+        }
     }
 }

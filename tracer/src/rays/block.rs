@@ -1,6 +1,6 @@
 //! Blocks of any sixteen rays: the rays of bounces, which have no origin in common.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::{PrimitiveId, Ray, RaySource};
 use crate::frame::{Instance, PreparedFrame};
@@ -70,18 +70,24 @@ impl<'a> RayBlock<'a> {
         Vec3x16::load(simd, &self.origin)
     }
 
-    /// The live rays in the space of an instance's mesh, or in eye space.
-    pub(crate) fn local(&self, instance: Option<&Instance>) -> LocalBlock {
-        let Some(instance) = instance else {
-            return LocalBlock { origin: self.origin, direction: self.direction };
-        };
-        let mut local = LocalBlock { origin: [Lanes::ZERO; 3], direction: [Lanes::ZERO; 3] };
+    /// Origins of the live rays in the space of a mesh, rounded.
+    #[inline(always)]
+    pub(super) fn origins_in<S: Simd>(&self, simd: S, to_mesh: &ToMesh) -> Vec3x16<S> {
+        let mut origins = [Lanes::ZERO; 3];
         for lane in each_bit(self.live) {
-            let Ray { origin, direction } = instance.to_mesh(&self.rays[lane]);
-            put(&mut local.origin, lane, origin);
-            put(&mut local.direction, lane, direction);
+            put(&mut origins, lane, to_mesh.inverse * (self.rays[lane].origin - to_mesh.translation));
         }
-        local
+        Vec3x16::load(simd, &origins)
+    }
+
+    /// Directions of the live rays in the space of a mesh, rounded.
+    #[inline(always)]
+    pub(super) fn directions_in<S: Simd>(&self, simd: S, to_mesh: &ToMesh) -> Vec3x16<S> {
+        let mut directions = [Lanes::ZERO; 3];
+        for lane in each_bit(self.live) {
+            put(&mut directions, lane, to_mesh.inverse * self.rays[lane].direction);
+        }
+        Vec3x16::load(simd, &directions)
     }
 }
 
@@ -103,21 +109,16 @@ impl RaySource for RayBlock<'_> {
     }
 }
 
-/// A block of rays in the space of a mesh, rounded.
-pub(crate) struct LocalBlock {
-    origin: [Lanes; 3],
-    direction: [Lanes; 3],
+/// Map from eye space to the space of a mesh.
+pub(super) struct ToMesh {
+    inverse: DMat3,
+    translation: DVec3,
 }
 
-impl LocalBlock {
-    #[inline(always)]
-    pub(crate) fn origins<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16::load(simd, &self.origin)
-    }
-
-    #[inline(always)]
-    pub(crate) fn directions<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16::load(simd, &self.direction)
+impl ToMesh {
+    /// The map of an instance.
+    pub(super) fn of(instance: &Instance) -> Self {
+        Self { inverse: instance.inverse, translation: instance.translation }
     }
 }
 

@@ -6,7 +6,8 @@ use super::group::Group;
 use super::queue::Path;
 use crate::bsdf::scattering::{Evaluated, Scattering, Setting};
 use crate::light::SHADOW_T_MAX;
-use crate::rays::{BLOCKS, Ray, RaySource, SurfaceSource};
+use crate::light::table::LightScene;
+use crate::rays::{BLOCKS, PrimitiveId, Ray, RaySource, SurfaceSource};
 use crate::sampler::{Dimension, Vertex, pair};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{
@@ -131,7 +132,7 @@ impl Group<'_> {
         let mut light = incoming.weight.mul(Vec3x16::load(simd, &colors));
         if let Some(table) = self.table.filter(|_| bounce > 0) {
             let selection = self.selection(bounce - 1);
-            let other = table.density_of_sky(simd, self.frame, selection, incoming.direction);
+            let other = table.density_of_sky(simd, self.frame.sky_rotation, selection, incoming.direction);
             light = light.scale(power_heuristic(simd, incoming.density, other));
         }
         self.add(simd, block, lanes, bounce, light);
@@ -179,11 +180,15 @@ impl Group<'_> {
         if let Some(table) = self.table.filter(|_| bounce > 0 && shining != 0) {
             let origins = self.batch.origins(simd, block);
             let selection = self.selection(bounce - 1);
+            let key_of = |lane: usize| {
+                let PrimitiveId { item, triangle } = self.hits[block].slot(lane);
+                (item, triangle)
+            };
             let other = table.density_of_hits(
                 simd,
                 selection,
                 (origins, incoming.direction),
-                (&self.hits[block], shining),
+                (&key_of, shining),
                 Vec3x16::load(simd, &surface.point),
             );
             light = light.scale(power_heuristic(simd, incoming.density, other));
@@ -291,8 +296,8 @@ impl Group<'_> {
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
         let [select_by, _] = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Light));
         let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::LightPoint));
-        let mut samples =
-            table.sample(simd, self.frame, (points, lanes), self.selection(bounce), select_by, at);
+        let scene = LightScene { lights: &self.frame.lights, sky_rotation: self.frame.sky_rotation };
+        let mut samples = table.sample(simd, &scene, (points, lanes), self.selection(bounce), select_by, at);
         if samples.live == 0 {
             return;
         }

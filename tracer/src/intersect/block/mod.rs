@@ -2,7 +2,12 @@
 //!
 //! Rays of bounces have neither origins nor directions in common, so each walks the trees by itself, and the sixteen
 //! children of a node fill the lanes. A block is dispatched to its level of SIMD once.
+//!
+//! ```text
+//!   few   scenes of few primitives: all rays against one primitive at a time
+//! ```
 
+mod few;
 #[cfg(test)]
 mod tests;
 
@@ -15,7 +20,15 @@ use crate::simd::{Simd, dispatch, each_bit};
 impl PreparedFrame {
     /// Finds the closest hits of some live rays of a block. Their lanes of `hits` must have none.
     pub(crate) fn closest_hits_of(&self, block: &RayBlock<'_>, lanes: u32, hits: &mut HitBlock) {
-        with_stack(|stack| dispatch!(self.level, simd => self.find_nearest(simd, stack, block, lanes, hits)));
+        let mut undecided = lanes & block.live(0);
+        if let Some(few) = &self.few {
+            undecided = dispatch!(self.level, simd => few.find_closest(simd, block, undecided, hits));
+        }
+        if undecided != 0 {
+            with_stack(
+                |stack| dispatch!(self.level, simd => self.find_nearest(simd, stack, block, undecided, hits)),
+            );
+        }
         for lane in each_bit(hits.coincident & lanes) {
             let (nearest, starts_on) = (hits.slot(lane), block.starts_on(0, lane));
             let (preferred, others) =
@@ -27,7 +40,15 @@ impl PreparedFrame {
 
     /// Bits of the live rays of a block that hit anything.
     pub(crate) fn any_hits_of(&self, block: &RayBlock<'_>) -> u32 {
-        with_stack(|stack| dispatch!(self.level, simd => self.find_any(simd, stack, block)))
+        let [occluded, undecided] = match &self.few {
+            Some(few) => dispatch!(self.level, simd => few.find_any(simd, block)),
+            None => [0, block.live(0)],
+        };
+        if undecided == 0 {
+            return occluded;
+        }
+        occluded
+            | with_stack(|stack| dispatch!(self.level, simd => self.find_any(simd, stack, block, undecided)))
     }
 
     /// The exact hit of a ray whose primitive is known.
@@ -56,9 +77,9 @@ impl PreparedFrame {
     }
 
     #[inline(always)]
-    fn find_any<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>) -> u32 {
+    fn find_any<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>, lanes: u32) -> u32 {
         let mut occluded = 0;
-        for lane in each_bit(block.live(0)) {
+        for lane in each_bit(lanes) {
             let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
             let hit = self.hits_any(simd, stack.above(), &ray, block.t_max(lane), starts_on);
             occluded |= u32::from(hit) << lane;

@@ -3,8 +3,7 @@
 use std::f32::consts::PI;
 
 use super::{LightSamples, LightTable};
-use crate::frame::PreparedFrame;
-use crate::light::Emitter;
+use crate::light::{Emitter, EyeLight};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, three};
 
@@ -15,12 +14,10 @@ impl LightTable {
     pub(super) fn add_light<S: Simd>(
         &self,
         simd: S,
-        frame: &PreparedFrame,
+        light: &EyeLight,
         (points, lane): (Vec3x16<S>, usize),
-        light: u32,
         samples: &mut LightSamples,
     ) -> ([f32; 3], f64) {
-        let light = &frame.lights[light as usize];
         let incidence = light.incidence(simd, points);
         if incidence.reached >> lane & 1 == 0 {
             samples.live &= !(1 << lane);

@@ -4,7 +4,7 @@
 //! their emission, or cut out by alpha, are no sources: paths find them by hitting them.
 //!
 //! ```text
-//!   collect    the sources of a frame, with their power
+//!   sources    a list of sources with their power
 //!   delta      the light of one light of the scene
 //!   select     a source at random, by its power
 //!   triangle   points on triangles
@@ -13,21 +13,22 @@
 //! ```
 
 mod ball;
-mod collect;
 mod delta;
 mod select;
 mod sky;
+mod sources;
 mod triangle;
 
 use glam::Vec3;
 
-use crate::frame::PreparedFrame;
-use crate::rays::{HitBlock, PrimitiveId};
+use super::EyeLight;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, each_bit, f32x16, splat, three};
 use ball::Ball;
 use select::Choice;
-use sky::SkyTable;
+pub(crate) use sky::SkyTable;
+pub(crate) use sources::{Sources, SurfaceKey};
+
 use triangle::Triangle;
 
 /// The lights that paths select from, in eye space.
@@ -35,7 +36,7 @@ use triangle::Triangle;
 pub(crate) struct LightTable {
     sources: Vec<Source>,
     /// The primitives that are sources, in ascending order, with the index of the source.
-    primitives: Vec<(PrimitiveId, u32)>,
+    surfaces: Vec<(SurfaceKey, u32)>,
     sky: Option<(SkyTable, u32)>,
     extended: Choice,
     all: Choice,
@@ -52,6 +53,15 @@ enum Source {
     /// A light without extent: its index among the lights of the frame.
     Delta(u32),
     Sky,
+}
+
+/// What the sources of a frame refer to.
+#[derive(Clone, Copy)]
+pub(crate) struct LightScene<'a> {
+    /// The lights of the scene.
+    pub lights: &'a [EyeLight],
+    /// Sine and cosine of the rotation of the sky about +Y.
+    pub sky_rotation: [f32; 2],
 }
 
 /// Which lights are selected from.
@@ -105,7 +115,7 @@ impl LightTable {
     pub(crate) fn sample<S: Simd>(
         &self,
         simd: S,
-        frame: &PreparedFrame,
+        scene: &LightScene<'_>,
         (points, lanes): (Vec3x16<S>, u32),
         selection: Selection,
         select: f32x16<S>,
@@ -130,13 +140,13 @@ impl LightTable {
                     self.sample_triangles(simd, (points, kinds.triangles), &sources, at, &mut samples);
                 }
                 if kinds.balls != 0 {
-                    self.sample_balls(simd, frame, (points, kinds.balls), &sources, at, &mut samples);
+                    self.sample_balls(simd, scene.lights, (points, kinds.balls), &sources, at, &mut samples);
                 }
                 if let Some((sky, _)) = self.sky.as_ref().filter(|_| kinds.sky != 0) {
-                    sky.sample(simd, frame.sky_rotation, kinds.sky, at, &mut samples);
+                    sky.sample(simd, scene.sky_rotation, kinds.sky, at, &mut samples);
                 }
                 if kinds.delta != 0 {
-                    self.add_delta(simd, frame, (points, kinds.delta), &sources, &mut samples);
+                    self.add_delta(simd, scene.lights, (points, kinds.delta), &sources, &mut samples);
                 }
             },
         );
@@ -147,14 +157,14 @@ impl LightTable {
     }
 
     /// Density, over solid angle, with which [`LightTable::sample`] selects the points of sources that rays hit: from their origins, along
-    /// unit vectors, to `points` on the primitives of `hits`. 0 where those are no sources.
+    /// unit vectors, to `points` on `surfaces`. 0 where those are no sources.
     #[inline(never)]
     pub(crate) fn density_of_hits<S: Simd>(
         &self,
         simd: S,
         selection: Selection,
         (origins, direction): (Vec3x16<S>, Vec3x16<S>),
-        (hits, lanes): (&HitBlock, u32),
+        (surfaces, lanes): (&dyn Fn(usize) -> SurfaceKey, u32),
         points: Vec3x16<S>,
     ) -> f32x16<S> {
         let mut probability = Lanes::ZERO;
@@ -163,11 +173,10 @@ impl LightTable {
         let starts = three!(axis => origins.0[axis].to_array());
         let choice = self.choice(selection);
         for lane in each_bit(lanes) {
-            let primitive = hits.slot(lane);
-            let Ok(place) = self.primitives.binary_search_by_key(&key(primitive), |(id, _)| key(*id)) else {
+            let Ok(place) = self.surfaces.binary_search_by_key(&surfaces(lane), |(key, _)| *key) else {
                 continue;
             };
-            let source = self.primitives[place].1;
+            let source = self.surfaces[place].1;
             probability.0[lane] = choice.probability(source);
             match &self.sources[source as usize] {
                 Source::Triangle(triangle) => {
@@ -199,7 +208,7 @@ impl LightTable {
     pub(crate) fn density_of_sky<S: Simd>(
         &self,
         simd: S,
-        frame: &PreparedFrame,
+        sky_rotation: [f32; 2],
         selection: Selection,
         direction: Vec3x16<S>,
     ) -> f32x16<S> {
@@ -207,7 +216,7 @@ impl LightTable {
         let probability = splat(simd, self.choice(selection).probability(*source));
         simd.vectorize(
             #[inline(always)]
-            || sky.density(simd, frame.sky_rotation, direction) * probability,
+            || sky.density(simd, sky_rotation, direction) * probability,
         )
     }
 
@@ -238,7 +247,7 @@ impl LightTable {
     fn sample_balls<S: Simd>(
         &self,
         simd: S,
-        frame: &PreparedFrame,
+        lights: &[EyeLight],
         (points, lanes): (Vec3x16<S>, u32),
         sources: &[u32; LANES],
         at: [f32x16<S>; 2],
@@ -253,7 +262,7 @@ impl LightTable {
             match &self.sources[sources[lane] as usize] {
                 Source::Lamp(_, light) => {
                     samples.alone |= 1 << lane;
-                    self.add_light(simd, frame, (points, lane), *light, samples);
+                    self.add_light(simd, &lights[*light as usize], (points, lane), samples);
                     // The light of its centre, over all of the ball.
                     let density = samples.density.0[lane];
                     for channel in 0..3 {
@@ -276,7 +285,7 @@ impl LightTable {
     fn add_delta<S: Simd>(
         &self,
         simd: S,
-        frame: &PreparedFrame,
+        lights: &[EyeLight],
         (points, lanes): (Vec3x16<S>, u32),
         sources: &[u32; LANES],
         samples: &mut LightSamples,
@@ -286,7 +295,8 @@ impl LightTable {
             samples.live |= 1 << lane;
             samples.alone |= 1 << lane;
             samples.density.0[lane] = 1.0;
-            let (direction, distance) = self.add_light(simd, frame, (points, lane), light, samples);
+            let (direction, distance) =
+                self.add_light(simd, &lights[light as usize], (points, lane), samples);
             samples.distance[lane] = distance;
             for axis in 0..3 {
                 samples.direction[axis].0[lane] = direction[axis];
@@ -314,9 +324,4 @@ impl Kinds {
         };
         *lanes |= 1 << lane;
     }
-}
-
-/// Order of primitives.
-fn key(primitive: PrimitiveId) -> (u32, u32) {
-    (primitive.item, primitive.triangle)
 }
