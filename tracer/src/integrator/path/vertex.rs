@@ -5,7 +5,6 @@ use super::super::stage::{Stage, Watch};
 use super::group::Group;
 use super::queue::Path;
 use crate::bsdf::scattering::{Evaluated, Scattering, Setting};
-use crate::light::SHADOW_T_MAX;
 use crate::light::table::LightScene;
 use crate::rays::{BLOCKS, PrimitiveId, Ray, RaySource, SurfaceSource};
 use crate::sampler::{Dimension, Vertex, pair};
@@ -14,6 +13,10 @@ use crate::simd::{
     Indices, LANES, Lanes, Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat, three,
 };
 use crate::surface::Materials;
+
+/// Upper end of shadow rays, as a share of the way to the light: far enough before a surface that emits for it to be no candidate of the
+/// filters of `intersect::block`.
+const BEFORE_LIGHT: f64 = 1.0 - 1.0 / (1 << 13) as f64;
 
 /// Bounces after which roulette begins.
 const ROULETTE_FROM: u32 = 3;
@@ -338,7 +341,7 @@ impl Group<'_> {
                     let direction = vector(&points, lane) + way - origin;
                     let margin =
                         2.0 * f64::from(self.surfaces.blocks[block].bias.0[lane]) / direction.length();
-                    (Ray { origin, direction }, SHADOW_T_MAX - margin)
+                    (Ray { origin, direction }, BEFORE_LIGHT - margin)
                 } else {
                     (Ray { origin, direction: vector(&to_light, lane) }, f64::INFINITY)
                 };
