@@ -67,4 +67,4 @@ pub use message::{FrameAnnounce, Hello, Reconnect, ToMaster, ToWorker, Welcome};
 pub use pixels::{Encoding, PixelFormat, PixelsHeader};
 
 /// Version of everything after the preamble. It grows with every change that an older peer would misread.
-pub const PROTOCOL_VERSION: u16 = 5;
+pub const PROTOCOL_VERSION: u16 = 6;

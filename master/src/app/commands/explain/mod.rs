@@ -21,7 +21,7 @@ use super::source::Source;
 use crate::app::cli::ExplainArgs;
 use crate::app::reports::{Knobs, print_json};
 use crate::error::CommandError;
-use crate::farm::{Assets, ViewRequest};
+use crate::farm::{Assets, ViewRequest, wire_format};
 use crate::measure::ray_bounds::RayBounds;
 
 /// Explanation of a scene; `--json` prints it as one line.
@@ -250,6 +250,7 @@ fn travel(source: &Source, view: &FrameView) -> Result<Travel, CommandError> {
         scene: assets.scene(),
         width: view.width,
         height: view.height,
+        format: wire_format(view.format),
         view: Bytes::from(bytes),
     });
     let envelope = announcement.to_envelope().map_err(CommandError::failed)?;
