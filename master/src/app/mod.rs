@@ -5,6 +5,7 @@ pub(crate) mod commands;
 pub(crate) mod control;
 pub(crate) mod logging;
 pub(crate) mod output;
-pub(crate) mod plan;
+pub(crate) mod picture;
+mod plan;
 pub(crate) mod progress;
 pub(crate) mod reports;

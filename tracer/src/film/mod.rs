@@ -20,8 +20,8 @@ use std::ops::Range;
 
 use crate::frame::PreparedFrame;
 use crate::image;
-use crate::simd;
 use crate::scene::{ColorDepth, FrameView, PixelFormat, Quality};
+use crate::simd;
 
 pub(crate) use development::Development;
 use dither::Dither;

@@ -153,7 +153,11 @@ mod tests {
         for level in all() {
             let here = dispatch!(level, simd => applied(simd, tone, &lanes));
             for channel in 0..3 {
-                assert_eq!(here[channel].0.map(f32::to_bits), first[channel].0.map(f32::to_bits), "{curve:?}");
+                assert_eq!(
+                    here[channel].0.map(f32::to_bits),
+                    first[channel].0.map(f32::to_bits),
+                    "{curve:?}"
+                );
             }
         }
         std::array::from_fn(|lane| [0, 1, 2].map(|channel| first[channel].0[lane]))

@@ -52,8 +52,7 @@ fn rendered(scene: &Scene, view: &FrameView) -> Vec<u8> {
 }
 
 fn floats(bytes: &[u8]) -> Vec<[f32; 3]> {
-    let numbers: Vec<f32> =
-        bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let numbers: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     numbers.as_chunks::<3>().0.to_vec()
 }
 
@@ -86,7 +85,8 @@ fn sums_develop_to_the_bytes_that_are_rendered() {
 /// Tiles with one and with several samples, and adaptive ones, write the light whose tone-mapped bytes they write otherwise.
 #[test]
 fn linear_pixels_are_the_light_of_the_encoded_ones() {
-    let scene = scene(Background::Gradient { bottom: Vec3::new(0.0, 0.1, 3.0), top: Vec3::new(1.2, 0.02, 0.0) });
+    let scene =
+        scene(Background::Gradient { bottom: Vec3::new(0.0, 0.1, 3.0), top: Vec3::new(1.2, 0.02, 0.0) });
     for (tone, quality) in TONES.into_iter().flat_map(|tone| qualities().map(|quality| (tone, quality))) {
         for (samples, adaptive) in [(1, false), (4, false), (9, true)] {
             let quality = Quality { adaptive, ..quality };

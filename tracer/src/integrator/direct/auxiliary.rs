@@ -56,7 +56,8 @@ fn shade_with<S: Simd, R: SurfaceSource>(
                 }
                 Shading::Depth => {
                     let relative = relative_distance(simd, rays, surface, block);
-                    let depth = if numbers { distance(simd, frame, relative) } else { nearness(simd, relative) };
+                    let depth =
+                        if numbers { distance(simd, frame, relative) } else { nearness(simd, relative) };
                     Vec3x16([depth; 3]).store(&mut shown);
                 }
                 Shading::Item if numbers => shown = item_numbers(&hits[block], surface.hit),
