@@ -20,8 +20,8 @@ pub fn planes_block(packer: &mut Packer, raw: &[u8], pixel: usize) -> Option<Vec
     packer.block(&planes)
 }
 
-/// Decompresses blocks of planes into `raw`, which they must fill exactly, as pixels of `pixel` bytes. `room` has the planes of a
-/// block for a while; it is as long as `raw`. Allocates nothing.
+/// Decompresses blocks of planes into `raw`, which they must fill exactly, as pixels of `pixel` bytes. `room` receives the planes of each
+/// block; it is as long as `raw`. Allocates nothing.
 ///
 /// # Errors
 /// Bytes that are no blocks, blocks of another total size, a block that ends within a pixel, or a block beyond `room`. The content

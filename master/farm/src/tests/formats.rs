@@ -108,7 +108,7 @@ async fn sums_beyond_a_message_are_leased_in_parts() {
     let mut farm = farm(SegmentPolicy::Static(1024)).await;
     let worker = fake_worker::start(farm.address(), Script::Correct).await;
     until_workers(&farm, 1).await;
-    let view = FrameView { width: 2048, height: 700, format: PixelFormat::Sums, ..view() };
+    let view = FrameView { width: 2048, height: 700, format: PixelFormat::Sums, ..paths() };
     assert!(view.format.bytes_of(view.width, view.height) > MAX_PIXELS_BYTES);
     farm.request(view);
     assert!(is_picture(&view, &finished(&mut farm).await.pixels));

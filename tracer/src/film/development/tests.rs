@@ -63,7 +63,7 @@ fn sums_of(light: [f32; 3], samples: u32) -> PixelSums {
     sums
 }
 
-/// All samples of a picture of one colour are that colour, whoever adds them up.
+/// All samples of a picture of one colour are that colour, on workers and on the master.
 #[test]
 fn sums_develop_to_the_bytes_that_are_rendered() {
     let light = [0.25, 1.75, 0.015625];

@@ -69,6 +69,11 @@ impl FrameFiles {
         self.plan.frames.len() as u64
     }
 
+    /// Pictures of the plan: frames and their auxiliary pictures.
+    pub(super) fn pictures(&self) -> u64 {
+        self.count() * (1 + self.aov.len() as u64)
+    }
+
     /// Accepts a picture of the plan: a frame, or the next auxiliary picture of the last one. Returns whether it is a frame.
     fn accept(&mut self, picture: SequenceFrame) -> Result<bool, CommandError> {
         let SequenceFrame { number, presented, slot } = picture;
@@ -171,7 +176,7 @@ impl FileDisplay<'_> {
         let Self { files, mut sequence, progress, interrupted, .. } = self;
         let mut tick = tokio::time::interval(STATUS_EVERY);
         let (mut arrived, mut frames) = (0, 0);
-        let pictures = files.count() * (1 + files.aov.len() as u64);
+        let pictures = files.pictures();
         while arrived < pictures || !files.unwritten.is_empty() {
             tokio::select! {
                 biased;

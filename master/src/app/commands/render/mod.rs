@@ -154,7 +154,7 @@ impl Run {
             farm.shut_down().await;
             return Err(error);
         }
-        farm.expect_frames(self.files.count());
+        farm.expect_frames(self.files.pictures());
         Ok(farm)
     }
 
