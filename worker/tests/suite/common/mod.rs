@@ -106,6 +106,7 @@ impl Stage {
             scene: AssetId::of(&self.body),
             width: self.view.width,
             height: self.view.height,
+            format: PixelFormat::Rgb8,
             view: codec::encode(&self.view(spin)).unwrap().into(),
         })
     }
@@ -113,7 +114,7 @@ impl Stage {
     /// Renders these rows in this process.
     pub(crate) fn expected(&self, spin: f64, rows: Range<u32>) -> Vec<u8> {
         let frame = PreparedFrame::new(Arc::clone(&self.compiled), &self.view(spin)).unwrap();
-        let mut out = vec![0; rows.len() * PixelFormat::SEGMENT.row_bytes(self.view.width)];
+        let mut out = vec![0; rows.len() * PixelFormat::Rgb8.row_bytes(self.view.width)];
         render_rows(&frame, rows, &mut out, &|| false).unwrap();
         out
     }
@@ -195,6 +196,7 @@ impl Link {
                     let expected = stage.expected(spin, header.lease.rows().unwrap());
                     match header.encoding {
                         Encoding::Raw => assert_eq!(bytes, expected),
+                        Encoding::PlanesLz4 => panic!("planes of RGB8"),
                         Encoding::Rgb565 | Encoding::Rgb565Lz4 => panic!("fewer colours were not requested"),
                         Encoding::Lz4 => {
                             let mut rows = vec![0; expected.len()];
