@@ -106,6 +106,7 @@ impl PreparedFrame {
     ) -> Result<Self, CompileError> {
         view.validate()?;
         go_on(cancelled)?;
+        let scene = scene.for_view(view);
         let source = scene.scene();
         let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
         let rays = CameraRays::new(view, 1.0 / to_eye.unit);

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use rayfarm_tracer::scene::Setting;
+use rayfarm_tracer::scene::{Integrator, Setting};
 use rayfarm_tracer::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, NumberRange};
 
 /// Words of a switch.
@@ -27,6 +27,12 @@ impl QualityArgs {
             value.apply(&mut setting);
         }
         setting
+    }
+
+    /// Options of knobs that have no effect with an integrator.
+    pub(crate) fn idle_with(&self, integrator: &Integrator) -> impl Iterator<Item = &'static str> {
+        let given = self.given.iter().map(|(knob, _)| *knob);
+        given.filter(move |knob| !knob.has_effect_with(integrator)).map(|knob| knob.option)
     }
 
     /// Whether the command line gives the knob of this name this value.
@@ -73,8 +79,7 @@ impl FromArgMatches for QualityArgs {
 fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
     let arg = Arg::new(knob.option).long(knob.option).value_name(value_name).help(help(knob.summary));
     let arg = match knob.form {
-        KnobForm::Count => arg.value_parser(move |text: &str| count(knob, text)),
-        KnobForm::Number(range) => arg.value_parser(move |text: &str| number(range, text)),
+        KnobForm::Count(range) | KnobForm::Number(range) => arg.value_parser(move |text: &str| number(range, text)),
         KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => {
             let words = PossibleValuesParser::new(words(knob));
             let known = move |text: String| knob.value(&text).map(GivenValue::Listed).ok_or("unknown word");
@@ -93,20 +98,11 @@ fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
 fn words(knob: &'static Knob) -> Vec<&'static str> {
     match knob.form {
         KnobForm::Switch => SWITCH.to_vec(),
-        KnobForm::Word | KnobForm::Fraction | KnobForm::Count | KnobForm::Number(_) => {
+        KnobForm::Word | KnobForm::Fraction | KnobForm::Count(_) | KnobForm::Number(_) => {
             let values = knob.values.iter().rev().chain(knob.apart);
             values.flat_map(|value| value.word.iter().chain(value.aliases).copied()).collect()
         }
     }
-}
-
-/// The value with this number, which may have leading zeros.
-fn count(knob: &'static Knob, text: &str) -> Result<GivenValue, String> {
-    let number = text.parse::<u32>().ok().map(|number| number.to_string());
-    number.and_then(|number| knob.value(&number)).map(GivenValue::Listed).ok_or_else(|| {
-        let numbers: Vec<&str> = knob.values.iter().filter_map(|value| value.word).collect();
-        format!("expected one of {}", numbers.join(", "))
-    })
 }
 
 /// A number of a range; whole ones may have leading zeros.
@@ -123,7 +119,7 @@ fn number(range: &'static NumberRange, text: &str) -> Result<GivenValue, String>
 fn value_name(knob: &Knob) -> String {
     match knob.form {
         KnobForm::Switch => SWITCH.join("|"),
-        KnobForm::Count => "N".to_owned(),
+        KnobForm::Count(_) => "N".to_owned(),
         KnobForm::Number(range) => if range.whole { "N" } else { "X" }.to_owned(),
         KnobForm::Word | KnobForm::Fraction => knob.words().collect::<Vec<_>>().join("|"),
     }

@@ -15,7 +15,7 @@ use rayfarm_tracer::simd_level;
 use super::interrupt::cancelled_by_signals;
 use super::runtime;
 use super::source::Source;
-use crate::app::cli::{QualityArgs, TradeoffArgs};
+use crate::app::cli::{LightArgs, QualityArgs, TradeoffArgs};
 use crate::app::output::check_writable;
 use crate::app::reports::print_json;
 use crate::error::CommandError;
@@ -55,7 +55,7 @@ fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
     let source = Source::load(scene, args.models, args.size)?;
-    let view = source.still_request(args.size, &QualityArgs::default())?.view;
+    let view = source.still_request(args.size, &LightArgs::default(), &QualityArgs::default())?.view;
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;
     let runtime = runtime()?;

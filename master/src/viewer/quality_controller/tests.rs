@@ -1,4 +1,4 @@
-use rayfarm_tracer::scene::{ExponentPrecision, FrameView, Quality, RenderScale, Setting, Shading};
+use rayfarm_tracer::scene::{ExponentPrecision, FrameView, Integrator, Quality, RenderScale, Setting, Shading};
 
 use super::*;
 use crate::test_scene;
@@ -101,6 +101,7 @@ fn no_knob_is_raised() {
     low.view.quality.exponent = ExponentPrecision::Fast;
     assert_eq!(low.at_most(&Setting::FULL), low);
     let lowest = Setting {
+        integrator: Integrator::Direct,
         samples: 1,
         scale: RenderScale::Half,
         quality: Quality {

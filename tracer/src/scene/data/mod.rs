@@ -61,6 +61,17 @@ pub struct Scene {
     pub triangles: Vec<Triangle>,
 }
 
+impl Scene {
+    /// The scene with its materials as the direct integrator shows them; `None` where all are shown as they are.
+    pub(crate) fn shown_directly(&self) -> Option<Self> {
+        let is_converted = |material: &Material| material.metallic_roughness.is_some();
+        self.materials.iter().any(is_converted).then(|| {
+            let materials = self.materials.iter().map(Material::shown_directly).collect();
+            Self { materials, ..self.clone() }
+        })
+    }
+}
+
 impl Default for Scene {
     /// A scene without any object or light, with a black background.
     fn default() -> Self {
