@@ -9,7 +9,7 @@ use std::time::Duration;
 use rayfarm_tracer::files::write_whole;
 use rayfarm_tracer::image::{self, RgbImage};
 use rayfarm_tracer::reference::Oracle;
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{FrameView, Integrator};
 use rayfarm_tracer::simd_level;
 
 use super::interrupt::cancelled_by_signals;
@@ -83,7 +83,10 @@ fn measure(
     steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
     let reference = context.reference(&|rows| steps.done(u64::from(rows)))?;
     folder.save(REFERENCE, &reference)?;
-    let reference_check = check(source, context, &reference_view, &reference, &steps)?;
+    // The oracle has direct light.
+    let reference_check = (reference_view.integrator == Integrator::Direct)
+        .then(|| check(source, context, &reference_view, &reference, &steps))
+        .transpose()?;
     let mut rows = compare(context, &settings, &reference, folder, &steps)?;
     for (row, times) in rows.iter_mut().zip(time(context, &settings, repeats, &steps)?) {
         (row.median_ms, row.min_ms) = summary(&times);

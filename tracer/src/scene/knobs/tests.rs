@@ -426,13 +426,14 @@ fn any_setting() -> impl Strategy<Value = Setting> {
     (any::<bool>(), picks).prop_map(|(paths, picks)| {
         let mut setting = Setting { integrator: integrator(paths), ..Setting::FULL };
         for (knob, (index, share, listed)) in KNOBS.iter().zip(picks) {
+            let listed = listed || (matches!(knob.form, KnobForm::Count(_)) && !paths);
             match knob.form {
                 KnobForm::Number(range) | KnobForm::Count(range) if !listed => {
                     let number = range.least + share * (range.most - range.least);
                     range.apply(if range.whole { number.round() } else { number }, &mut setting);
                 }
                 _ => {
-                    let all: Vec<_> = knob.all().collect();
+                    let all: Vec<_> = knob.values_with(setting.integrator).chain(knob.apart).collect();
                     index.get(&all).apply(&mut setting);
                 }
             }

@@ -202,8 +202,11 @@ mod tests {
 
     #[test]
     fn every_value_of_the_table_is_read_by_its_key() {
-        for knob in KNOBS {
-            for word in knob.words() {
+        for (knob, (name, integrator)) in
+            KNOBS.iter().flat_map(|knob| Integrator::WORDS.map(|named| (knob, named)))
+        {
+            let values = knob.values_with(integrator).chain(knob.apart);
+            for word in values.filter_map(|value| value.word) {
                 let written = match knob.form {
                     KnobForm::Switch => (word == "on").to_string(),
                     KnobForm::Word | KnobForm::Fraction => format!("\"{word}\""),
@@ -211,7 +214,9 @@ mod tests {
                 };
                 // With several samples, so that adaptive sampling is accepted.
                 let samples = if knob.key == "samples" { "" } else { "samples = 9\n" };
-                let settings = render(&format!("{samples}{} = {written}", knob.key)).unwrap();
+                let head = format!("integrator = \"{name}\"\n{samples}");
+                let settings = render(&format!("{head}{} = {written}", knob.key)).unwrap();
+                assert_eq!(settings.integrator.usual(), integrator);
                 assert!(knob.value(word).unwrap().is_of(&settings.setting()), "{} = {written}", knob.key);
             }
         }
@@ -221,6 +226,9 @@ mod tests {
     fn every_whole_number_of_a_range_is_read() {
         for knob in KNOBS {
             let KnobForm::Number(range) = knob.form else { continue };
+            if !range.whole {
+                continue;
+            }
             for number in range.whole_numbers() {
                 let settings = render(&format!("{} = {number}", knob.key)).unwrap();
                 assert_eq!(range.of(&settings.setting()), number as f32, "{}", knob.key);
