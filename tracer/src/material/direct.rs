@@ -12,7 +12,7 @@
 //! reflect    specular_factor mirror, with Fresnel shares, where nothing is metal or something is transmitted; else F0 mirror
 //! ```
 //!
-//! The lobe of Blinn and Phong with that exponent has the width of the GGX lobe at its peak (Walter et al. 2007), and that factor
+//! The Blinn-Phong lobe with that exponent has the width of the GGX lobe at its peak (Walter et al. 2007), and that factor
 //! gives it the same height. Sharper highlights than a peak of 1 allows keep their width and are darker. Transmitted light is sharp
 //! at any roughness. Textures of roughness and metal have no effect.
 
@@ -179,7 +179,7 @@ mod tests {
                 prop_assert!(color.to_array().iter().all(|c| (0.0..=1.0).contains(c)), "{shown:?}");
             }
             prop_assert!((1.0..=MAX_EXPONENT).contains(&shown.exponent));
-            // What is scattered and what is transmitted is no more than the base colour.
+            // What is scattered and what is transmitted is at most the base colour.
             prop_assert!((shown.diffuse + shown.transmit).cmple(base + 1e-6).all());
         }
     }

@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use rayfarm_tracer::scene::{Integrator, Setting};
 use rayfarm_tracer::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, NumberRange};
+use rayfarm_tracer::scene::{Integrator, Setting};
 
 /// Words of a switch.
 const SWITCH: [&str; 2] = ["on", "off"];
@@ -79,7 +79,9 @@ impl FromArgMatches for QualityArgs {
 fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
     let arg = Arg::new(knob.option).long(knob.option).value_name(value_name).help(help(knob.summary));
     let arg = match knob.form {
-        KnobForm::Count(range) | KnobForm::Number(range) => arg.value_parser(move |text: &str| number(range, text)),
+        KnobForm::Count(range) | KnobForm::Number(range) => {
+            arg.value_parser(move |text: &str| number(range, text))
+        }
         KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => {
             let words = PossibleValuesParser::new(words(knob));
             let known = move |text: String| knob.value(&text).map(GivenValue::Listed).ok_or("unknown word");

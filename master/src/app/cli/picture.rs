@@ -2,8 +2,8 @@
 
 use clap::Args;
 
-use super::{LightArgs, QualityArgs};
 use super::values::{Size, degrees, size};
+use super::{LightArgs, QualityArgs};
 
 /// Size, light, quality and animation; all but the animation override the scene file.
 #[derive(Clone, Debug, Args)]

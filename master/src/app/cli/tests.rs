@@ -2,8 +2,8 @@ use std::net::SocketAddr;
 
 use rayfarm_tracer::scene::knobs::KNOBS;
 use rayfarm_tracer::scene::{
-    ColorDepth, ExponentPrecision, Filter, FrameView, Integrator, PathSettings, Quality, RenderScale, Sampler,
-    Setting, Shading, ToneCurve, Up,
+    ColorDepth, ExponentPrecision, Filter, FrameView, Integrator, PathSettings, Quality, RenderScale,
+    Sampler, Setting, Shading, ToneCurve, Up,
 };
 
 use super::*;
@@ -330,7 +330,8 @@ fn knobs_are_parsed_and_override_the_scene() {
 #[test]
 fn options_of_light_override_the_scene() {
     let view = FrameView::default();
-    let light = |options: &str| render(&format!("rayfarm-master render a.toml -o b.png {options}")).picture.light;
+    let light =
+        |options: &str| render(&format!("rayfarm-master render a.toml -o b.png {options}")).picture.light;
     assert_eq!(light("").over(view), view);
     let all = "--integrator path --seed 7 --max-noise 0.02 --aperture 0.5 --focus-distance 3 --exposure -1.5 --tone agx";
     let shown = light(all).over(view);
@@ -361,8 +362,7 @@ fn options_of_light_without_effect_are_named() {
         of_light.chain(picture.quality.idle_with(&view.integrator)).collect()
     };
     let paths = "--seed 1 --max-noise 0.1 --aperture 1 --focus-distance 2 --sampler sobol --roulette off --clamp-indirect 10";
-    let named =
-        ["seed", "max-noise", "aperture", "focus-distance", "sampler", "roulette", "clamp-indirect"];
+    let named = ["seed", "max-noise", "aperture", "focus-distance", "sampler", "roulette", "clamp-indirect"];
     assert_eq!(idle(paths), named);
     assert_eq!(idle(&format!("--integrator path {paths}")), [""; 0]);
     assert_eq!(idle("--integrator path --focus-distance 2"), ["focus-distance"]);
@@ -375,8 +375,7 @@ fn options_of_light_without_effect_are_named() {
 #[test]
 fn every_word_of_the_table_is_a_value_of_its_option() {
     for (knob, (_, integrator)) in KNOBS.iter().flat_map(|knob| Integrator::WORDS.map(|word| (knob, word))) {
-        let usual =
-            Setting { integrator, samples: 4, scale: RenderScale::Full, quality: Quality::default() };
+        let usual = Setting { integrator, samples: 4, scale: RenderScale::Full, quality: Quality::default() };
         for word in knob.words() {
             let line = format!("rayfarm-master render a.toml -o b.png --{}={word}", knob.option);
             let found = render(&line).picture.quality.over(usual);

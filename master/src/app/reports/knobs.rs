@@ -63,7 +63,8 @@ fn fraction(text: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use rayfarm_tracer::scene::{
-        ColorDepth, ExponentPrecision, Filter, Integrator, PathSettings, Quality, RenderScale, RenderSettings, Shading,
+        ColorDepth, ExponentPrecision, Filter, Integrator, PathSettings, Quality, RenderScale,
+        RenderSettings, Shading,
     };
 
     use super::*;

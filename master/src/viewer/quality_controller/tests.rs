@@ -1,4 +1,6 @@
-use rayfarm_tracer::scene::{ExponentPrecision, FrameView, Integrator, Quality, RenderScale, Setting, Shading};
+use rayfarm_tracer::scene::{
+    ExponentPrecision, FrameView, Integrator, Quality, RenderScale, Setting, Shading,
+};
 
 use super::*;
 use crate::test_scene;

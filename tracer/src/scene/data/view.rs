@@ -285,12 +285,8 @@ mod tests {
     #[test]
     fn settings_round_trip() {
         let integrator = Integrator::Path(PathSettings { roulette: false, ..PathSettings::DEFAULT });
-        let settings = RenderSettings {
-            samples: 9,
-            scale: RenderScale::Third,
-            integrator,
-            ..RenderSettings::default()
-        };
+        let settings =
+            RenderSettings { samples: 9, scale: RenderScale::Third, integrator, ..RenderSettings::default() };
         assert_eq!(RenderSettings::default().with_setting(settings.setting()), settings);
         let setting =
             Setting { quality: Quality { adaptive: true, ..Quality::default() }, ..settings.setting() };

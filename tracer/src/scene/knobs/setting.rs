@@ -98,8 +98,7 @@ impl Setting {
 
     /// Short names of all values that reduce the accuracy, in the order of the table.
     pub fn reductions(&self) -> Vec<Cow<'static, str>> {
-        let acting =
-            KNOBS.iter().filter(|knob| knob.has_effect_with(&self.integrator) && (knob.acts)(self));
+        let acting = KNOBS.iter().filter(|knob| knob.has_effect_with(&self.integrator) && (knob.acts)(self));
         acting.filter_map(|knob| knob.reduction(self)).collect()
     }
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 
-use super::*;
 use super::number::Order;
+use super::*;
 use crate::scene::data::{PathSettings, RenderSettings, Sampler};
 use crate::scene::validate::{
     MAX_CLAMP, MAX_DEPTH, MAX_PATH_SAMPLES, MAX_SAMPLES, MAX_SHADOW_SAMPLES, is_sample_count,
@@ -200,7 +200,7 @@ fn a_limit_changes_no_integrator() {
     let limit = Setting { integrator: Integrator::Path(cheapest), ..Setting::FULL };
     assert_eq!(direct.at_most(&limit), direct);
     assert_eq!(paths.at_most(&Setting::FULL), paths);
-    // Neither the seed nor the goal is a knob, and roulette reduces nothing.
+    // Neither the random seed nor the goal is a knob, and roulette reduces nothing.
     let limited = PathSettings { roulette: true, seed: 0, max_noise: 0.0, ..cheapest };
     assert_eq!(paths.at_most(&limit), Setting { integrator: Integrator::Path(limited), ..paths });
     let own = Setting { integrator: Integrator::Path(cheapest), ..paths };

@@ -87,11 +87,7 @@ impl Kind {
 }
 
 /// Reads the camera of a scene that is rendered by `integrator`.
-pub(super) fn camera(
-    table: Table<'_>,
-    integrator: &Integrator,
-    reading: &mut Reading,
-) -> Read<CameraText> {
+pub(super) fn camera(table: Table<'_>, integrator: &Integrator, reading: &mut Reading) -> Read<CameraText> {
     let word = table.read("kind", |kind| kind.word(&Kind::WORDS))?.unwrap_or(Kind::Pinhole);
     let position = table.required("position")?.vector()?;
     let up = table.read("up", |value| value.direction())?.unwrap_or(DVec3::Y);
@@ -112,9 +108,8 @@ pub(super) fn camera(
 }
 
 fn lens(table: Table<'_>) -> Read<Lens> {
-    let aperture = |value: Value<'_>| {
-        value.number("from 0 to 1e30", |radius| (0.0..=MAX_COORDINATE).contains(&radius))
-    };
+    let aperture =
+        |value: Value<'_>| value.number("from 0 to 1e30", |radius| (0.0..=MAX_COORDINATE).contains(&radius));
     Ok(Lens {
         aperture: table.read("aperture", aperture)?.unwrap_or(0.0),
         focus_distance: table.read("focus_distance", |value| value.positive())?,

@@ -1,9 +1,9 @@
 //! The knobs of `[render]`, read by a loop over the table of knobs.
 
+use super::Reading;
 use super::fault::{Fault, Read};
 use super::table::Table;
 use super::value::Value;
-use super::Reading;
 use crate::scene::data::{Integrator, RenderScale, Setting};
 use crate::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, KnobValue, NumberRange, Shading};
 use crate::scene::validate::is_sample_count;

@@ -285,8 +285,7 @@ fn check_render(render: &RenderSettings) -> Check {
 fn check_integrator(integrator: &Integrator, samples: u32) -> Check {
     let counted = is_sample_count(integrator, samples);
     let Integrator::Path(settings) = integrator else {
-        let expected =
-            "a square number from 1 to 256: 1, 4, 9, 16, ... (with the path integrator any number up to 65536)";
+        let expected = "a square number from 1 to 256: 1, 4, 9, 16, ... (with the path integrator any number up to 65536)";
         return require(counted, || "samples".into(), expected);
     };
     require(counted, || "samples".into(), "from 1 to 65536")?;

@@ -283,7 +283,10 @@ fn samples_are_counted_by_the_integrator() {
 fn numbers_of_paths_lenses_and_tone_are_bounded() {
     type Spoil = fn(&mut Scene);
     let cases: [(Spoil, &str); 11] = [
-        (|s| s.render.integrator = paths(|p| p.clamp_indirect = -1.0), "clamp_indirect must be from 0 to 1e6"),
+        (
+            |s| s.render.integrator = paths(|p| p.clamp_indirect = -1.0),
+            "clamp_indirect must be from 0 to 1e6",
+        ),
         (|s| s.render.integrator = paths(|p| p.clamp_indirect = f32::NAN), "clamp_indirect"),
         (|s| s.render.integrator = paths(|p| p.max_noise = 1.5), "max_noise must be from 0 to 1"),
         (|s| s.render.integrator = paths(|p| p.max_noise = f32::NAN), "max_noise"),
