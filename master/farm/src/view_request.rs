@@ -22,7 +22,7 @@ impl From<FrameView> for ViewRequest {
 }
 
 impl ViewRequest {
-    /// Sample count, scale and knobs.
+    /// Integrator, sample count, scale and knobs.
     pub fn setting(&self) -> Setting {
         self.view.setting(self.scale)
     }
@@ -30,8 +30,8 @@ impl ViewRequest {
     /// The request with upper limits of its knobs. No knob is raised.
     #[must_use]
     pub fn at_most(&self, limit: &Setting) -> Self {
-        let Setting { samples, scale, quality } = self.setting().at_most(limit);
-        Self { view: FrameView { samples, quality, ..self.view }, scale }
+        let setting = self.setting().at_most(limit);
+        Self { view: self.view.with_setting(&setting), scale: setting.scale }
     }
 
     /// The view that the farm renders.

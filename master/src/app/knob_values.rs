@@ -11,8 +11,7 @@ pub(crate) const SWITCH: [&str; 2] = ["on", "off"];
 /// The values that were expected.
 pub(crate) fn parse(knob: &'static Knob, text: &str) -> Result<GivenValue, String> {
     match knob.form {
-        KnobForm::Count => count(knob, text),
-        KnobForm::Number(range) => number(range, text),
+        KnobForm::Count(range) | KnobForm::Number(range) => number(range, text),
         KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => {
             let words = words(knob);
             let value = words.contains(&text).then(|| knob.value(text)).flatten();
@@ -26,20 +25,11 @@ pub(crate) fn parse(knob: &'static Knob, text: &str) -> Result<GivenValue, Strin
 pub(crate) fn words(knob: &'static Knob) -> Vec<&'static str> {
     match knob.form {
         KnobForm::Switch => SWITCH.to_vec(),
-        KnobForm::Word | KnobForm::Fraction | KnobForm::Count | KnobForm::Number(_) => {
+        KnobForm::Word | KnobForm::Fraction | KnobForm::Count(_) | KnobForm::Number(_) => {
             let values = knob.values.iter().rev().chain(knob.apart);
             values.flat_map(|value| value.word.iter().chain(value.aliases).copied()).collect()
         }
     }
-}
-
-/// The value with this number, which may have leading zeros.
-fn count(knob: &'static Knob, text: &str) -> Result<GivenValue, String> {
-    let number = text.parse::<u32>().ok().map(|number| number.to_string());
-    number.and_then(|number| knob.value(&number)).map(GivenValue::Listed).ok_or_else(|| {
-        let numbers: Vec<&str> = knob.values.iter().filter_map(|value| value.word).collect();
-        format!("expected one of {}", numbers.join(", "))
-    })
 }
 
 /// A number of a range; whole ones may have leading zeros.

@@ -2,7 +2,6 @@
 
 use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::knobs::{GivenValue, Knob};
-use rayfarm_tracer::scene::{FrameView, Setting};
 
 /// A knob and the value that it is to have.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +17,7 @@ impl KnobChange {
     pub(super) fn applied(&self, request: ViewRequest) -> ViewRequest {
         let mut setting = request.setting();
         self.value.apply(&mut setting);
-        let Setting { samples, scale, quality } = setting;
-        ViewRequest { view: FrameView { samples, quality, ..request.view }, scale }
+        ViewRequest { view: request.view.with_setting(&setting), scale: setting.scale }
     }
 }
 

@@ -136,7 +136,7 @@ fn documented_option(knob: &Knob) -> String {
     match (knob.form, knob.best().word) {
         (KnobForm::Switch, Some("off")) => format!("`--{option}[=on|off]`"),
         (KnobForm::Switch, _) => format!("`--{option} on|off`"),
-        (KnobForm::Count, _) => format!("`--{option} N`"),
+        (KnobForm::Count(_), _) => format!("`--{option} N`"),
         (KnobForm::Number(range), _) => format!("`--{option} {}`", if range.whole { "N" } else { "X" }),
         (KnobForm::Word | KnobForm::Fraction, _) => format!("`--{option} {words}`"),
     }
@@ -149,7 +149,7 @@ fn documented_key(knob: &Knob) -> String {
         (_, None) => format!("`{key}`"),
         (KnobForm::Switch, Some(word)) => format!("`{key} = {}`", word == "on"),
         (KnobForm::Word, Some(word)) => format!("`{key} = \"{word}\"`"),
-        (KnobForm::Count | KnobForm::Fraction | KnobForm::Number(_), Some(word)) => {
+        (KnobForm::Count(_) | KnobForm::Fraction | KnobForm::Number(_), Some(word)) => {
             format!("`{key} = {word}`")
         }
     }

@@ -11,14 +11,14 @@ mod bounds;
 mod items;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use crate::bvh::{self, BuildQuality};
 use crate::cancel::{Cancelled, IsCancelled, go_on, never};
 use crate::mesh::{CompiledMesh, MeshId};
-use crate::scene::{Material, Model, NormalMode, Scene, SceneFeatures, TextureMap, ValidateError};
+use crate::scene::{FrameView, Material, Model, NormalMode, Scene, SceneFeatures, TextureMap, ValidateError};
 use crate::texture::{Texture, TextureId};
 pub(crate) use attributes::AttributeUse;
 use attributes::{attribute_uses, uses_uvs};
@@ -66,7 +66,7 @@ pub enum CompileError {
 }
 
 /// A scene with its meshes, its textures and the shape of the tree over its items: immutable, shared between threads.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct CompiledScene {
     scene: Scene,
     /// One per model.
@@ -79,6 +79,8 @@ pub struct CompiledScene {
     tree: bvh::WideTree,
     bounds: Option<(DVec3, DVec3)>,
     features: SceneFeatures,
+    /// The scene as the direct integrator shows it, where that differs; made by its first frame.
+    shown_directly: OnceLock<Option<Arc<CompiledScene>>>,
 }
 
 impl CompiledScene {
@@ -122,7 +124,21 @@ impl CompiledScene {
         let bounds = boxes.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default, cancelled)?;
         let features = SceneFeatures::of(&scene);
-        Ok(Self { scene, meshes, attributes, textures, tree, bounds, features })
+        let shown_directly = OnceLock::new();
+        Ok(Self { scene, meshes, attributes, textures, tree, bounds, features, shown_directly })
+    }
+
+    /// The scene for the frames of a view: with its materials as the direct integrator shows them, if it is the one.
+    pub(crate) fn for_view(self: Arc<Self>, view: &FrameView) -> Arc<Self> {
+        if !self.features.metallic_roughness || !view.shows_materials_directly() {
+            return self;
+        }
+        let with_materials = |scene: Scene| {
+            let features = SceneFeatures::of(&scene);
+            Arc::new(Self { scene, features, shown_directly: OnceLock::new(), ..Self::clone(&self) })
+        };
+        let shown = self.shown_directly.get_or_init(|| self.scene.shown_directly().map(with_materials));
+        shown.clone().unwrap_or(self)
     }
 
     /// The scene as plain data.

@@ -30,7 +30,7 @@ use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, trans
 use crate::light::EyeLight;
 use crate::light::table::LightTable;
 use crate::rotation::sin_cos_degrees;
-use crate::scene::{Background, Camera, Filter, FrameView, Light, Quality, Scene, SceneFeatures, TextureMap};
+use crate::scene::{Background, Camera, Filter, FrameView, Light, Scene, SceneFeatures, TextureMap};
 use crate::shape::{EyeDisk, EyePlane, EyeSphere};
 use crate::simd::{self, Level};
 use crate::texture::Texture;
@@ -116,6 +116,7 @@ impl PreparedFrame {
     ) -> Result<Self, CompileError> {
         view.validate()?;
         go_on(cancelled)?;
+        let scene = scene.for_view(view);
         let source = scene.scene();
         let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
         let rays = CameraRays::new(view, 1.0 / to_eye.unit);
@@ -147,7 +148,7 @@ impl PreparedFrame {
             disks,
             planes,
             coarsest,
-            lights: lights(source, &view.quality, &to_eye),
+            lights: lights(&scene, view, &to_eye),
             few: None,
             light_table: None,
             seen_background: seen_background(source),
@@ -292,14 +293,19 @@ fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
     libm::exp2(f64::from(exponent))
 }
 
-fn lights(scene: &Scene, quality: &Quality, to_eye: &ToEye) -> Vec<EyeLight> {
+fn lights(scene: &CompiledScene, view: &FrameView, to_eye: &ToEye) -> Vec<EyeLight> {
+    let (source, quality) = (scene.scene(), &view.quality);
+    let shines = scene.features().emissive || matches!(source.background, Background::Sky(_));
+    if source.has_default_light && shines && view.integrator.path().is_some() {
+        return Vec::new();
+    }
     let cast = |light: &Light| Light {
         shadows: light.shadows && quality.shadows,
         shadow_samples: light.shadow_samples.or(Some(quality.shadow_samples)),
         ..*light
     };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
-    scene.lights.iter().map(place).collect()
+    source.lights.iter().map(place).collect()
 }
 
 fn seen_background(scene: &Scene) -> Background {

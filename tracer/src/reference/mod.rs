@@ -92,7 +92,8 @@ impl Oracle {
         let trilinear = scene.textures.iter().any(|map| filter_of(map) == Filter::Trilinear);
         let pyramids =
             textures.iter().filter(|_| trilinear).map(|texture| pyramid::levels(texture)).collect();
-        let (scene, textures) = (scene.clone(), textures.to_vec());
+        let shown = scene.shown_directly().filter(|_| view.shows_materials_directly());
+        let (scene, textures) = (shown.unwrap_or_else(|| scene.clone()), textures.to_vec());
         Self { scene, view: *view, textures, primitives, light_points: Vec::new(), pyramids, size }
     }
 

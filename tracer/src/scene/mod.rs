@@ -27,9 +27,9 @@ pub use knobs::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setting, Sh
 #[cfg(feature = "import")]
 pub use load::{LoadLimits, LoadedScene, compile_model, compile_model_with, load, load_limited, load_with};
 pub use validate::{
-    MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_IOR, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS,
-    MAX_NORMAL_STRENGTH, MAX_PLANES, MAX_SAMPLES, MAX_SHADOW_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES,
-    MAX_TRIANGLES, ValidateError,
+    MAX_CLAMP, MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_EXPOSURE, MAX_IOR, MAX_LIGHT, MAX_LIGHTS,
+    MAX_MATERIALS, MAX_MODELS, MAX_NORMAL_STRENGTH, MAX_PATH_SAMPLES, MAX_PLANES, MAX_SAMPLES,
+    MAX_SHADOW_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, ValidateError,
 };
 
 pub(crate) use crate::material::is_squared;

@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
-use rayfarm_tracer::scene::Setting;
 use rayfarm_tracer::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm};
+use rayfarm_tracer::scene::{Integrator, Setting};
 
 use crate::app::knob_values;
 
@@ -26,6 +26,12 @@ impl QualityArgs {
             value.apply(&mut setting);
         }
         setting
+    }
+
+    /// Options of knobs that have no effect with an integrator.
+    pub(crate) fn idle_with(&self, integrator: &Integrator) -> impl Iterator<Item = &'static str> {
+        let given = self.given.iter().map(|(knob, _)| *knob);
+        given.filter(move |knob| !knob.has_effect_with(integrator)).map(|knob| knob.option)
     }
 
     /// Whether the command line gives the knob of this name this value.
@@ -72,7 +78,7 @@ impl FromArgMatches for QualityArgs {
 fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
     let arg = Arg::new(knob.option).long(knob.option).value_name(value_name).help(help(knob.summary));
     let arg = match knob.form {
-        KnobForm::Count | KnobForm::Number(_) => {
+        KnobForm::Count(_) | KnobForm::Number(_) => {
             arg.value_parser(move |text: &str| knob_values::parse(knob, text))
         }
         KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => {
@@ -92,7 +98,7 @@ fn option(knob: &'static Knob, value_name: &'static str) -> Arg {
 fn value_name(knob: &Knob) -> String {
     match knob.form {
         KnobForm::Switch => knob_values::SWITCH.join("|"),
-        KnobForm::Count => "N".to_owned(),
+        KnobForm::Count(_) => "N".to_owned(),
         KnobForm::Number(range) => if range.whole { "N" } else { "X" }.to_owned(),
         KnobForm::Word | KnobForm::Fraction => knob.words().collect::<Vec<_>>().join("|"),
     }

@@ -18,6 +18,7 @@ use values::{frame_count, frame_index, ray_count, size, thread_count, worker_cou
 mod aov;
 mod farm;
 mod knobs;
+mod light;
 mod models;
 mod picture;
 mod plot;
@@ -30,6 +31,7 @@ mod values;
 pub(crate) use aov::Aov;
 pub(crate) use farm::FarmArgs;
 pub(crate) use knobs::QualityArgs;
+pub(crate) use light::LightArgs;
 pub(crate) use models::ModelArgs;
 pub(crate) use picture::PictureArgs;
 pub(crate) use plot::PlotArgs;
@@ -253,6 +255,8 @@ pub(crate) struct ExplainArgs {
     /// Picture size in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<Size>,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
     #[command(flatten)]
     pub(crate) quality: QualityArgs,
     /// Print one line of JSON on standard output.

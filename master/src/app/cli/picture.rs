@@ -1,16 +1,18 @@
-//! Options of the picture: size, quality and animation.
+//! Options of the picture: size, light, quality and animation.
 
 use clap::Args;
 
-use super::QualityArgs;
 use super::values::{Size, degrees, size};
+use super::{LightArgs, QualityArgs};
 
-/// Size, quality and animation; size and quality override the scene file.
+/// Size, light, quality and animation; all but the animation override the scene file.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PictureArgs {
     /// Picture size in pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<Size>,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
     #[command(flatten)]
     pub(crate) quality: QualityArgs,
     /// Orbit the camera about its look-at point by this angle over all frames.

@@ -3,7 +3,8 @@ use std::net::SocketAddr;
 use rayfarm_farm::SegmentPolicy;
 use rayfarm_tracer::scene::knobs::KNOBS;
 use rayfarm_tracer::scene::{
-    ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, Setting, Shading, Up,
+    ColorDepth, ExponentPrecision, Filter, FrameView, Integrator, PathSettings, Quality, RenderScale,
+    Sampler, Setting, Shading, ToneCurve, Up,
 };
 
 use super::*;
@@ -187,9 +188,17 @@ fn wrong_use_is_status_2_and_says_what_was_expected() {
         ("rayfarm-master --size 800", "1024x768"),
         ("rayfarm-master --size 800x", "1024x768"),
         ("rayfarm-master --size 16385x1", "16384"),
-        ("rayfarm-master --samples 0", "expected one of 1, 4, 9"),
-        ("rayfarm-master --samples 2", "expected one of 1, 4, 9"),
-        ("rayfarm-master --samples 4294967296", "225, 256"),
+        ("rayfarm-master --samples 0", "expected a whole number from 1 to 65536"),
+        ("rayfarm-master --samples 65537", "expected a whole number from 1 to 65536"),
+        ("rayfarm-master --samples 4294967296", "expected a whole number from 1 to 65536"),
+        ("rayfarm-master --integrator paths", "possible values: direct, path"),
+        ("rayfarm-master --tone filmic", "possible values: srgb, agx, aces, neutral"),
+        ("rayfarm-master --seed 4294967296", "--seed"),
+        ("rayfarm-master --max-noise 1.5", "from 0 to 1"),
+        ("rayfarm-master --max-noise nan", "from 0 to 1"),
+        ("rayfarm-master --exposure 65", "expected stops from -64 to 64"),
+        ("rayfarm-master --aperture=-1", "expected a radius from 0"),
+        ("rayfarm-master --focus-distance 0", "expected a distance above 0"),
         ("rayfarm-master --frames 0", "from 1"),
         ("rayfarm-master --threads 0", "from 1"),
         ("rayfarm-master --local-workers -1", "-1"),
@@ -259,8 +268,10 @@ fn a_run_has_a_timeline_and_control() {
 fn knobs_are_parsed_and_override_the_scene() {
     let all = "--samples 9 --adaptive --shadows off --shading diffuse --filter nearest --exponent fast --colors reduced --scale 3/4 \
                --dither --max-depth 7 --min-contribution 0.02 --shadow-samples 5 --smooth-terminator off";
-    let full = Setting { samples: 4, scale: RenderScale::Full, quality: Quality::default() };
+    let integrator = Integrator::Direct;
+    let full = Setting { integrator, samples: 4, scale: RenderScale::Full, quality: Quality::default() };
     let reduced = Setting {
+        integrator,
         samples: 9,
         scale: RenderScale::ThreeQuarters,
         quality: Quality {
@@ -306,6 +317,9 @@ fn knobs_are_parsed_and_override_the_scene() {
         ("--shadow-samples 0", "expected a whole number from 1 to 1024"),
         ("--shadow-samples 1025", "expected a whole number from 1 to 1024"),
         ("--smooth-terminator", "a value is required"),
+        ("--sampler random", "sobol, independent"),
+        ("--roulette", "a value is required"),
+        ("--clamp-indirect=-1", "expected a number from 0 to 1000000"),
         ("--shading normal", "diffuse, normals, depth, item, albedo"),
     ] {
         let message = refused(&format!("rayfarm-master bench a.toml {wrong}"));
@@ -314,9 +328,54 @@ fn knobs_are_parsed_and_override_the_scene() {
 }
 
 #[test]
+fn options_of_light_override_the_scene() {
+    let view = FrameView::default();
+    let light =
+        |options: &str| render(&format!("rayfarm-master render a.toml -o b.png {options}")).picture.light;
+    assert_eq!(light("").over(view), view);
+    let all = "--integrator path --seed 7 --max-noise 0.02 --aperture 0.5 --focus-distance 3 --exposure -1.5 --tone agx";
+    let shown = light(all).over(view);
+    let settings = PathSettings { seed: 7, max_noise: 0.02, ..PathSettings::DEFAULT };
+    assert_eq!(shown.integrator, Integrator::Path(settings));
+    assert_eq!((shown.lens.aperture, shown.lens.focus_distance), (0.5, Some(3.0)));
+    assert_eq!((shown.tone.exposure, shown.tone.curve), (-1.5, ToneCurve::Agx));
+    assert_eq!((shown.samples, shown.quality.max_depth), (64, 8), "the defaults of the path integrator");
+    assert_eq!(shown.validate(), Ok(()));
+    // Settings of the scene's own paths remain.
+    let independent = PathSettings { sampler: Sampler::Independent, seed: 3, ..settings };
+    let own = FrameView { samples: 10, integrator: Integrator::Path(independent), ..shown };
+    assert_eq!(light("--integrator path").over(own), own);
+    let back = light("--integrator direct").over(FrameView { samples: 64, ..own });
+    assert_eq!((back.integrator, back.samples, back.quality.max_depth), (Integrator::Direct, 1, 5));
+    let kept = FrameView { quality: Quality { max_depth: 3, ..view.quality }, samples: 9, ..view };
+    let kept = light("--integrator path").over(kept);
+    assert_eq!((kept.samples, kept.quality.max_depth), (9, 3));
+}
+
+#[test]
+fn options_of_light_without_effect_are_named() {
+    let view = FrameView::default();
+    let idle = |options: &str| -> Vec<&str> {
+        let picture = render(&format!("rayfarm-master render a.toml -o b.png {options}")).picture;
+        let view = picture.light.over(view);
+        let of_light = picture.light.idle_on(&view).into_iter().map(|(option, _)| option);
+        of_light.chain(picture.quality.idle_with(&view.integrator)).collect()
+    };
+    let paths = "--seed 1 --max-noise 0.1 --aperture 1 --focus-distance 2 --sampler sobol --roulette off --clamp-indirect 10";
+    let named = ["seed", "max-noise", "aperture", "focus-distance", "sampler", "roulette", "clamp-indirect"];
+    assert_eq!(idle(paths), named);
+    assert_eq!(idle(&format!("--integrator path {paths}")), [""; 0]);
+    assert_eq!(idle("--integrator path --focus-distance 2"), ["focus-distance"]);
+    let direct = "--adaptive --shadows off --exponent fast --min-contribution 0.1 --samples 4 --max-depth 3";
+    assert_eq!(idle(direct), [""; 0]);
+    let named = ["adaptive", "shadows", "min-contribution", "exponent"];
+    assert_eq!(idle(&format!("--integrator path {direct}")), named);
+}
+
+#[test]
 fn every_word_of_the_table_is_a_value_of_its_option() {
-    let usual = Setting { samples: 4, scale: RenderScale::Full, quality: Quality::default() };
-    for knob in KNOBS {
+    for (knob, (_, integrator)) in KNOBS.iter().flat_map(|knob| Integrator::WORDS.map(|word| (knob, word))) {
+        let usual = Setting { integrator, samples: 4, scale: RenderScale::Full, quality: Quality::default() };
         for word in knob.words() {
             let line = format!("rayfarm-master render a.toml -o b.png --{}={word}", knob.option);
             let found = render(&line).picture.quality.over(usual);

@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayfarm_protocol::address;
 use rayfarm_tracer::image::MAX_SIDE;
+use rayfarm_tracer::scene::{MAX_COORDINATE, MAX_EXPOSURE};
 
 const MAX_FRAMES: u32 = 10_000_000;
 const MAX_LOCAL_WORKERS: u32 = 64;
@@ -74,6 +75,32 @@ pub(super) fn frame_rate(text: &str) -> Result<f64, String> {
 pub(super) fn error_limit(text: &str) -> Result<f64, String> {
     let in_range = text.parse().ok().filter(|error| (0.0..=1.0).contains(error));
     in_range.ok_or_else(|| "expected a mean FLIP error from 0 to 1, such as 0.05".to_owned())
+}
+
+/// A relative error of a pixel.
+pub(super) fn noise(text: &str) -> Result<f32, String> {
+    let in_range = text.parse().ok().filter(|error| (0.0..=1.0).contains(error));
+    in_range.ok_or_else(|| "expected a relative error from 0 to 1, such as 0.02".to_owned())
+}
+
+/// An exposure in stops.
+pub(super) fn exposure(text: &str) -> Result<f32, String> {
+    let in_range = text.parse().ok().filter(|stops| (-MAX_EXPOSURE..=MAX_EXPOSURE).contains(stops));
+    in_range.ok_or_else(|| {
+        format!("expected stops from -{MAX_EXPOSURE} to {MAX_EXPOSURE}, such as 1 for twice the light")
+    })
+}
+
+/// A length, from 0.
+pub(super) fn radius(text: &str) -> Result<f64, String> {
+    let in_range = text.parse().ok().filter(|radius| (0.0..=MAX_COORDINATE).contains(radius));
+    in_range.ok_or_else(|| "expected a radius from 0 to 1e30, such as 0.05".to_owned())
+}
+
+/// A length above 0.
+pub(super) fn distance(text: &str) -> Result<f64, String> {
+    let in_range = text.parse().ok().filter(|distance| *distance > 0.0 && *distance <= MAX_COORDINATE);
+    in_range.ok_or_else(|| "expected a distance above 0 and up to 1e30, such as 4.5".to_owned())
 }
 
 /// A finite angle.

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{self, FrameView, LoadedScene, Scene, Setting};
+use rayfarm_tracer::scene::{self, FrameView, Integrator, LoadedScene, Scene};
 use rayfarm_tracer::texture::Texture;
 
-use crate::app::cli::{ModelArgs, PictureArgs, QualityArgs, Size};
+use crate::app::cli::{LightArgs, ModelArgs, PictureArgs, QualityArgs, Size};
 use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
 
@@ -54,7 +54,7 @@ impl Source {
     /// # Errors
     /// A combination that cannot be rendered.
     pub(super) fn request(&self, picture: &PictureArgs) -> Result<ViewRequest, CommandError> {
-        self.still_request(picture.size, &picture.quality)
+        self.still_request(picture.size, &picture.light, &picture.quality)
     }
 
     /// Request of a picture without animation.
@@ -64,21 +64,24 @@ impl Source {
     pub(super) fn still_request(
         &self,
         size: Option<Size>,
+        light: &LightArgs,
         options: &QualityArgs,
     ) -> Result<ViewRequest, CommandError> {
-        let mut view = FrameView::of(&self.scene);
+        let mut view = light.over(FrameView::of(&self.scene));
         if let Some(size) = size {
             (view.width, view.height) = (size.width, size.height);
         }
-        let Setting { samples, scale, quality } = options.over(self.scene.render.setting());
-        (view.samples, view.quality) = (samples, quality);
+        let setting = options.over(view.setting(self.scene.render.scale));
+        let view = view.with_setting(&setting);
         view.validate().map_err(CommandError::wrong_input)?;
-        if options.selects("adaptive", "on") && samples == 1 {
+        warn_about_idle_options(&view, light, options);
+        let is_direct = view.integrator == Integrator::Direct;
+        if is_direct && options.selects("adaptive", "on") && view.samples == 1 {
             let message = "--adaptive omits samples, but there is only one per pixel: \
                            request more with --samples 4, 9, 16, ..., or leave --adaptive out";
             return Err(CommandError::WrongInput(message.into()));
         }
-        Ok(ViewRequest { view, scale })
+        Ok(ViewRequest { view, scale: setting.scale })
     }
 
     /// Compiles the scene for the tracer.
@@ -88,6 +91,18 @@ impl Source {
     pub(super) fn compiled(&self) -> Result<CompiledScene, CommandError> {
         let (meshes, textures) = (self.meshes.iter().cloned(), self.textures.iter().cloned());
         CompiledScene::new(self.scene.clone(), meshes, textures).map_err(CommandError::wrong_input)
+    }
+}
+
+/// Warns about options that have no effect on a view.
+fn warn_about_idle_options(view: &FrameView, light: &LightArgs, knobs: &QualityArgs) {
+    let reason = match view.integrator {
+        Integrator::Direct => "with the direct integrator",
+        Integrator::Path(_) => "with the path integrator",
+    };
+    let of_knobs = knobs.idle_with(&view.integrator).map(|option| (option, reason));
+    for (option, reason) in light.idle_on(view).into_iter().chain(of_knobs) {
+        tracing::warn!("--{option} has no effect {reason}");
     }
 }
 

@@ -9,13 +9,13 @@ use std::time::Duration;
 use rayfarm_tracer::files::write_whole;
 use rayfarm_tracer::image::{self, RgbImage};
 use rayfarm_tracer::reference::Oracle;
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{FrameView, Integrator};
 use rayfarm_tracer::simd_level;
 
 use super::interrupt::cancelled_by_signals;
 use super::runtime;
 use super::source::Source;
-use crate::app::cli::{QualityArgs, TradeoffArgs};
+use crate::app::cli::{LightArgs, QualityArgs, TradeoffArgs};
 use crate::app::output::check_writable;
 use crate::app::reports::print_json;
 use crate::error::CommandError;
@@ -55,7 +55,7 @@ fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
     let source = Source::load(scene, args.models, args.size)?;
-    let view = source.still_request(args.size, &QualityArgs::default())?.view;
+    let view = source.still_request(args.size, &LightArgs::default(), &QualityArgs::default())?.view;
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;
     let runtime = runtime()?;
@@ -83,7 +83,10 @@ fn measure(
     steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
     let reference = context.reference(&|rows| steps.done(u64::from(rows)))?;
     folder.save(REFERENCE, &reference)?;
-    let reference_check = check(source, context, &reference_view, &reference, &steps)?;
+    // The oracle has direct light.
+    let reference_check = (reference_view.integrator == Integrator::Direct)
+        .then(|| check(source, context, &reference_view, &reference, &steps))
+        .transpose()?;
     let mut rows = compare(context, &settings, &reference, folder, &steps)?;
     for (row, times) in rows.iter_mut().zip(time(context, &settings, repeats, &steps)?) {
         (row.median_ms, row.min_ms) = summary(&times);

@@ -1,7 +1,7 @@
 //! Values of the knobs in reports.
 
 use rayfarm_tracer::scene::Setting;
-use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobForm};
+use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobForm, KnobScope};
 use serde::{Serialize, Serializer};
 
 /// Value of each knob except the number of samples, which reports have on its own. Serialises to a map by knob.
@@ -29,6 +29,11 @@ impl Knobs {
         Self(setting)
     }
 
+    /// Whether the integrator has a knob. Knobs of the direct integrator are always reported.
+    fn has(&self, knob: &Knob) -> bool {
+        knob.scope != KnobScope::Paths || knob.has_effect_with(&self.0.integrator)
+    }
+
     fn value(&self, knob: &Knob) -> Option<ReportedValue> {
         let word = knob.value_of(&self.0).word;
         match knob.form {
@@ -37,14 +42,15 @@ impl Knobs {
             KnobForm::Word => Some(ReportedValue::Word(word)),
             KnobForm::Number(range) if range.whole => Some(ReportedValue::Whole(range.of(&self.0) as u32)),
             KnobForm::Number(range) => Some(ReportedValue::Number(range.of(&self.0))),
-            KnobForm::Count => None,
+            KnobForm::Count(_) => None,
         }
     }
 }
 
 impl Serialize for Knobs {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(KNOBS.iter().filter_map(|knob| Some((knob.name, self.value(knob)?))))
+        let knobs = KNOBS.iter().filter(|knob| self.has(knob));
+        serializer.collect_map(knobs.filter_map(|knob| Some((knob.name, self.value(knob)?))))
     }
 }
 
@@ -57,7 +63,8 @@ fn fraction(text: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use rayfarm_tracer::scene::{
-        ColorDepth, ExponentPrecision, Filter, Quality, RenderScale, RenderSettings, Shading,
+        ColorDepth, ExponentPrecision, Filter, Integrator, PathSettings, Quality, RenderScale,
+        RenderSettings, Shading,
     };
 
     use super::*;
@@ -93,7 +100,7 @@ mod tests {
             smooth_terminator: false,
         };
         assert_eq!(
-            json(Setting { samples: 4, scale: RenderScale::Half, quality }),
+            json(Setting { integrator: Integrator::Direct, samples: 4, scale: RenderScale::Half, quality }),
             concat!(
                 r#"{"scale":0.5,"adaptive":true,"shadows":false,"shadow_samples":5,"terminator":false,"shading":"diffuse","depth":7,"#,
                 r#""min_contribution":0.05,"filter":"nearest","exponent":"fast","colors":"reduced","dither":true}"#
@@ -106,6 +113,17 @@ mod tests {
         let quality = Quality { shading: Shading::Normals, ..Quality::default() };
         let setting = Setting { quality, ..RenderSettings::default().setting() };
         assert!(json(setting).contains(r#""shading":"normals""#));
+    }
+
+    #[test]
+    fn knobs_of_paths_are_reported_where_paths_are_traced() {
+        let usual = Integrator::Path(PathSettings::DEFAULT);
+        let report = json(RenderSettings::with_integrator(usual).setting());
+        let of_paths = r#""sampler":"sobol","roulette":true,"clamp_indirect":0.0"#;
+        assert!(report.contains(of_paths) && report.contains(r#""depth":8"#), "{report}");
+        let clamped = PathSettings { clamp_indirect: 2.5, roulette: false, ..PathSettings::DEFAULT };
+        let report = json(RenderSettings::with_integrator(Integrator::Path(clamped)).setting());
+        assert!(report.contains(r#""roulette":false,"clamp_indirect":2.5"#), "{report}");
     }
 
     #[test]

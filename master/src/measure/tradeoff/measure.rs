@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_tracer::image::{self, FlipMap, PIXELS_PER_DEGREE, RgbImage};
-use rayfarm_tracer::scene::{FrameView, MAX_SAMPLES};
+use rayfarm_tracer::scene::{FrameView, Integrator, MAX_SAMPLES};
 use rayfarm_tracer::{CompiledScene, PreparedFrame};
 
 use super::setting::MeasuredSetting;
@@ -12,6 +12,9 @@ use super::table::Row;
 use crate::error::CommandError;
 use crate::in_process::trace;
 use crate::quantile::{percentile, round_to_us};
+
+/// Paths per pixel of the reference: 32 times those of the best measured setting.
+const REFERENCE_PATHS: u32 = 4096;
 
 /// A scene with the view and the threads that it is measured with.
 pub(crate) struct MeasureContext<'a> {
@@ -36,9 +39,13 @@ pub(crate) struct Compared {
 }
 
 impl MeasureContext<'_> {
-    /// View of the reference: full quality with the largest number of samples.
+    /// View of the reference: full quality with the largest number of samples, or [`REFERENCE_PATHS`].
     pub(crate) fn reference_view(&self) -> FrameView {
-        FrameView { samples: MAX_SAMPLES, ..MeasuredSetting::plain().applied_to(&self.view).view }
+        let samples = match self.view.integrator {
+            Integrator::Direct => MAX_SAMPLES,
+            Integrator::Path(_) => REFERENCE_PATHS,
+        };
+        FrameView { samples, ..MeasuredSetting::plain().applied_to(&self.view).view }
     }
 
     /// Renders the reference picture. `done` receives the number of rows that were rendered since the last call.

@@ -18,22 +18,31 @@ pub(crate) struct Report {
     pub(crate) repeats: u32,
     /// Samples per pixel of the reference.
     pub(crate) reference_samples: u32,
-    /// Check of the reference.
-    pub(crate) reference_check: ReferenceCheck,
+    /// Check of the reference, with the direct integrator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) reference_check: Option<ReferenceCheck>,
     /// Settings on the front, from the fastest to the best.
     pub(crate) front: Vec<String>,
+}
+
+/// The sentence about the check of the reference.
+fn checked(check: &ReferenceCheck) -> String {
+    let ReferenceCheck { pixels, max_error, above_one_step } = check;
+    format!(
+        " {pixels} pixels of that reference were checked against the oracle in double precision: \
+         {above_one_step} differ by more than a step of 1/255; the largest difference is {max_error}."
+    )
 }
 
 /// The page in Markdown: method, then a line for each setting, the fastest first. Settings on the front are bold.
 pub(crate) fn markdown(report: &Report) -> String {
     let Table { scene, width, height, threads, simd_level, rows } = &report.table;
-    let ReferenceCheck { pixels, max_error, above_one_step } = report.reference_check;
+    let check = report.reference_check.as_ref().map_or_else(String::new, checked);
     let mut text = format!(
         "# Speed against accuracy: {scene}\n\n\
          {width} x {height} pixels, {threads} render thread{}, {simd_level}, rayfarm {}. Times are milliseconds per frame in one process, {} each, \
          settings in turn.\n\n\
-         Errors are against full quality with {} samples a pixel. {pixels} pixels of that reference were checked against the oracle in double precision: \
-         {above_one_step} differ by more than a step of 1/255; the largest difference is {max_error}.\n\n\
+         Errors are against full quality with {} samples a pixel.{check}\n\n\
          ![time against error](front.png)\n\n\
          | setting | ms, median | ms, least | largest error | RMSE | PSNR, dB | SSIM | FLIP, mean |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
@@ -137,7 +146,13 @@ mod tests {
         };
         let front = table.front().into_iter().map(|index| table.rows[index].setting.clone()).collect();
         let reference_check = ReferenceCheck { pixels: 12, max_error: 1, above_one_step: 0 };
-        Report { table, repeats: 7, reference_samples: 256, reference_check, front }
+        Report { table, repeats: 7, reference_samples: 256, reference_check: Some(reference_check), front }
+    }
+
+    #[test]
+    fn a_reference_of_paths_has_no_check() {
+        let text = markdown(&Report { reference_check: None, ..report() });
+        assert!(text.contains("with 256 samples a pixel.\n\n") && !text.contains("oracle"), "{text}");
     }
 
     #[test]

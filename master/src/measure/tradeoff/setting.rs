@@ -1,12 +1,12 @@
 //! Measured settings: combinations of knobs, named by the slugs of the table of knobs.
 
 use rayfarm_farm::ViewRequest;
-use rayfarm_tracer::scene::knobs::{KNOBS, KnobValue};
-use rayfarm_tracer::scene::{FrameView, RenderScale, SceneFeatures, Setting};
+use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobValue};
+use rayfarm_tracer::scene::{FrameView, Integrator, PathSettings, RenderScale, SceneFeatures, Setting};
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.
-const NAMES: [&str; 49] = [
+const NAMES: [&str; 62] = [
     PLAIN,
     "fast-exponent",
     "diffuse",
@@ -56,17 +56,33 @@ const NAMES: [&str; 49] = [
     "samples-9+adaptive",
     "samples-16",
     "samples-16+adaptive",
+    "depth-5",
+    "independent",
+    "no-roulette",
+    "clamp-10",
+    "clamp-1",
+    "samples-2",
+    "samples-8",
+    "samples-32",
+    "samples-32+independent",
+    "samples-32+no-roulette",
+    "samples-32+clamp-10",
+    "samples-32+depth-3",
+    "samples-128",
 ];
 
 /// Name of the setting without changed knobs: one sample per pixel, full quality.
 const PLAIN: &str = "samples-1";
 
 /// A setting with its name in tables.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct MeasuredSetting {
     /// Name of lower-case letters, digits, `-` and `+`, so that it can be a file name.
     pub(crate) name: &'static str,
-    setting: Setting,
+    /// Upper limits of the knobs of both integrators.
+    limit: Setting,
+    /// The value of a knob that reduces nothing, which no limit changes.
+    switched: Option<&'static KnobValue>,
 }
 
 impl MeasuredSetting {
@@ -75,8 +91,11 @@ impl MeasuredSetting {
     pub(crate) fn applicable(features: &SceneFeatures, view: &FrameView) -> Vec<Self> {
         let features = features.shown_by(view.quality.shading);
         let mut found: Vec<Self> = Vec::new();
-        for measured in all().filter(|measured| measured.setting.without_idle(&features) == measured.setting)
-        {
+        let changes_picture = |measured: &Self| {
+            let limit = measured.limit_of(view);
+            limit.without_idle(&features) == limit && has_listed_samples(&limit)
+        };
+        for measured in all().filter(changes_picture) {
             let request = measured.applied_to(view);
             if !found.iter().any(|other| other.applied_to(view) == request) {
                 found.push(measured);
@@ -87,7 +106,14 @@ impl MeasuredSetting {
 
     /// The setting without changed knobs.
     pub(crate) fn plain() -> Self {
-        Self { name: PLAIN, setting: Setting { samples: 1, ..Setting::FULL } }
+        let paths = Integrator::Path(PathSettings::DEFAULT);
+        let limit = Setting { samples: 1, ..Setting::full_with(paths) };
+        Self { name: PLAIN, limit, switched: None }
+    }
+
+    /// The limits of the knobs of a view's integrator.
+    fn limit_of(&self, view: &FrameView) -> Setting {
+        Setting { integrator: self.limit.integrator.changed_to(view.integrator), ..self.limit }
     }
 
     /// The setting of a name, as in tables.
@@ -99,8 +125,11 @@ impl MeasuredSetting {
     /// dither, which loses nothing, the kind of a picture without light, and numbers such as the depth, which the setting lowers.
     pub(crate) fn applied_to(&self, view: &FrameView) -> ViewRequest {
         let full = view.setting(RenderScale::Full).restored();
-        let Setting { samples, scale, quality } = full.at_most(&self.setting);
-        ViewRequest { view: FrameView { samples, quality, ..*view }, scale }
+        let mut setting = full.at_most(&self.limit);
+        if let Some(value) = self.switched {
+            value.apply(&mut setting);
+        }
+        ViewRequest { view: view.with_setting(&setting), scale: setting.scale }
     }
 }
 
@@ -113,20 +142,32 @@ fn all() -> impl Iterator<Item = MeasuredSetting> {
 fn parsed(name: &'static str) -> Option<MeasuredSetting> {
     let mut measured = MeasuredSetting { name, ..MeasuredSetting::plain() };
     for slug in name.split('+') {
-        value_with(slug)?.apply(&mut measured.setting);
+        let (knob, value) = value_with(slug)?;
+        if knob.reduces {
+            value.apply(&mut measured.limit);
+        } else {
+            measured.switched = Some(value);
+        }
     }
     Some(measured)
 }
 
-fn value_with(slug: &str) -> Option<&'static KnobValue> {
-    KNOBS.iter().flat_map(|knob| knob.values).find(|value| value.slug == Some(slug))
+fn value_with(slug: &str) -> Option<(&'static Knob, &'static KnobValue)> {
+    let values = KNOBS.iter().flat_map(|knob| knob.values.iter().map(move |value| (knob, value)));
+    values.into_iter().find(|(_, value)| value.slug == Some(slug))
+}
+
+/// Whether the integrator of a setting is measured with its number of samples.
+fn has_listed_samples(setting: &Setting) -> bool {
+    let samples = Knob::named("samples");
+    samples.is_some_and(|knob| knob.values_with(setting.integrator).any(|value| value.is_of(setting)))
 }
 
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 
-    use rayfarm_tracer::scene::{Quality, Shading};
+    use rayfarm_tracer::scene::{Quality, Sampler, Shading};
 
     use super::*;
 
@@ -147,6 +188,7 @@ mod tests {
         soft_shadows: false,
         checkered: false,
         normal_mapped: false,
+        metallic_roughness: false,
     };
     const EVERYTHING: SceneFeatures = SceneFeatures {
         specular: true,
@@ -177,17 +219,40 @@ mod tests {
     #[test]
     fn every_knob_that_reduces_accuracy_is_measured() {
         for knob in KNOBS.iter().filter(|knob| knob.reduces) {
-            let plain = knob.value_of(&MeasuredSetting::plain().setting);
-            let is_changed = |measured: MeasuredSetting| !plain.is_of(&measured.setting);
+            let plain = knob.value_of(&MeasuredSetting::plain().limit);
+            let is_changed = |measured: MeasuredSetting| !plain.is_of(&measured.limit);
             assert!(all().any(is_changed), "no measured setting changes {}", knob.name);
         }
     }
 
+    /// The view of the tests, rendered by paths.
+    fn path_view() -> FrameView {
+        let paths = Integrator::Path(PathSettings { seed: 5, ..PathSettings::DEFAULT });
+        let quality = Quality { max_depth: 8, ..Quality::default() };
+        FrameView { integrator: paths, quality, ..rayfarm_farm::testing::test_scene::view() }
+    }
+
     #[test]
-    fn a_scene_with_all_features_has_all_settings() {
+    fn a_scene_with_all_features_has_all_settings_of_both_integrators() {
         let view = rayfarm_farm::testing::test_scene::view();
-        assert_eq!(MeasuredSetting::applicable(&EVERYTHING, &view).len(), NAMES.len());
-        assert!(MeasuredSetting::applicable(&NOTHING, &view).contains(&MeasuredSetting::plain()));
+        let names = |view: &FrameView| -> BTreeSet<&str> {
+            MeasuredSetting::applicable(&EVERYTHING, view).iter().map(|setting| setting.name).collect()
+        };
+        let (direct, paths) = (names(&view), names(&path_view()));
+        assert_eq!(&direct | &paths, NAMES.into());
+        let of_both = &direct & &paths;
+        for name in ["adaptive", "shadow", "terminator", "exponent", "contribution", "diffuse", "samples-9"] {
+            assert!(!paths.iter().any(|found| found.contains(name)), "{name}: {paths:?}");
+        }
+        for name in ["independent", "roulette", "clamp", "samples-2", "samples-8", "samples-128", "depth-5"] {
+            assert!(!direct.iter().any(|found| found.contains(name)), "{name}: {direct:?}");
+            assert!(paths.iter().any(|found| found.contains(name)), "{name}: {paths:?}");
+        }
+        for name in [PLAIN, "samples-16", "scale-1-2", "reduced-colors", "depth-1", "nearest"] {
+            assert!(of_both.contains(name), "{name}: {of_both:?}");
+        }
+        let bare = MeasuredSetting::applicable(&NOTHING, &view);
+        assert!(bare.iter().any(|setting| setting.name == PLAIN));
     }
 
     #[test]
@@ -213,12 +278,34 @@ mod tests {
         let view = rayfarm_farm::testing::test_scene::view();
         let turned =
             FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
-        let pictures: Vec<ViewRequest> = all().map(|setting| setting.applied_to(&turned)).collect();
-        for (index, picture) in pictures.iter().enumerate() {
-            assert!(picture.rendered().validate().is_ok() && picture.view.camera == view.camera);
-            assert!(!pictures[..index].contains(picture), "{}", NAMES[index]);
+        for turned in [turned, FrameView { samples: 25, ..path_view() }] {
+            let settings = MeasuredSetting::applicable(&EVERYTHING, &turned);
+            let pictures: Vec<ViewRequest> =
+                settings.iter().map(|setting| setting.applied_to(&turned)).collect();
+            for (index, picture) in pictures.iter().enumerate() {
+                assert_eq!(picture.rendered().validate(), Ok(()), "{}", settings[index].name);
+                assert_eq!(picture.view.camera, view.camera);
+                assert!(!pictures[..index].contains(picture), "{}", settings[index].name);
+            }
+            let quality = Quality { shadows: true, ..turned.quality };
+            let plain = FrameView { samples: 1, quality, ..turned };
+            assert_eq!(pictures[0].view, plain, "knobs of the view are reset");
         }
-        assert_eq!(pictures[0].view, FrameView { samples: 1, ..view }, "knobs of the view are reset");
+    }
+
+    #[test]
+    fn settings_of_paths_change_what_their_names_say() {
+        let view = path_view();
+        let paths = |name| {
+            let request = MeasuredSetting::named(name).unwrap().applied_to(&view);
+            (request.view.samples, *request.view.integrator.path().unwrap())
+        };
+        let own = *view.integrator.path().unwrap();
+        assert_eq!(paths(PLAIN), (1, own));
+        assert_eq!(paths("samples-32+no-roulette"), (32, PathSettings { roulette: false, ..own }));
+        assert_eq!(paths("clamp-10"), (1, PathSettings { clamp_indirect: 10.0, ..own }));
+        let independent = PathSettings { sampler: Sampler::Independent, ..own };
+        assert_eq!(paths("samples-32+independent"), (32, independent));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobValue};
-use rayfarm_tracer::scene::{Scene, SceneFeatures, Setting};
+use rayfarm_tracer::scene::{Integrator, Scene, SceneFeatures, Setting};
 
 use super::ladder::{Ladder, Origin, Rung};
 use super::wire::bytes;
@@ -54,15 +54,16 @@ const ADAPTIVE_LOSS: f64 = 0.0011;
 /// General ladder for pictures of a scene.
 pub(crate) fn ladder(scene: &Scene, wanted: &ViewRequest) -> Ladder {
     let features = SceneFeatures::of(scene);
-    let settings = settings(wanted.view.samples).into_iter();
+    let settings = settings(wanted.view.integrator, wanted.view.samples).into_iter();
     Ladder::of(settings.map(|setting| rung(setting.without_idle(&features), wanted)), Origin::General)
 }
 
 /// All combinations of values whose effects are known, with at most `samples` rays per pixel.
-fn settings(samples: u32) -> Vec<Setting> {
-    KNOBS.iter().fold(vec![Setting::FULL], |settings, knob| {
+fn settings(integrator: Integrator, samples: u32) -> Vec<Setting> {
+    let knobs = KNOBS.iter().filter(|knob| knob.has_effect_with(&integrator));
+    knobs.fold(vec![Setting::full_with(integrator)], |settings, knob| {
         let values: Vec<&KnobValue> =
-            knob.values.iter().rev().filter(|value| is_known(knob, value)).collect();
+            knob.values_with(integrator).rev().filter(|value| is_known(knob, value)).collect();
         let combined = settings.iter().flat_map(|setting| values.iter().map(|value| with(value, *setting)));
         combined.filter(|setting| setting.samples <= samples).collect()
     })

@@ -1,5 +1,7 @@
 use rayfarm_farm::testing::test_scene;
-use rayfarm_tracer::scene::{ExponentPrecision, FrameView, Quality, RenderScale, Setting, Shading};
+use rayfarm_tracer::scene::{
+    ExponentPrecision, FrameView, Integrator, Quality, RenderScale, Setting, Shading,
+};
 
 use super::*;
 
@@ -101,6 +103,7 @@ fn no_knob_is_raised() {
     low.view.quality.exponent = ExponentPrecision::Fast;
     assert_eq!(low.at_most(&Setting::FULL), low);
     let lowest = Setting {
+        integrator: Integrator::Direct,
         samples: 1,
         scale: RenderScale::Half,
         quality: Quality {

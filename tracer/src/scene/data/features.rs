@@ -39,6 +39,8 @@ pub struct SceneFeatures {
     pub checkered: bool,
     /// A material has a normal map.
     pub normal_mapped: bool,
+    /// A material is metallic-roughness.
+    pub metallic_roughness: bool,
 }
 
 impl SceneFeatures {
@@ -65,6 +67,7 @@ impl SceneFeatures {
             soft_shadows: scene.lights.iter().any(|light| light.shadows && light.radius > 0.0),
             checkered: any(|material| material.checker.is_some()),
             normal_mapped: any(|material| material.normal_map.is_some()),
+            metallic_roughness: any(|material| material.metallic_roughness.is_some()),
         }
     }
 
@@ -127,6 +130,7 @@ mod tests {
         Attenuation, Background, Camera, ExponentPrecision, Light, LightKind, RenderSettings, Sphere,
     };
     use super::*;
+    use crate::material::MetallicRoughness;
 
     fn scene(material: Material, assigned: bool) -> Scene {
         let sphere = Sphere {
@@ -182,6 +186,21 @@ mod tests {
     }
 
     #[test]
+    fn metallic_roughness_counts_where_it_is_assigned() {
+        let model = MetallicRoughness {
+            metallic: 1.0,
+            roughness: 0.5,
+            transmission: 0.0,
+            specular_factor: 1.0,
+            texture: None,
+        };
+        let metal = Material { metallic_roughness: Some(model), ..Material::NEUTRAL };
+        assert!(SceneFeatures::of(&scene(metal, true)).metallic_roughness);
+        assert!(!SceneFeatures::of(&scene(metal, false)).metallic_roughness);
+        assert!(!SceneFeatures::of(&scene(Material::NEUTRAL, true)).metallic_roughness);
+    }
+
+    #[test]
     fn quality_removes_features() {
         let features = SceneFeatures::of(&scene(Material { exponent: 0.5, ..Material::NEUTRAL }, true));
         let quality = Quality { shading: Shading::Diffuse, shadows: false, ..Quality::default() };
@@ -210,6 +229,7 @@ mod tests {
             soft_shadows: true,
             checkered: true,
             normal_mapped: true,
+            metallic_roughness: true,
         };
         let at = |shading| everything.at(&Quality { shading, ..Quality::default() });
         assert_eq!(at(Shading::Full), everything);

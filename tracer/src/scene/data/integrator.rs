@@ -12,7 +12,52 @@ pub enum Integrator {
     Path(PathSettings),
 }
 
+/// Default depths: see [`super::Quality::max_depth`].
+const DIRECT_DEPTH: u8 = 5;
+const PATH_DEPTH: u8 = 8;
+/// Default numbers of rays per pixel.
+const DIRECT_SAMPLES: u32 = 1;
+const PATH_SAMPLES: u32 = 64;
+
 impl Integrator {
+    /// Each value with its word, the path integrator with its default settings.
+    pub const WORDS: [(&'static str, Self); 2] =
+        [("direct", Self::Direct), ("path", Self::Path(PathSettings::DEFAULT))];
+
+    /// The integrator with its default settings.
+    #[must_use]
+    pub fn usual(&self) -> Self {
+        match self {
+            Self::Direct => Self::Direct,
+            Self::Path(_) => Self::Path(PathSettings::DEFAULT),
+        }
+    }
+
+    /// The default of [`super::Quality::max_depth`] with this integrator.
+    pub fn usual_depth(&self) -> u8 {
+        match self {
+            Self::Direct => DIRECT_DEPTH,
+            Self::Path(_) => PATH_DEPTH,
+        }
+    }
+
+    /// The default number of rays per pixel with this integrator.
+    pub fn usual_samples(&self) -> u32 {
+        match self {
+            Self::Direct => DIRECT_SAMPLES,
+            Self::Path(_) => PATH_SAMPLES,
+        }
+    }
+
+    /// The other integrator; itself, with its settings, if the other one is of the same kind.
+    #[must_use]
+    pub fn changed_to(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Path(_), Self::Path(_)) => self,
+            _ => other,
+        }
+    }
+
     /// The settings of the path integrator, if it is the one.
     pub fn path(&self) -> Option<&PathSettings> {
         match self {
@@ -38,9 +83,15 @@ pub struct PathSettings {
     pub max_noise: f32,
 }
 
+impl PathSettings {
+    /// The default settings.
+    pub const DEFAULT: Self =
+        Self { seed: 0, sampler: Sampler::Sobol, roulette: true, clamp_indirect: 0.0, max_noise: 0.0 };
+}
+
 impl Default for PathSettings {
     fn default() -> Self {
-        Self { seed: 0, sampler: Sampler::Sobol, roulette: true, clamp_indirect: 0.0, max_noise: 0.0 }
+        Self::DEFAULT
     }
 }
 

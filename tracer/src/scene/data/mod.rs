@@ -45,6 +45,8 @@ pub struct Scene {
     pub background_visible: bool,
     /// Lights; never empty after loading (a scene without one gets the default light).
     pub lights: Vec<Light>,
+    /// Whether the lights are the default one. Paths leave it out in scenes that emit light or have a sky.
+    pub has_default_light: bool,
     /// Materials; the range of every material index of the scene.
     pub materials: Vec<Material>,
     /// Textures; the range of every texture index of the materials.
@@ -61,6 +63,17 @@ pub struct Scene {
     pub triangles: Vec<Triangle>,
 }
 
+impl Scene {
+    /// The scene with its materials as the direct integrator shows them; `None` where all are shown as they are.
+    pub(crate) fn shown_directly(&self) -> Option<Self> {
+        let is_converted = |material: &Material| material.metallic_roughness.is_some();
+        self.materials.iter().any(is_converted).then(|| {
+            let materials = self.materials.iter().map(Material::shown_directly).collect();
+            Self { materials, ..self.clone() }
+        })
+    }
+}
+
 impl Default for Scene {
     /// A scene without any object or light, with a black background.
     fn default() -> Self {
@@ -72,6 +85,7 @@ impl Default for Scene {
             background: Background::Color(Vec3::ZERO),
             background_visible: true,
             lights: Vec::new(),
+            has_default_light: false,
             materials: Vec::new(),
             textures: Vec::new(),
             models: Vec::new(),

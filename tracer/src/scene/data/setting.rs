@@ -1,11 +1,13 @@
 //! The full description of how faithfully a picture is rendered.
 
-use super::{Quality, RenderScale};
+use super::{Integrator, Quality, RenderScale};
 
-/// Sample count, scale and quality knobs of a picture.
+/// Integrator, sample count, scale and quality knobs of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// Rays per pixel, a square number.
+    /// How light is computed. As a limit it changes no integrator to another one, only settings of the path integrator.
+    pub integrator: Integrator,
+    /// Rays per pixel: with direct light a square number; any number of paths.
     pub samples: u32,
     /// Share of width and height that is rendered.
     pub scale: RenderScale,

@@ -39,15 +39,23 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
-    /// Sample count, scale and knobs.
+    /// The default settings with an integrator.
+    pub fn with_integrator(integrator: Integrator) -> Self {
+        let usual = Self::default();
+        let quality = Quality { max_depth: integrator.usual_depth(), ..usual.quality };
+        Self { integrator, samples: integrator.usual_samples(), quality, ..usual }
+    }
+
+    /// Integrator, sample count, scale and knobs.
     pub fn setting(&self) -> Setting {
-        Setting { samples: self.samples, scale: self.scale, quality: self.quality }
+        let Self { integrator, samples, scale, quality, .. } = *self;
+        Setting { integrator, samples, scale, quality }
     }
 
     /// The same with another setting.
     #[must_use]
-    pub fn with_setting(self, Setting { samples, scale, quality }: Setting) -> Self {
-        Self { samples, scale, quality, ..self }
+    pub fn with_setting(self, Setting { integrator, samples, scale, quality }: Setting) -> Self {
+        Self { integrator, samples, scale, quality, ..self }
     }
 }
 
@@ -206,6 +214,11 @@ impl FrameView {
         self.quality.adaptive && self.samples > 1 && self.integrator == Integrator::Direct
     }
 
+    /// Whether materials are shown as by [`crate::material::Material::shown_directly`]: by the direct integrator, in pictures of light.
+    pub(crate) fn shows_materials_directly(&self) -> bool {
+        self.integrator == Integrator::Direct && self.quality.shading.is_light()
+    }
+
     /// The frame that the scene requests, at full scale.
     pub fn of(scene: &Scene) -> Self {
         let RenderSettings { width, height, integrator, samples, quality, tone, .. } = scene.render;
@@ -224,22 +237,49 @@ impl FrameView {
         }
     }
 
-    /// Sample count and knobs, with the scale at which the view is rendered.
+    /// Integrator, sample count and knobs, with the scale at which the view is rendered.
     pub fn setting(&self, scale: RenderScale) -> Setting {
-        Setting { samples: self.samples, scale, quality: self.quality }
+        Setting { integrator: self.integrator, samples: self.samples, scale, quality: self.quality }
     }
 
-    /// The view as it is rendered at a setting: its sample count and knobs, and the size at its scale.
+    /// The view with the integrator, the sample count and the knobs of a setting, in its own size.
+    #[must_use]
+    pub fn with_setting(&self, setting: &Setting) -> Self {
+        let Setting { integrator, samples, quality, .. } = *setting;
+        Self { integrator, samples, quality, ..*self }
+    }
+
+    /// The view as it is rendered at a setting: [`FrameView::with_setting`], and the size at its scale.
     #[must_use]
     pub fn at(&self, setting: &Setting) -> Self {
-        let Setting { samples, scale, quality } = *setting;
-        Self { width: scale.of(self.width), height: scale.of(self.height), samples, quality, ..*self }
+        let (width, height) = (setting.scale.of(self.width), setting.scale.of(self.height));
+        Self { width, height, ..self.with_setting(setting) }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::PathSettings;
     use super::*;
+
+    #[test]
+    fn each_integrator_has_its_usual_depth_and_samples() {
+        for ((_, integrator), numbers) in Integrator::WORDS.into_iter().zip([(5, 1), (8, 64)]) {
+            let usual = RenderSettings::with_integrator(integrator);
+            assert_eq!(usual.integrator, integrator);
+            assert_eq!((usual.quality.max_depth, usual.samples), numbers);
+        }
+        assert_eq!(RenderSettings::with_integrator(Integrator::Direct), RenderSettings::default());
+    }
+
+    #[test]
+    fn an_integrator_keeps_its_settings_unless_its_kind_changes() {
+        let [(_, direct), (_, paths)] = Integrator::WORDS;
+        let seeded = Integrator::Path(PathSettings { seed: 7, ..PathSettings::DEFAULT });
+        assert_eq!(seeded.changed_to(paths), seeded);
+        assert_eq!(direct.changed_to(paths), paths);
+        assert_eq!(seeded.changed_to(direct), direct);
+    }
 
     const CAMERA: Camera = Camera {
         position: DVec3::Z,
@@ -252,7 +292,9 @@ mod tests {
 
     #[test]
     fn settings_round_trip() {
-        let settings = RenderSettings { samples: 9, scale: RenderScale::Third, ..RenderSettings::default() };
+        let integrator = Integrator::Path(PathSettings { roulette: false, ..PathSettings::DEFAULT });
+        let settings =
+            RenderSettings { samples: 9, scale: RenderScale::Third, integrator, ..RenderSettings::default() };
         assert_eq!(RenderSettings::default().with_setting(settings.setting()), settings);
         let setting =
             Setting { quality: Quality { adaptive: true, ..Quality::default() }, ..settings.setting() };
@@ -271,11 +313,15 @@ mod tests {
             ..FrameView::default()
         };
         let quality = Quality { adaptive: true, ..Quality::default() };
-        let setting = Setting { samples: 4, scale: RenderScale::Half, quality };
+        let setting =
+            Setting { integrator: Integrator::Direct, samples: 4, scale: RenderScale::Half, quality };
         let rendered = view.at(&setting);
+        assert_eq!(view.with_setting(&setting), FrameView { samples: 4, quality, ..view });
         assert_eq!(rendered, FrameView { width: 51, height: 30, samples: 4, quality, ..view });
         assert!(rendered.is_adaptive() && !view.is_adaptive());
         assert!(!FrameView { samples: 1, ..rendered }.is_adaptive());
+        let paths = Integrator::Path(PathSettings::DEFAULT);
+        assert!(!rendered.at(&Setting { integrator: paths, ..setting }).is_adaptive());
         assert_eq!(rendered.setting(RenderScale::Half), setting);
     }
 }

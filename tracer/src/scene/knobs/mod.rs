@@ -30,7 +30,8 @@ pub use super::data::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setti
 pub use number::NumberRange;
 pub use table::KNOBS;
 
-use super::data::SceneFeatures;
+use super::data::{Integrator, SceneFeatures};
+use super::validate::is_sample_count;
 
 /// A knob: one property of a [`Setting`] with a list of values.
 #[derive(Debug)]
@@ -53,6 +54,8 @@ pub struct Knob {
     pub apart: &'static [KnobValue],
     /// Whether a cheaper value reduces the accuracy of a picture. Other knobs are never turned automatically.
     pub reduces: bool,
+    /// Integrators whose pictures can depend on the knob.
+    pub scope: KnobScope,
     /// Whether the value has an effect next to the other knobs of a setting, whatever the scene.
     acts: fn(&Setting) -> bool,
     /// See [`Knob::matters`].
@@ -66,12 +69,24 @@ pub enum KnobForm {
     Switch,
     /// One of the words of the values.
     Word,
-    /// A whole number, one of the words of the values.
-    Count,
+    /// A number of samples, any of a range with the path integrator, and a square number up to [`super::MAX_SAMPLES`] with the
+    /// direct one.
+    Count(&'static NumberRange),
     /// A number or a fraction: 0.5, or 1/2, which is in quotes in a scene file.
     Fraction,
     /// Any number of a range, whether or not it is one of the values.
     Number(&'static NumberRange),
+}
+
+/// Integrators whose pictures can depend on a knob.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum KnobScope {
+    /// Every integrator.
+    All,
+    /// The direct integrator only.
+    Direct,
+    /// The path integrator only, whose settings have the value: other settings have none.
+    Paths,
 }
 
 /// A value of a knob as a scene file or a command line gives it.
@@ -125,12 +140,31 @@ impl Knob {
         self.all().find(|value| value.word == Some(text) || value.aliases.contains(&text))
     }
 
-    /// The value that a setting has. For a number between two of the list it is the cheaper one of them; for a number that is
+    /// The value that a setting has; the best for a setting without a value. For a number between two of the list it is the cheaper one of them; for a number that is
     /// cheaper than all of the list, the cheapest.
     pub fn value_of(&self, setting: &Setting) -> &'static KnobValue {
         match self.rank_of(setting) {
             Some(rank) => &self.values[rank],
             None => self.apart.iter().find(|value| value.is_of(setting)).unwrap_or(self.best()),
+        }
+    }
+
+    /// The values that programs choose from for pictures of an integrator, the cheapest first. All integrators have the same,
+    /// except for numbers of samples: squares with the direct integrator, powers of two with the path integrator.
+    pub fn values_with(
+        &self,
+        integrator: Integrator,
+    ) -> impl DoubleEndedIterator<Item = &'static KnobValue> + use<> {
+        let is_count = matches!(self.form, KnobForm::Count(_));
+        self.values.iter().filter(move |value| !is_count || has_listed_samples(value, integrator))
+    }
+
+    /// Whether pictures of an integrator can depend on the knob.
+    pub fn has_effect_with(&self, integrator: &Integrator) -> bool {
+        match self.scope {
+            KnobScope::All => true,
+            KnobScope::Direct => integrator.path().is_none(),
+            KnobScope::Paths => integrator.path().is_some(),
         }
     }
 
@@ -147,20 +181,24 @@ impl Knob {
     /// Short name of the reduction of a setting for overlays and logs, such as "no shadows" or "depth 1"; `None` where nothing is
     /// reduced.
     pub fn reduction(&self, setting: &Setting) -> Option<Cow<'static, str>> {
-        match self.form {
-            KnobForm::Number(range) => range.reduction(setting).map(Cow::Owned),
-            _ => self.value_of(setting).label.map(Cow::Borrowed),
+        match self.range() {
+            Some(range) => range.reduction(setting).map(Cow::Owned),
+            None => self.value_of(setting).label.map(Cow::Borrowed),
         }
     }
 
     /// Whether the picture of a scene with these features, at this setting, can depend on the knob.
     pub fn matters(&self, features: &SceneFeatures, setting: &Setting) -> bool {
-        (self.matters)(&features.shown_by(setting.quality.shading), setting)
+        self.has_effect_with(&setting.integrator)
+            && (self.matters)(&features.shown_by(setting.quality.shading), setting)
     }
 
     /// Lowers a setting to the value of `limit`, where that is cheaper.
     fn limit(&self, setting: &mut Setting, limit: &Setting) {
-        if let KnobForm::Number(range) = self.form {
+        if !self.is_in(setting) || !self.is_in(limit) {
+            return;
+        }
+        if let Some(range) = self.range() {
             return range.limit(setting, limit);
         }
         if let (Some(own), Some(most)) = (self.rank_of(setting), self.rank_of(limit))
@@ -170,17 +208,44 @@ impl Knob {
         }
     }
 
-    /// Place of a setting's value among the ordered values: 0 is the cheapest. `None` for a value apart from the order.
+    /// Place of a setting's value among the ordered values: 0 is the cheapest. `None` for a value apart from the order, and
+    /// for a setting without a value.
     fn rank_of(&self, setting: &Setting) -> Option<usize> {
-        if let KnobForm::Number(range) = self.form {
+        if !self.is_in(setting) {
+            return None;
+        }
+        if let Some(range) = self.range() {
             return Some(range.rank_of(setting, self.values));
         }
         self.values.iter().position(|value| value.is_of(setting))
     }
 
+    /// Whether a setting has a value of the knob.
+    fn is_in(&self, setting: &Setting) -> bool {
+        self.scope != KnobScope::Paths || setting.integrator.path().is_some()
+    }
+
+    /// The numbers of a knob that is a number.
+    fn range(&self) -> Option<&'static NumberRange> {
+        match self.form {
+            KnobForm::Number(range) | KnobForm::Count(range) => Some(range),
+            KnobForm::Switch | KnobForm::Word | KnobForm::Fraction => None,
+        }
+    }
+
     /// The ordered values and those apart from the order.
     fn all(&self) -> impl Iterator<Item = &'static KnobValue> {
         self.values.iter().chain(self.apart)
+    }
+}
+
+/// Whether a number of samples is one that programs choose for pictures of an integrator.
+fn has_listed_samples(value: &KnobValue, integrator: Integrator) -> bool {
+    let mut setting = Setting { integrator, ..Setting::FULL };
+    value.apply(&mut setting);
+    match integrator {
+        Integrator::Direct => is_sample_count(&integrator, setting.samples),
+        Integrator::Path(_) => setting.samples.is_power_of_two(),
     }
 }
 

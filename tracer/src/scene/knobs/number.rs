@@ -14,12 +14,23 @@ pub struct NumberRange {
     pub most: f32,
     /// Whether only whole numbers are allowed.
     pub whole: bool,
-    /// Whether larger numbers are better; else smaller ones are.
-    pub(super) rises: bool,
+    /// Which numbers are better.
+    pub(super) order: Order,
     pub(super) get: fn(&Setting) -> f32,
     pub(super) set: fn(&mut Setting, f32),
-    /// Short name of a reduction to a number.
-    pub(super) label: fn(f32) -> String,
+    /// Short name of a reduction to a number; `None` for a number that reports have on its own.
+    pub(super) label: Option<fn(f32) -> String>,
+}
+
+/// The order of the numbers of a range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// Larger numbers are better.
+    Rises,
+    /// Smaller numbers are better.
+    Falls,
+    /// Larger numbers are better, and 0, which is no limit, is the best.
+    RisesToZero,
 }
 
 impl NumberRange {
@@ -63,14 +74,21 @@ impl NumberRange {
         values.partition_point(|value| !is_better(value)).saturating_sub(1)
     }
 
-    /// Short name of the number of a setting, where it is cheaper than the default.
+    /// Short name of the number of a setting, where it is cheaper than the default of its integrator.
     pub(super) fn reduction(&self, setting: &Setting) -> Option<String> {
+        let label = self.label?;
         let number = self.of(setting);
-        let usual = self.of(&RenderSettings::default().setting());
-        self.is_cheaper(number, usual).then(|| (self.label)(number))
+        let usual = self.of(&RenderSettings::with_integrator(setting.integrator.usual()).setting());
+        self.is_cheaper(number, usual).then(|| label(number))
     }
 
-    fn is_cheaper(&self, number: f32, other: f32) -> bool {
-        if self.rises { number < other } else { number > other }
+    /// Whether a number is cheaper, and worse, than another one.
+    pub(super) fn is_cheaper(&self, number: f32, other: f32) -> bool {
+        let limit = |number: f32| if number == 0.0 { f32::INFINITY } else { number };
+        match self.order {
+            Order::Rises => number < other,
+            Order::Falls => number > other,
+            Order::RisesToZero => limit(number) < limit(other),
+        }
     }
 }

@@ -1,9 +1,12 @@
 //! The table of knobs.
 
+use super::number::Order;
 use super::{
-    ColorDepth, ExponentPrecision, Knob, KnobForm, KnobValue, NumberRange, RenderScale, Setting, Shading,
+    ColorDepth, ExponentPrecision, Knob, KnobForm, KnobScope, KnobValue, NumberRange, RenderScale, Setting,
+    Shading,
 };
-use crate::scene::validate::{MAX_DEPTH, MAX_SHADOW_SAMPLES};
+use crate::scene::data::{Integrator, PathSettings, Sampler};
+use crate::scene::validate::{MAX_CLAMP, MAX_DEPTH, MAX_PATH_SAMPLES, MAX_SHADOW_SAMPLES};
 use crate::texture::Filter;
 
 /// All knobs, in the order in which reports list them.
@@ -12,11 +15,20 @@ pub static KNOBS: &[Knob] = &[
         name: "samples",
         key: "samples",
         option: "samples",
-        summary: "Rays per pixel: a square number, 1, 4, 9, 16, ...",
-        form: KnobForm::Count,
+        summary: "Rays per pixel: 1, 4, 9, 16, ... 256; with the path integrator any number up to 65536.",
+        form: KnobForm::Count(&NumberRange {
+            least: 1.0,
+            most: MAX_PATH_SAMPLES as f32,
+            whole: true,
+            order: Order::Rises,
+            get: |s| s.samples as f32,
+            set: |s, number| s.samples = number as u32,
+            label: None,
+        }),
         values: SAMPLE_COUNTS,
         apart: &[],
         reduces: true,
+        scope: KnobScope::All,
         acts: |_| true,
         matters: |_, _| true,
     },
@@ -37,6 +49,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::All,
         acts: |_| true,
         matters: |_, _| true,
     },
@@ -52,6 +65,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::Direct,
         acts: |setting| setting.samples > 1,
         matters: |_, setting| setting.samples > 1,
     },
@@ -67,6 +81,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::Direct,
         acts: shows_light,
         matters: |features, _| features.shadows,
     },
@@ -79,10 +94,10 @@ pub static KNOBS: &[Knob] = &[
             least: 1.0,
             most: MAX_SHADOW_SAMPLES as f32,
             whole: true,
-            rises: true,
+            order: Order::Rises,
             get: |s| f32::from(s.quality.shadow_samples),
             set: |s, number| s.quality.shadow_samples = number as u16,
-            label: |number| format!("{number} shadow sample{}", if number == 1.0 { "" } else { "s" }),
+            label: Some(|number| format!("{number} shadow sample{}", if number == 1.0 { "" } else { "s" })),
         }),
         values: &[
             fewer("1", "shadow-samples-1", |s| s.quality.shadow_samples = 1),
@@ -97,6 +112,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::Direct,
         acts: |setting| shows_light(setting) && setting.quality.shadows,
         matters: |features, setting| features.soft_shadows && setting.quality.shadows,
     },
@@ -112,6 +128,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::Direct,
         acts: |setting| shows_light(setting) && setting.quality.shadows,
         matters: |features, setting| features.smooth && features.shadows && setting.quality.shadows,
     },
@@ -132,37 +149,41 @@ pub static KNOBS: &[Knob] = &[
             usual("albedo", |s| s.quality.shading = Shading::Albedo),
         ],
         reduces: true,
+        scope: KnobScope::All,
         acts: |_| true,
-        matters: |features, setting| features.specular || !shows_light(setting),
+        matters: |features, setting| {
+            !shows_light(setting) || (features.specular && setting.integrator == Integrator::Direct)
+        },
     },
     Knob {
         name: "depth",
         key: "max_depth",
         option: "max-depth",
-        summary: "The largest number of reflections and transmissions of a ray, from 0 to 64.",
+        summary: "The largest number of reflections and transmissions of a ray, or of bounces of a path, from 0 to 64.",
         form: KnobForm::Number(&NumberRange {
             least: 0.0,
             most: MAX_DEPTH as f32,
             whole: true,
-            rises: true,
+            order: Order::Rises,
             get: |s| f32::from(s.quality.max_depth),
             set: |s, number| s.quality.max_depth = number as u8,
-            label: |number| format!("depth {number}"),
+            label: Some(|number| format!("depth {number}")),
         }),
         values: &[
             fewer("0", "depth-0", |s| s.quality.max_depth = 0),
             fewer("1", "depth-1", |s| s.quality.max_depth = 1),
             fewer("2", "depth-2", |s| s.quality.max_depth = 2),
             fewer("3", "depth-3", |s| s.quality.max_depth = 3),
-            usual("5", |s| s.quality.max_depth = 5),
+            fewer("5", "depth-5", |s| s.quality.max_depth = 5),
             usual("8", |s| s.quality.max_depth = 8),
             usual("16", |s| s.quality.max_depth = 16),
             usual("64", |s| s.quality.max_depth = MAX_DEPTH),
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::All,
         acts: shows_light,
-        matters: |features, _| features.bounces,
+        matters: |features, setting| features.bounces || setting.integrator.path().is_some(),
     },
     Knob {
         name: "min_contribution",
@@ -173,10 +194,10 @@ pub static KNOBS: &[Knob] = &[
             least: 0.0,
             most: 1.0,
             whole: false,
-            rises: false,
+            order: Order::Falls,
             get: |s| s.quality.min_contribution,
             set: |s, number| s.quality.min_contribution = number,
-            label: |number| format!("contributions from {number}"),
+            label: Some(|number| format!("contributions from {number}")),
         }),
         values: &[
             fewer("0.1", "contribution-0-1", |s| s.quality.min_contribution = 0.1),
@@ -188,8 +209,74 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::Direct,
         acts: |setting| shows_light(setting) && setting.quality.max_depth > 0,
         matters: |features, setting| features.bounces && setting.quality.max_depth > 0,
+    },
+    Knob {
+        name: "sampler",
+        key: "sampler",
+        option: "sampler",
+        summary: "The numbers of paths: evenly spread, or independent, which have more noise.",
+        form: KnobForm::Word,
+        values: &[
+            reduced("independent", "independent samples", "independent", |s| {
+                set_path(s, |paths| paths.sampler = Sampler::Independent);
+            }),
+            usual("sobol", |s| set_path(s, |paths| paths.sampler = Sampler::Sobol)),
+        ],
+        apart: &[],
+        reduces: true,
+        scope: KnobScope::Paths,
+        acts: shows_light,
+        matters: |_, setting| shows_light(setting),
+    },
+    Knob {
+        name: "roulette",
+        key: "roulette",
+        option: "roulette",
+        summary: "Whether paths of little weight end early, at random: the mean of the picture does not change.",
+        form: KnobForm::Switch,
+        values: &[
+            KnobValue {
+                word: Some("off"),
+                aliases: &[],
+                label: None,
+                slug: Some("no-roulette"),
+                apply: |s| set_path(s, |paths| paths.roulette = false),
+            },
+            usual("on", |s| set_path(s, |paths| paths.roulette = true)),
+        ],
+        apart: &[],
+        reduces: false,
+        scope: KnobScope::Paths,
+        acts: shows_light,
+        matters: |_, setting| shows_light(setting),
+    },
+    Knob {
+        name: "clamp_indirect",
+        key: "clamp_indirect",
+        option: "clamp-indirect",
+        summary: "Largest radiance of a path's light that was scattered more than once; 0 is no limit.",
+        form: KnobForm::Number(&NumberRange {
+            least: 0.0,
+            most: MAX_CLAMP,
+            whole: false,
+            order: Order::RisesToZero,
+            get: |s| s.integrator.path().map_or(0.0, |paths| paths.clamp_indirect),
+            set: |s, number| set_path(s, |paths| paths.clamp_indirect = number),
+            label: Some(|number| format!("indirect light up to {number}")),
+        }),
+        values: &[
+            fewer("1", "clamp-1", |s| set_path(s, |paths| paths.clamp_indirect = 1.0)),
+            fewer("10", "clamp-10", |s| set_path(s, |paths| paths.clamp_indirect = 10.0)),
+            usual("0", |s| set_path(s, |paths| paths.clamp_indirect = 0.0)),
+        ],
+        apart: &[],
+        reduces: true,
+        scope: KnobScope::Paths,
+        acts: shows_light,
+        matters: |_, setting| shows_light(setting) && setting.quality.max_depth > 0,
     },
     Knob {
         name: "filter",
@@ -213,6 +300,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::All,
         acts: |setting| shows_light(setting) || setting.quality.shading == Shading::Albedo,
         matters: |features, _| features.filtered,
     },
@@ -230,6 +318,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::Direct,
         acts: shows_light,
         matters: |features, setting| features.powers && setting.quality.shading == Shading::Full,
     },
@@ -247,6 +336,7 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: true,
+        scope: KnobScope::All,
         acts: |_| true,
         matters: |_, _| true,
     },
@@ -268,30 +358,50 @@ pub static KNOBS: &[Knob] = &[
         ],
         apart: &[],
         reduces: false,
+        scope: KnobScope::All,
         acts: |_| true,
         matters: |_, _| true,
     },
 ];
 
-/// All sample counts up to [`crate::scene::MAX_SAMPLES`].
+/// All sample counts of the direct integrator, and powers of two for paths.
 const SAMPLE_COUNTS: &[KnobValue] = &[
     samples("1", "samples-1", |s| s.samples = 1),
+    samples("2", "samples-2", |s| s.samples = 2),
     samples("4", "samples-4", |s| s.samples = 4),
+    samples("8", "samples-8", |s| s.samples = 8),
     samples("9", "samples-9", |s| s.samples = 9),
     samples("16", "samples-16", |s| s.samples = 16),
     samples("25", "samples-25", |s| s.samples = 25),
+    samples("32", "samples-32", |s| s.samples = 32),
     samples("36", "samples-36", |s| s.samples = 36),
     samples("49", "samples-49", |s| s.samples = 49),
     samples("64", "samples-64", |s| s.samples = 64),
     samples("81", "samples-81", |s| s.samples = 81),
     samples("100", "samples-100", |s| s.samples = 100),
     samples("121", "samples-121", |s| s.samples = 121),
+    samples("128", "samples-128", |s| s.samples = 128),
     samples("144", "samples-144", |s| s.samples = 144),
     samples("169", "samples-169", |s| s.samples = 169),
     samples("196", "samples-196", |s| s.samples = 196),
     samples("225", "samples-225", |s| s.samples = 225),
     samples("256", "samples-256", |s| s.samples = 256),
+    samples("512", "samples-512", |s| s.samples = 512),
+    samples("1024", "samples-1024", |s| s.samples = 1024),
+    samples("2048", "samples-2048", |s| s.samples = 2048),
+    samples("4096", "samples-4096", |s| s.samples = 4096),
+    samples("8192", "samples-8192", |s| s.samples = 8192),
+    samples("16384", "samples-16384", |s| s.samples = 16384),
+    samples("32768", "samples-32768", |s| s.samples = 32768),
+    samples("65536", "samples-65536", |s| s.samples = 65536),
 ];
+
+/// Changes the settings of the path integrator, if it is the one.
+fn set_path(setting: &mut Setting, change: impl FnOnce(&mut PathSettings)) {
+    if let Integrator::Path(settings) = &mut setting.integrator {
+        change(settings);
+    }
+}
 
 /// Whether the picture of a setting shows light.
 fn shows_light(setting: &Setting) -> bool {

@@ -4,17 +4,27 @@ use std::collections::BTreeSet;
 
 use proptest::prelude::*;
 
+use super::number::Order;
 use super::*;
-use crate::scene::data::RenderSettings;
-use crate::scene::validate::{MAX_DEPTH, MAX_SAMPLES, MAX_SHADOW_SAMPLES, is_sample_count};
+use crate::scene::data::{PathSettings, RenderSettings, Sampler};
+use crate::scene::validate::{
+    MAX_CLAMP, MAX_DEPTH, MAX_PATH_SAMPLES, MAX_SAMPLES, MAX_SHADOW_SAMPLES, is_sample_count,
+};
 use crate::texture::Filter;
 
 fn all_off() -> SceneFeatures {
     SceneFeatures::default()
 }
 
+const PATHS: Integrator = Integrator::Path(PathSettings::DEFAULT);
+
+/// The best values with the integrator that has the knob.
+fn full(knob: &Knob) -> Setting {
+    Setting::full_with(if knob.scope == KnobScope::Paths { PATHS } else { Integrator::Direct })
+}
+
 /// Name, key and option of each knob.
-const NAMES: [[&str; 3]; 13] = [
+const NAMES: [[&str; 3]; 16] = [
     ["samples"; 3],
     ["scale"; 3],
     ["adaptive"; 3],
@@ -24,6 +34,9 @@ const NAMES: [[&str; 3]; 13] = [
     ["shading"; 3],
     ["depth", "max_depth", "max-depth"],
     ["min_contribution", "min_contribution", "min-contribution"],
+    ["sampler"; 3],
+    ["roulette"; 3],
+    ["clamp_indirect", "clamp_indirect", "clamp-indirect"],
     ["filter"; 3],
     ["exponent"; 3],
     ["colors", "pixels", "colors"],
@@ -51,9 +64,27 @@ fn words_of_values_are_the_best_first() {
     assert_eq!(words("exponent"), ["exact", "fast"]);
     assert_eq!(words("colors"), ["exact", "reduced"]);
     assert_eq!(words("dither"), ["off", "on"]);
-    let samples: Vec<u32> = words("samples").iter().map(|word| word.parse().unwrap()).collect();
-    let all: Vec<u32> = (1..=MAX_SAMPLES).rev().filter(|count| is_sample_count(*count)).collect();
-    assert_eq!(samples, all);
+    assert_eq!(words("sampler"), ["sobol", "independent"]);
+    assert_eq!(words("roulette"), ["on", "off"]);
+    assert_eq!(words("clamp_indirect"), ["0", "10", "1"]);
+}
+
+#[test]
+fn each_integrator_has_its_numbers_of_samples() {
+    let knob = Knob::named("samples").unwrap();
+    let samples = |integrator| -> Vec<u32> {
+        knob.values_with(integrator).map(|value| value.word.unwrap().parse().unwrap()).collect()
+    };
+    let squares: Vec<u32> =
+        (1..=MAX_SAMPLES).filter(|count| is_sample_count(&Integrator::Direct, *count)).collect();
+    assert_eq!(samples(Integrator::Direct), squares);
+    let powers: Vec<u32> = (0..=16).map(|exponent| 1 << exponent).collect();
+    assert_eq!(samples(PATHS), powers);
+    assert_eq!(powers.last(), Some(&MAX_PATH_SAMPLES));
+    let listed = |integrator| samples(integrator).into_iter().collect::<BTreeSet<u32>>();
+    assert_eq!(listed(Integrator::Direct).union(&listed(PATHS)).count(), knob.values.len());
+    let shading = Knob::named("shading").unwrap();
+    assert_eq!(shading.values_with(PATHS).count(), shading.values.len());
 }
 
 #[test]
@@ -61,7 +92,7 @@ fn every_value_is_found_again_in_a_setting_that_has_it() {
     let mut slugs = BTreeSet::new();
     for knob in KNOBS {
         for value in knob.all() {
-            let mut setting = Setting::FULL;
+            let mut setting = full(knob);
             value.apply(&mut setting);
             assert!(std::ptr::eq(knob.value_of(&setting), value), "{} {:?}", knob.name, value.word);
             for text in value.word.iter().chain(value.aliases) {
@@ -78,10 +109,17 @@ fn every_value_is_found_again_in_a_setting_that_has_it() {
 #[test]
 fn values_set_what_their_words_say() {
     let set = |name: &str, word: &str| {
-        let mut setting = Setting::FULL;
-        Knob::named(name).unwrap().value(word).unwrap().apply(&mut setting);
+        let knob = Knob::named(name).unwrap();
+        let mut setting = full(knob);
+        knob.value(word).unwrap().apply(&mut setting);
         setting
     };
+    let path = |name: &str, word: &str| *set(name, word).integrator.path().unwrap();
+    for (word, sampler) in Sampler::WORDS {
+        assert_eq!(path("sampler", word).sampler, sampler);
+    }
+    assert!(path("roulette", "on").roulette && !path("roulette", "off").roulette);
+    assert_eq!(path("clamp_indirect", "10").clamp_indirect, 10.0);
     assert_eq!(set("samples", "16").samples, 16);
     for (word, scale) in RenderScale::WORDS {
         assert_eq!(set("scale", word).scale, scale);
@@ -114,9 +152,9 @@ fn values_set_what_their_words_say() {
 #[test]
 fn listed_numbers_are_those_of_their_words_in_order() {
     for knob in KNOBS {
-        let KnobForm::Number(range) = knob.form else { continue };
+        let Some(range) = knob.range() else { continue };
         let number = |value: &KnobValue| {
-            let mut setting = Setting::FULL;
+            let mut setting = full(knob);
             value.apply(&mut setting);
             range.of(&setting)
         };
@@ -126,11 +164,82 @@ fn listed_numbers_are_those_of_their_words_in_order() {
         }
         for pair in knob.values.windows(2) {
             let [cheaper, better] = [&pair[0], &pair[1]].map(number);
-            assert!((cheaper < better) == range.rises && cheaper != better, "{}", knob.name);
+            assert!(range.is_cheaper(cheaper, better) && !range.is_cheaper(better, cheaper), "{}", knob.name);
         }
-        let ends = if range.rises { [range.least, range.most] } else { [range.most, range.least] };
-        assert_eq!(range.of(&Setting::FULL), ends[1], "{}", knob.name);
+        let best = if range.order == Order::Rises { range.most } else { range.least };
+        assert_eq!(range.of(&full(knob)), best, "{}", knob.name);
     }
+}
+
+#[test]
+fn no_limit_of_indirect_light_is_better_than_any_limit() {
+    let with = |clamp_indirect| {
+        let settings = PathSettings { clamp_indirect, ..PathSettings::DEFAULT };
+        Setting { integrator: Integrator::Path(settings), ..RenderSettings::with_integrator(PATHS).setting() }
+    };
+    assert_eq!(with(0.0).at_most(&with(10.0)), with(10.0));
+    assert_eq!(with(10.0).at_most(&with(0.0)), with(10.0));
+    assert_eq!(with(3.0).at_most(&with(10.0)), with(3.0));
+    assert_eq!(with(10.0).at_most(&with(3.0)), with(3.0));
+    assert_eq!(with(MAX_CLAMP).at_most(&with(0.0)), with(MAX_CLAMP));
+    assert_eq!(with(2.5).reductions(), ["indirect light up to 2.5"]);
+    assert_eq!(with(0.0).reductions(), [""; 0]);
+}
+
+#[test]
+fn a_limit_changes_no_integrator() {
+    let direct = RenderSettings::default().setting();
+    let paths = RenderSettings::with_integrator(PATHS).setting();
+    let cheapest = PathSettings {
+        sampler: Sampler::Independent,
+        roulette: false,
+        clamp_indirect: 1.0,
+        seed: 9,
+        max_noise: 0.5,
+    };
+    let limit = Setting { integrator: Integrator::Path(cheapest), ..Setting::FULL };
+    assert_eq!(direct.at_most(&limit), direct);
+    assert_eq!(paths.at_most(&Setting::FULL), paths);
+    // Neither the random seed nor the goal is a knob, and roulette reduces nothing.
+    let limited = PathSettings { roulette: true, seed: 0, max_noise: 0.0, ..cheapest };
+    assert_eq!(paths.at_most(&limit), Setting { integrator: Integrator::Path(limited), ..paths });
+    let own = Setting { integrator: Integrator::Path(cheapest), ..paths };
+    let restored = own.restored();
+    let expected = PathSettings { sampler: Sampler::Sobol, ..cheapest };
+    assert_eq!(restored.integrator, Integrator::Path(expected), "numbers are full quality");
+    assert_eq!(restored.samples, MAX_PATH_SAMPLES);
+}
+
+#[test]
+fn knobs_of_the_other_integrator_do_not_matter() {
+    let everything = SceneFeatures {
+        shadows: true,
+        soft_shadows: true,
+        smooth: true,
+        bounces: true,
+        specular: true,
+        powers: true,
+        filtered: true,
+        ..all_off()
+    };
+    let matter = |integrator: Integrator| -> Vec<&str> {
+        let usual = RenderSettings { samples: 4, ..RenderSettings::with_integrator(integrator) }.setting();
+        KNOBS.iter().filter(|knob| knob.matters(&everything, &usual)).map(|knob| knob.name).collect()
+    };
+    let of_all = ["samples", "scale", "depth", "filter", "colors", "dither"];
+    let of_direct =
+        ["adaptive", "shadows", "shadow_samples", "terminator", "shading", "min_contribution", "exponent"];
+    let of_paths = ["sampler", "roulette", "clamp_indirect"];
+    let sorted = |names: &[&'static str]| names.iter().copied().collect::<BTreeSet<_>>();
+    let found = |integrator| sorted(&matter(integrator));
+    assert_eq!(found(Integrator::Direct), &sorted(&of_all) | &sorted(&of_direct));
+    assert_eq!(found(PATHS), &sorted(&of_all) | &sorted(&of_paths));
+    let depth = Knob::named("depth").unwrap();
+    let usual = RenderSettings::with_integrator(PATHS).setting();
+    assert!(depth.matters(&all_off(), &usual), "light bounces in every scene");
+    assert_eq!(usual.reductions(), [""; 0]);
+    let dark = Quality { shadows: false, max_depth: 5, ..usual.quality };
+    assert_eq!(Setting { quality: dark, ..usual }.reductions(), ["depth 5"]);
 }
 
 #[test]
@@ -177,6 +286,12 @@ fn cheapest() -> Setting {
     let mut setting = Setting::FULL;
     KNOBS.iter().for_each(|knob| knob.values[0].apply(&mut setting));
     Setting { samples: 4, ..setting }
+}
+
+/// The integrator that a number selects, with other settings than the default.
+fn integrator(paths: bool) -> Integrator {
+    let settings = PathSettings { seed: 3, max_noise: 0.125, ..PathSettings::DEFAULT };
+    if paths { Integrator::Path(settings) } else { Integrator::Direct }
 }
 
 #[test]
@@ -308,16 +423,17 @@ fn reductions_are_labelled() {
 fn any_setting() -> impl Strategy<Value = Setting> {
     let picks =
         prop::collection::vec((any::<prop::sample::Index>(), 0.0..=1.0_f32, any::<bool>()), KNOBS.len());
-    picks.prop_map(|picks| {
-        let mut setting = Setting::FULL;
+    (any::<bool>(), picks).prop_map(|(paths, picks)| {
+        let mut setting = Setting { integrator: integrator(paths), ..Setting::FULL };
         for (knob, (index, share, listed)) in KNOBS.iter().zip(picks) {
+            let listed = listed || (matches!(knob.form, KnobForm::Count(_)) && !paths);
             match knob.form {
-                KnobForm::Number(range) if !listed => {
+                KnobForm::Number(range) | KnobForm::Count(range) if !listed => {
                     let number = range.least + share * (range.most - range.least);
                     range.apply(if range.whole { number.round() } else { number }, &mut setting);
                 }
                 _ => {
-                    let all: Vec<_> = knob.all().collect();
+                    let all: Vec<_> = knob.values_with(setting.integrator).chain(knob.apart).collect();
                     index.get(&all).apply(&mut setting);
                 }
             }

@@ -14,7 +14,7 @@ use super::limits::LoadLimits;
 use super::textures::Textures;
 use crate::mesh::CompiledMesh;
 use crate::scene::NormalMap;
-use crate::scene::data::{Background, Camera, Scene};
+use crate::scene::data::{Background, Camera, Lens, Scene};
 use crate::scene::import::{LoadOptions, MAX_SCENE_BYTES, SceneError, bytes};
 use crate::scene::toml::{self, Aim, CameraText, Fault, SceneText, TextureText, TexturesText};
 
@@ -105,6 +105,7 @@ fn assemble(
     };
     let mesh_files = meshes.iter().map(|mesh| file_of(mesh).unwrap_or_default()).collect();
     let bounds = framing::bounds(&scene, &meshes);
+    scene.lens = text.camera.map_or(Lens::default(), |camera| camera.lens);
     scene.camera = match text.camera {
         Some(camera) => aimed(camera, bounds),
         None if bounds.is_none() => {
@@ -115,6 +116,7 @@ fn assemble(
     };
     if scene.lights.is_empty() {
         scene.lights.push(framing::default_light(&scene.camera));
+        scene.has_default_light = true;
     }
     Ok(LoadedScene { scene, meshes, mesh_files, textures, warnings: Vec::new() })
 }
@@ -163,13 +165,16 @@ fn load_textures(
             let texture = list(&map.texture)?.index;
             material.normal_map = Some(NormalMap { texture, strength: map.strength });
         }
+        if let (Some(model), Some(text)) = (&mut material.metallic_roughness, &text.metallic_roughness) {
+            model.texture = Some(list(text)?.index);
+        }
     }
     Ok(())
 }
 
 /// The camera of the file with its look-at point.
 fn aimed(text: CameraText, bounds: Option<framing::Bounds>) -> Camera {
-    let CameraText { kind, position, aim, up, fov, zoom } = text;
+    let CameraText { kind, position, aim, up, fov, zoom, lens: _ } = text;
     let look_at = match aim {
         Aim::Point(point) => point,
         Aim::Direction(direction) => framing::point_on_axis(position, direction, bounds),

@@ -4,14 +4,27 @@ use glam::DVec3;
 
 use super::Reading;
 use super::fault::Read;
+use super::knobs;
 use super::table::Table;
 use super::value::Value;
 use crate::rotation;
-use crate::scene::data::{CameraKind, FovAxis};
-use crate::scene::validate::view_fault;
+use crate::scene::data::{CameraKind, FovAxis, Integrator, Lens};
+use crate::scene::validate::{MAX_COORDINATE, view_fault};
 
-pub(super) const CAMERA_KEYS: &[&str] =
-    &["kind", "position", "look_at", "direction", "rotation", "up", "fov", "fov_axis", "view_height", "zoom"];
+pub(super) const CAMERA_KEYS: &[&str] = &[
+    "kind",
+    "position",
+    "look_at",
+    "direction",
+    "rotation",
+    "up",
+    "fov",
+    "fov_axis",
+    "view_height",
+    "zoom",
+    "aperture",
+    "focus_distance",
+];
 
 /// Default field of view of a pinhole camera in degrees.
 const PINHOLE_FOV: f64 = 40.0;
@@ -35,6 +48,8 @@ pub(crate) struct CameraText {
     pub(crate) fov: f64,
     /// Divides the view plane's size.
     pub(crate) zoom: f64,
+    /// Its lens.
+    pub(crate) lens: Lens,
 }
 
 /// Viewing direction of a camera.
@@ -61,13 +76,18 @@ impl Kind {
     fn idle_keys(self) -> (&'static str, &'static [&'static str]) {
         match self {
             Self::Pinhole => ("a pinhole camera", &["view_height"]),
-            Self::Orthographic => ("an orthographic camera", &["fov", "fov_axis"]),
-            Self::Fisheye => ("a fisheye camera", &["fov_axis", "view_height", "zoom"]),
+            Self::Orthographic => {
+                ("an orthographic camera", &["fov", "fov_axis", "aperture", "focus_distance"])
+            }
+            Self::Fisheye => {
+                ("a fisheye camera", &["fov_axis", "view_height", "zoom", "aperture", "focus_distance"])
+            }
         }
     }
 }
 
-pub(super) fn camera(table: Table<'_>, reading: &mut Reading) -> Read<CameraText> {
+/// Reads the camera of a scene that is rendered by `integrator`.
+pub(super) fn camera(table: Table<'_>, integrator: &Integrator, reading: &mut Reading) -> Read<CameraText> {
     let word = table.read("kind", |kind| kind.word(&Kind::WORDS))?.unwrap_or(Kind::Pinhole);
     let position = table.required("position")?.vector()?;
     let up = table.read("up", |value| value.direction())?.unwrap_or(DVec3::Y);
@@ -80,7 +100,31 @@ pub(super) fn camera(table: Table<'_>, reading: &mut Reading) -> Read<CameraText
     let zoom = table.read("zoom", |value| value.positive())?.unwrap_or(1.0);
     let (name, idle) = word.idle_keys();
     idle.iter().for_each(|key| reading.idle(table, key, &format!("on {name}")));
-    Ok(CameraText { kind, position, aim: looks, up, fov, zoom })
+    let lens = lens(table)?;
+    if let Kind::Pinhole = word {
+        warn_about_lens(table, &lens, integrator, reading);
+    }
+    Ok(CameraText { kind, position, aim: looks, up, fov, zoom, lens })
+}
+
+fn lens(table: Table<'_>) -> Read<Lens> {
+    let aperture =
+        |value: Value<'_>| value.number("from 0 to 1e30", |radius| (0.0..=MAX_COORDINATE).contains(&radius));
+    Ok(Lens {
+        aperture: table.read("aperture", aperture)?.unwrap_or(0.0),
+        focus_distance: table.read("focus_distance", |value| value.positive())?,
+    })
+}
+
+/// Warns about keys of the lens of a pinhole camera that change nothing.
+fn warn_about_lens(table: Table<'_>, lens: &Lens, integrator: &Integrator, reading: &mut Reading) {
+    if *integrator == Integrator::Direct {
+        for key in ["aperture", "focus_distance"] {
+            reading.idle(table, key, knobs::with(integrator));
+        }
+    } else if lens.aperture == 0.0 {
+        reading.idle(table, "focus_distance", "without an `aperture`");
+    }
 }
 
 /// The kind of camera with its own keys, and the field of view.

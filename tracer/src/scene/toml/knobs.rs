@@ -1,26 +1,44 @@
 //! The knobs of `[render]`, read by a loop over the table of knobs.
 
+use super::Reading;
 use super::fault::{Fault, Read};
 use super::table::Table;
 use super::value::Value;
-use crate::scene::data::{RenderScale, Setting};
-use crate::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, KnobValue, NumberRange};
+use crate::scene::data::{Integrator, RenderScale, Setting};
+use crate::scene::knobs::{GivenValue, KNOBS, Knob, KnobForm, KnobValue, NumberRange, Shading};
 use crate::scene::validate::is_sample_count;
 
-/// Reads the knobs of a `[render]` table; a missing key keeps its value of `default`.
+/// Reads the knobs of a `[render]` table; a missing key keeps its value of `default`. Knobs without an effect with the integrator
+/// are warned about.
 ///
 /// # Errors
-/// A value that the knob does not have; `adaptive = true` with one sample per pixel.
-pub(super) fn setting(table: Table<'_>, default: Setting) -> Read<Setting> {
+/// A value that the knob does not have; `adaptive = true` with one sample per pixel and the direct integrator.
+pub(super) fn setting(table: Table<'_>, default: Setting, reading: &mut Reading) -> Read<Setting> {
     let mut setting = default;
     for knob in KNOBS {
         if let Some(value) = table.get(knob.key) {
-            read(knob, value)?.apply(&mut setting);
+            read(knob, value, &default.integrator)?.apply(&mut setting);
+            if !knob.has_effect_with(&default.integrator) {
+                reading.idle(table, knob.key, with(&default.integrator));
+            }
         }
     }
-    match table.get("adaptive").filter(|_| setting.quality.adaptive && setting.samples == 1) {
+    let is_direct = default.integrator == Integrator::Direct;
+    if !is_direct && setting.quality.shading == Shading::Diffuse {
+        reading.idle(table, "shading", "at \"diffuse\" with the path integrator, which has no such terms");
+    }
+    let nothing = is_direct && setting.quality.adaptive && setting.samples == 1;
+    match table.get("adaptive").filter(|_| nothing) {
         Some(value) => Err(nothing_to_adapt(&value)),
         None => Ok(setting),
+    }
+}
+
+/// The reason why a key has no effect with an integrator.
+pub(super) fn with(integrator: &Integrator) -> &'static str {
+    match integrator {
+        Integrator::Direct => "with the direct integrator",
+        Integrator::Path(_) => "with the path integrator",
     }
 }
 
@@ -31,11 +49,11 @@ fn nothing_to_adapt(value: &Value<'_>) -> Fault {
 }
 
 /// The value of a knob, written in the knob's form.
-fn read(knob: &'static Knob, value: Value<'_>) -> Read<GivenValue> {
+fn read(knob: &'static Knob, value: Value<'_>, integrator: &Integrator) -> Read<GivenValue> {
     let listed = match knob.form {
         KnobForm::Switch => find(knob, value, if value.boolean()? { "on" } else { "off" }),
         KnobForm::Word => word(knob, value),
-        KnobForm::Count => find(knob, value, &count(value)?.to_string()),
+        KnobForm::Count(range) => return count(range, value, integrator),
         KnobForm::Fraction => fraction(knob, value),
         KnobForm::Number(range) => return number(range, value),
     };
@@ -67,11 +85,14 @@ fn word(knob: &'static Knob, value: Value<'_>) -> Read<&'static KnobValue> {
 }
 
 /// A sample count.
-fn count(value: Value<'_>) -> Read<u32> {
-    let expected = "that is a square from 1 to 256 (1, 4, 9, 16, ...)";
-    let samples = value.whole(expected, 1..=u32::MAX)?;
-    let square = is_sample_count(samples).then_some(samples);
-    square.ok_or_else(|| value.must_be(&format!("a whole number {expected}")))
+fn count(range: &'static NumberRange, value: Value<'_>, integrator: &Integrator) -> Read<GivenValue> {
+    let expected = match integrator {
+        Integrator::Direct => "that is a square from 1 to 256 (1, 4, 9, 16, ...)",
+        Integrator::Path(_) => "from 1 to 65536",
+    };
+    let samples = value.whole(expected, range.whole_numbers())?;
+    let fits = is_sample_count(integrator, samples).then_some(GivenValue::Number(range, samples as f32));
+    fits.ok_or_else(|| value.must_be(&format!("a whole number {expected}")))
 }
 
 /// A scale, as a number or as a fraction in quotes.
@@ -181,16 +202,21 @@ mod tests {
 
     #[test]
     fn every_value_of_the_table_is_read_by_its_key() {
-        for knob in KNOBS {
-            for word in knob.words() {
+        for (knob, (name, integrator)) in
+            KNOBS.iter().flat_map(|knob| Integrator::WORDS.map(|named| (knob, named)))
+        {
+            let values = knob.values_with(integrator).chain(knob.apart);
+            for word in values.filter_map(|value| value.word) {
                 let written = match knob.form {
                     KnobForm::Switch => (word == "on").to_string(),
                     KnobForm::Word | KnobForm::Fraction => format!("\"{word}\""),
-                    KnobForm::Count | KnobForm::Number(_) => word.to_owned(),
+                    KnobForm::Count(_) | KnobForm::Number(_) => word.to_owned(),
                 };
                 // With several samples, so that adaptive sampling is accepted.
                 let samples = if knob.key == "samples" { "" } else { "samples = 9\n" };
-                let settings = render(&format!("{samples}{} = {written}", knob.key)).unwrap();
+                let head = format!("integrator = \"{name}\"\n{samples}");
+                let settings = render(&format!("{head}{} = {written}", knob.key)).unwrap();
+                assert_eq!(settings.integrator.usual(), integrator);
                 assert!(knob.value(word).unwrap().is_of(&settings.setting()), "{} = {written}", knob.key);
             }
         }
@@ -200,6 +226,9 @@ mod tests {
     fn every_whole_number_of_a_range_is_read() {
         for knob in KNOBS {
             let KnobForm::Number(range) = knob.form else { continue };
+            if !range.whole {
+                continue;
+            }
             for number in range.whole_numbers() {
                 let settings = render(&format!("{} = {number}", knob.key)).unwrap();
                 assert_eq!(range.of(&settings.setting()), number as f32, "{}", knob.key);

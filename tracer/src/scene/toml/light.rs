@@ -4,9 +4,10 @@ use glam::DVec3;
 
 use super::Reading;
 use super::fault::Read;
+use super::knobs;
 use super::table::Table;
 use super::value::{Value, unit};
-use crate::scene::data::{Attenuation, Light, LightKind};
+use crate::scene::data::{Attenuation, Integrator, Light, LightKind};
 use crate::scene::validate::{MAX_COORDINATE, MAX_LIGHT, MAX_SHADOW_SAMPLES};
 
 pub(super) const LIGHT_KEYS: &[&str] = &[
@@ -31,7 +32,8 @@ enum Kind {
     Directional,
 }
 
-pub(super) fn light(table: Table<'_>, reading: &mut Reading) -> Read<Light> {
+/// Reads a light of a scene that is rendered by `integrator`.
+pub(super) fn light(table: Table<'_>, integrator: &Integrator, reading: &mut Reading) -> Read<Light> {
     let kinds = [("point", Kind::Point), ("spot", Kind::Spot), ("directional", Kind::Directional)];
     let kind = table.read("kind", |value| value.word(&kinds))?.unwrap_or(Kind::Point);
     let radius = |value: Value<'_>| value.number("from 0 to 1e30", |n| (0.0..=MAX_COORDINATE).contains(&n));
@@ -54,6 +56,10 @@ pub(super) fn light(table: Table<'_>, reading: &mut Reading) -> Read<Light> {
     };
     warn_about_unused_keys(table, kind, light.attenuation, reading)?;
     warn_about_extent(table, kind, radius, &light, reading);
+    match integrator {
+        Integrator::Direct => warn_about_points(table, &light, reading),
+        Integrator::Path(_) => reading.idle(table, "shadow_samples", knobs::with(integrator)),
+    }
     Ok(light)
 }
 
@@ -107,13 +113,17 @@ fn attenuation(value: Value<'_>) -> Read<Attenuation> {
     Ok(Attenuation::Polynomial { constant, linear, quadratic })
 }
 
-/// Warns about a radius and a number of points that change no shadow.
+/// Warns about a radius that changes no shadow.
 fn warn_about_extent(table: Table<'_>, kind: Kind, radius: f64, light: &Light, reading: &mut Reading) {
     if radius > 0.0 && kind == Kind::Directional {
         reading.idle(table, "radius", "on a directional light");
     } else if radius > 0.0 && !light.shadows {
         reading.idle(table, "radius", "on a light without shadows");
     }
+}
+
+/// Warns about a number of points that changes no shadow.
+fn warn_about_points(table: Table<'_>, light: &Light, reading: &mut Reading) {
     if light.radius == 0.0 || !light.shadows {
         reading.idle(table, "shadow_samples", "without a `radius` and shadows");
     }

@@ -32,7 +32,7 @@ use table::{Table, tables_of};
 use value::Value;
 
 use crate::material::Material;
-use crate::scene::data::{Disk, Light, Plane, RenderSettings, Sphere, Triangle};
+use crate::scene::data::{Disk, Integrator, Light, Plane, RenderSettings, Sphere, Triangle};
 use crate::scene::validate::{
     MAX_DISKS, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
 };
@@ -171,15 +171,20 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let mut reading = Reading::default();
     let reading = &mut reading;
     let ambient = first.keep(top.read("ambient", |value| value.color(MAX_LIGHT)));
-    let render = section(top, "render", "[render]", &view::render_keys(), view::render, first);
-    let camera = |table: Table<'_>| camera::camera(table, reading);
+    let render = |table: Table<'_>| view::render(table, reading);
+    let render = section(top, "render", "[render]", &view::render_keys(), render, first);
+    let integrator = &render.flatten().unwrap_or_default().integrator;
+    if integrator.path().is_some() {
+        reading.idle(top, "ambient", knobs::with(integrator));
+    }
+    let camera = |table: Table<'_>| camera::camera(table, integrator, reading);
     let camera = section(top, "camera", "[camera]", camera::CAMERA_KEYS, camera, first);
     let background = |table: Table<'_>| background::background(table, reading);
     let background =
         section(top, "background", "[background]", background::BACKGROUND_KEYS, background, first);
-    let light = |table: Table<'_>| light::light(table, reading);
+    let light = |table: Table<'_>| light::light(table, integrator, reading);
     let lights = list(top, "light", "[[light]]", (light::LIGHT_KEYS, MAX_LIGHTS), light, first);
-    let mut materials = read_materials(top, reading, first);
+    let mut materials = read_materials(top, integrator, reading, first);
     let plane = |table: Table<'_>| objects::plane(table, &mut materials, reading);
     let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
     let objects = read_objects(top, &mut materials, reading, first);
@@ -283,7 +288,12 @@ fn within<'t>(
 }
 
 /// Reads all materials. All names are collected first, so that a fault in one material hides none in its users.
-fn read_materials(top: Table<'_>, reading: &mut Reading, first: &mut FirstFault) -> Materials {
+fn read_materials(
+    top: Table<'_>,
+    integrator: &Integrator,
+    reading: &mut Reading,
+    first: &mut FirstFault,
+) -> Materials {
     let Some(value) = top.get("material") else { return Materials::default() };
     let Some(entries) = first.keep(material_tables(value)) else { return Materials::default() };
     let mut materials = Materials::named(entries.iter().map(|(name, _)| name.to_string()).collect());
@@ -291,7 +301,7 @@ fn read_materials(top: Table<'_>, reading: &mut Reading, first: &mut FirstFault)
     for (index, (name, value)) in entries.into_iter().enumerate() {
         let name = format!("[material.{}]", fault::shortened(name));
         let read = Table::open(&name, value, material::MATERIAL_KEYS)
-            .and_then(|table| material::material(table, reading));
+            .and_then(|table| material::material(table, integrator, reading));
         if let Some(mut text) = first.keep(read) {
             patterns.extend(text.checker.take().map(|pattern| (index, pattern)));
             materials.define(index, text);

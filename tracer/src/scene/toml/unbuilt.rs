@@ -2,15 +2,7 @@
 
 /// Tables, as named in messages or by the beginning of that name, with their keys and the feature that is missing.
 const UNBUILT: &[(&str, &[&str], &str)] = &[
-    ("[render]", &["seed", "max_noise", "clamp_indirect"], "the path integrator"),
-    ("[render]", &["exposure", "tone"], "tone mapping"),
-    ("[camera]", &["aperture", "focus_distance"], "a lens with an aperture"),
     ("[camera]", &["shutter"], "motion blur"),
-    (
-        "[material.",
-        &["metallic", "roughness", "transmission", "specular_factor"],
-        "a metallic-roughness material",
-    ),
     ("[[model]]", &["translate_end", "rotate_end"], "motion blur"),
     ("[[sphere]]", &["center_end"], "motion blur"),
     ("the scene file", &["volume"], "a volume"),

@@ -45,15 +45,6 @@ impl<'t> Value<'t> {
         Fault::at_value(culprit, format!("{self} must be {expected}, but is {actual}"))
     }
 
-    /// The fault of an unsupported feature of the format.
-    pub(super) fn not_yet(&self, what: &str, instead: &str) -> Fault {
-        let given = match self.value.get_ref() {
-            DeValue::String(word) => format!(" = \"{word}\""),
-            _ => String::new(),
-        };
-        self.fault(format!("{what} ({self}{given}) is not supported yet; {instead}"))
-    }
-
     pub(super) fn table(&self) -> bool {
         self.value.get_ref().is_table()
     }

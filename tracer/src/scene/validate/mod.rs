@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use glam::{DVec3, Vec3};
 
 use super::data::{
-    Attenuation, Background, Camera, CameraKind, FrameView, Light, LightKind, Model, Quality, RenderSettings,
-    Scene, SkyPicture, Triangle,
+    Attenuation, Background, Camera, CameraKind, FrameView, Integrator, Lens, Light, LightKind, Model,
+    PixelFormat, Quality, RenderSettings, Scene, SkyPicture, ToneMapping, Triangle,
 };
 use crate::image::MAX_SIDE;
 use crate::material::{Checker, MAX_EXPONENT, Material, NormalMap};
@@ -32,8 +32,14 @@ pub const MAX_PLANES: usize = 1024;
 pub const MAX_TRIANGLES: usize = 1 << 20;
 /// Largest number of material slots of one model.
 pub const MAX_SLOTS: usize = 1 << 16;
-/// Largest number of rays per pixel.
+/// Largest number of rays per pixel with the direct integrator.
 pub const MAX_SAMPLES: u32 = 256;
+/// Largest number of paths per pixel.
+pub const MAX_PATH_SAMPLES: u32 = 65_536;
+/// Largest limit of indirect light.
+pub const MAX_CLAMP: f32 = 1e6;
+/// Largest exposure in stops, up and down.
+pub const MAX_EXPOSURE: f32 = 64.0;
 /// Largest number of reflections and transmissions of a ray.
 pub const MAX_DEPTH: u8 = 64;
 /// Largest number of points of a light that shadow rays go to.
@@ -103,6 +109,7 @@ impl Scene {
         require(is_color(self.ambient, MAX_LIGHT), || "ambient".into(), "finite and not negative")?;
         check_render(&self.render)?;
         check_camera(&self.camera)?;
+        check_lens(&self.lens)?;
         self.check_background()?;
         each("lights", &self.lights, check_light)?;
         each("textures", &self.textures, check_texture)?;
@@ -222,12 +229,37 @@ impl FrameView {
     /// Checks a view from an untrusted source.
     ///
     /// # Errors
-    /// An invalid camera, a size or sample count out of bounds.
+    /// An invalid camera or lens; a size, a sample count or a number out of bounds; a format or a range of samples that the
+    /// integrator does not have.
     pub fn validate(&self) -> Result<(), ValidateError> {
         check_camera(&self.camera)?;
-        check_size(self.width, self.height, self.samples)?;
+        check_lens(&self.lens)?;
+        check_size(self.width, self.height)?;
+        check_integrator(&self.integrator, self.samples)?;
+        self.check_pass()?;
         check_quality(&self.quality)?;
+        check_tone(&self.tone)?;
         require(is_coordinate(self.spin), || "spin".into(), FINITE)
+    }
+
+    /// Checks the range of samples and the format of a pass. Where pixels stop by their error, a picture is whole.
+    fn check_pass(&self) -> Check {
+        let sums = self.format == PixelFormat::Sums;
+        let first = || "first_sample".into();
+        match &self.integrator {
+            Integrator::Direct => {
+                require(self.first_sample == 0, first, "0 with the direct integrator")?;
+                require(!sums, || "format".into(), "bytes or linear with the direct integrator")
+            }
+            Integrator::Path(settings) => {
+                let end = self.first_sample.checked_add(self.samples);
+                let within = end.is_some_and(|end| end <= MAX_PATH_SAMPLES);
+                require(within, first, "at most 65536 less the number of samples")?;
+                let whole = self.first_sample == 0 && !sums;
+                let noise = || "max_noise".into();
+                require(whole || settings.max_noise == 0.0, noise, "0 for a pass of a picture")
+            }
+        }
     }
 }
 
@@ -244,8 +276,34 @@ fn each<T>(list: &str, items: &[T], check: impl Fn(&T, &str) -> Check) -> Check 
 }
 
 fn check_render(render: &RenderSettings) -> Check {
-    check_size(render.width, render.height, render.samples)?;
-    check_quality(&render.quality)
+    check_size(render.width, render.height)?;
+    check_integrator(&render.integrator, render.samples)?;
+    check_quality(&render.quality)?;
+    check_tone(&render.tone)
+}
+
+fn check_integrator(integrator: &Integrator, samples: u32) -> Check {
+    let counted = is_sample_count(integrator, samples);
+    let Integrator::Path(settings) = integrator else {
+        let expected = "a square number from 1 to 256: 1, 4, 9, 16, ... (with the path integrator any number up to 65536)";
+        return require(counted, || "samples".into(), expected);
+    };
+    require(counted, || "samples".into(), "from 1 to 65536")?;
+    let clamp = (0.0..=MAX_CLAMP).contains(&settings.clamp_indirect);
+    require(clamp, || "clamp_indirect".into(), "from 0 to 1e6")?;
+    require((0.0..=1.0).contains(&settings.max_noise), || "max_noise".into(), "from 0 to 1")
+}
+
+fn check_tone(tone: &ToneMapping) -> Check {
+    let fits = (-MAX_EXPOSURE..=MAX_EXPOSURE).contains(&tone.exposure);
+    require(fits, || "exposure".into(), "from -64 to 64 stops")
+}
+
+fn check_lens(lens: &Lens) -> Check {
+    let aperture = (0.0..=MAX_COORDINATE).contains(&lens.aperture);
+    require(aperture, || "aperture".into(), "not negative, at most 1e30")?;
+    let focus = lens.focus_distance.is_none_or(is_positive);
+    require(focus, || "focus_distance".into(), "above zero and finite")
 }
 
 fn check_quality(quality: &Quality) -> Check {
@@ -256,11 +314,10 @@ fn check_quality(quality: &Quality) -> Check {
     require(samples, || "shadow_samples".into(), "from 1 to 1024")
 }
 
-fn check_size(width: u32, height: u32, samples: u32) -> Check {
+fn check_size(width: u32, height: u32) -> Check {
     let fits = |side| (1..=MAX_SIDE).contains(&side);
     require(fits(width), || "width".into(), "from 1 to 16384 pixels")?;
-    require(fits(height), || "height".into(), "from 1 to 16384 pixels")?;
-    require(is_sample_count(samples), || "samples".into(), "a square number from 1 to 256")
+    require(fits(height), || "height".into(), "from 1 to 16384 pixels")
 }
 
 fn check_camera(camera: &Camera) -> Check {
@@ -340,6 +397,16 @@ fn check_material(material: &Material, name: &str) -> Check {
     require(ior, || format!("{name}.ior"), "from 0.01 to 100")?;
     let absorption = is_color(material.absorption, 1.0) && material.absorption.min_element() > 0.0;
     require(absorption, || format!("{name}.absorption"), "above 0 and at most 1")?;
+    if let Some(model) = &material.metallic_roughness {
+        for (key, share) in [
+            ("metallic", model.metallic),
+            ("roughness", model.roughness),
+            ("transmission", model.transmission),
+            ("specular_factor", model.specular_factor),
+        ] {
+            require((0.0..=1.0).contains(&share), || format!("{name}.{key}"), "from 0 to 1")?;
+        }
+    }
     if let Some(Checker { colors, size, .. }) = &material.checker {
         let colors = colors.iter().all(|color| is_color(*color, 1.0));
         require(colors, || format!("{name}.checker"), "of colours from 0 to 1")?;
@@ -351,10 +418,15 @@ fn check_material(material: &Material, name: &str) -> Check {
     require(fits, || format!("{name}.normal_map.strength"), "from 0 to 100")
 }
 
-/// Whether a pixel can have this number of samples: 1, 4, 9, ... 256.
-pub(in crate::scene) fn is_sample_count(samples: u32) -> bool {
-    let root = samples.isqrt();
-    (1..=MAX_SAMPLES).contains(&samples) && root * root == samples
+/// Whether a pixel can have this number of samples: 1, 4, 9, ... 256 with the direct integrator, 1 to 65536 paths.
+pub(in crate::scene) fn is_sample_count(integrator: &Integrator, samples: u32) -> bool {
+    match integrator {
+        Integrator::Direct => {
+            let root = samples.isqrt();
+            (1..=MAX_SAMPLES).contains(&samples) && root * root == samples
+        }
+        Integrator::Path(_) => (1..=MAX_PATH_SAMPLES).contains(&samples),
+    }
 }
 
 fn is_coordinate(value: f64) -> bool {

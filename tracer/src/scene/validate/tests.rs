@@ -2,7 +2,8 @@ use glam::{DMat3, Vec2};
 
 use super::*;
 use crate::material::CheckerSpace;
-use crate::scene::data::{Disk, NormalMode, Plane, Sky, Sphere};
+use crate::material::MetallicRoughness;
+use crate::scene::data::{Disk, NormalMode, PathSettings, Plane, Sky, Sphere};
 use crate::texture::Filter;
 
 fn scene() -> Scene {
@@ -252,4 +253,109 @@ fn frames_from_the_wire_are_checked() {
     assert!(view.validate().unwrap_err().to_string().starts_with("spin"));
     view = FrameView { width: 0, ..FrameView::of(&scene()) };
     assert!(view.validate().unwrap_err().to_string().contains("1 to 16384"));
+}
+
+fn paths(change: impl FnOnce(&mut PathSettings)) -> Integrator {
+    let mut settings = PathSettings::DEFAULT;
+    change(&mut settings);
+    Integrator::Path(settings)
+}
+
+#[test]
+fn samples_are_counted_by_the_integrator() {
+    for (samples, direct, path) in [
+        (0, false, false),
+        (1, true, true),
+        (2, false, true),
+        (256, true, true),
+        (289, false, true),
+        (65_536, false, true),
+        (65_537, false, false),
+    ] {
+        assert_eq!(is_sample_count(&Integrator::Direct, samples), direct, "{samples}");
+        assert_eq!(is_sample_count(&paths(|_| ()), samples), path, "{samples}");
+        let view = FrameView { integrator: paths(|_| ()), samples, ..FrameView::of(&scene()) };
+        assert_eq!(view.validate().is_ok(), path, "{samples}");
+    }
+}
+
+#[test]
+fn numbers_of_paths_lenses_and_tone_are_bounded() {
+    type Spoil = fn(&mut Scene);
+    let cases: [(Spoil, &str); 11] = [
+        (
+            |s| s.render.integrator = paths(|p| p.clamp_indirect = -1.0),
+            "clamp_indirect must be from 0 to 1e6",
+        ),
+        (|s| s.render.integrator = paths(|p| p.clamp_indirect = f32::NAN), "clamp_indirect"),
+        (|s| s.render.integrator = paths(|p| p.max_noise = 1.5), "max_noise must be from 0 to 1"),
+        (|s| s.render.integrator = paths(|p| p.max_noise = f32::NAN), "max_noise"),
+        (|s| s.render.tone.exposure = 65.0, "exposure must be from -64 to 64 stops"),
+        (|s| s.render.tone.exposure = f32::NAN, "exposure"),
+        (|s| s.lens.aperture = -1.0, "aperture must be not negative"),
+        (|s| s.lens.aperture = f64::NAN, "aperture"),
+        (|s| s.lens.aperture = f64::INFINITY, "aperture"),
+        (|s| s.lens.focus_distance = Some(0.0), "focus_distance must be above zero"),
+        (|s| s.lens.focus_distance = Some(f64::NAN), "focus_distance"),
+    ];
+    for (spoil, expected) in cases {
+        let message = spoiled(spoil);
+        assert!(message.starts_with(expected), "{message} / {expected}");
+        let mut spoiled = scene();
+        spoil(&mut spoiled);
+        let of_view = FrameView::of(&spoiled).validate().unwrap_err().to_string();
+        assert_eq!(of_view, message, "a view is checked as its scene is");
+    }
+}
+
+#[test]
+fn shares_of_metallic_roughness_are_bounded() {
+    let sound = MetallicRoughness {
+        metallic: 1.0,
+        roughness: 0.0,
+        transmission: 1.0,
+        specular_factor: 0.0,
+        texture: None,
+    };
+    let with = |model| spoiled(|s| s.materials[1].metallic_roughness = Some(model));
+    for bad in [-0.5, 1.5, f32::NAN, f32::INFINITY] {
+        for (model, key) in [
+            (MetallicRoughness { metallic: bad, ..sound }, "metallic"),
+            (MetallicRoughness { roughness: bad, ..sound }, "roughness"),
+            (MetallicRoughness { transmission: bad, ..sound }, "transmission"),
+            (MetallicRoughness { specular_factor: bad, ..sound }, "specular_factor"),
+        ] {
+            assert_eq!(with(model), format!("materials[1].{key} must be from 0 to 1"));
+        }
+    }
+    let message = with(MetallicRoughness { texture: Some(0), ..sound });
+    assert_eq!(message, "materials[1].texture must be one of the scene's textures");
+    let mut scene = scene();
+    scene.materials[1].metallic_roughness = Some(sound);
+    assert_eq!(scene.validate(), Ok(()));
+}
+
+#[test]
+fn passes_and_formats_are_those_of_the_integrator() {
+    let direct = FrameView::of(&scene());
+    let path = FrameView { integrator: paths(|_| ()), samples: 16, first_sample: 32, ..direct };
+    let sums = FrameView { format: PixelFormat::Sums, ..path };
+    let linear = FrameView { format: PixelFormat::Linear, ..direct };
+    for view in [path, sums, linear, FrameView { first_sample: 65_520, ..path }] {
+        assert_eq!(view.validate(), Ok(()), "{view:?}");
+    }
+    let goal = paths(|p| p.max_noise = 0.1);
+    let whole = FrameView { integrator: goal, first_sample: 0, ..path };
+    assert_eq!(whole.validate(), Ok(()));
+    for (view, expected) in [
+        (FrameView { first_sample: 1, ..direct }, "first_sample must be 0 with the direct integrator"),
+        (FrameView { format: PixelFormat::Sums, ..direct }, "format must be bytes or linear"),
+        (FrameView { first_sample: 65_521, ..path }, "first_sample must be at most 65536 less"),
+        (FrameView { first_sample: u32::MAX, ..path }, "first_sample must be at most 65536 less"),
+        (FrameView { integrator: goal, ..path }, "max_noise must be 0 for a pass"),
+        (FrameView { integrator: goal, first_sample: 0, ..sums }, "max_noise must be 0 for a pass"),
+    ] {
+        let message = view.validate().unwrap_err().to_string();
+        assert!(message.starts_with(expected), "{message} / {expected}");
+    }
 }

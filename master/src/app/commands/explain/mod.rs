@@ -136,7 +136,7 @@ struct Rays {
 /// A wrong scene.
 pub(super) fn run(args: &ExplainArgs) -> Result<(), CommandError> {
     let source = Source::load(&args.scene, args.models, args.size)?;
-    let wanted = source.still_request(args.size, &args.quality)?;
+    let wanted = source.still_request(args.size, &args.light, &args.quality)?;
     let explanation = explain(&source, &wanted)?;
     if args.json {
         return print_json(&explanation);

@@ -44,6 +44,7 @@ pub(super) fn bare_model(mesh: &CompiledMesh, up: Up, size: Option<(u32, u32)>) 
         camera,
         background: BACKGROUND,
         lights: vec![default_light(&camera)],
+        has_default_light: true,
         models: vec![Model {
             mesh: mesh.id(),
             materials: (0..materials.len() as u32).collect(),

@@ -1,7 +1,7 @@
 //! What the keys of a scene file become once its files are loaded: skies, normal maps, patterns, groups, glass.
 
 use super::*;
-use crate::scene::{Background, CameraKind, SkyPicture};
+use crate::scene::{Background, CameraKind, FrameView, SkyPicture};
 
 fn picture(folder: &Folder, name: &str, width: u32, height: u32) {
     let pixels = vec![200; (3 * width * height) as usize];
@@ -152,4 +152,25 @@ fn glass_of_a_model_reaches_the_scene_through_its_compiled_form() {
     assert_eq!(warnings, [""; 0]);
     std::fs::write(folder.path("a.rfmesh"), mesh.bytes()).unwrap();
     assert_eq!(folder.load("a.rfmesh").scene.materials[0], glass);
+}
+
+#[test]
+fn lenses_and_metallic_roughness_reach_the_scene() {
+    let scene = "aperture = 0.5\nfocus_distance = 3\n[render]\nintegrator = \"path\"\nsamples = 10\nexposure = 1\n\
+                 [material.gold]\ndiffuse = [1, 0.75, 0.25]\nroughness = 0.75\n\
+                 metallic_roughness_texture = { texture = \"rough.png\" }\n\
+                 [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"gold\"\n";
+    let folder = folder(scene);
+    picture(&folder, "rough.png", 2, 2);
+    let LoadedScene { scene, textures, warnings, .. } = folder.load("s.toml");
+    assert_eq!((textures.len(), warnings), (1, Vec::new()));
+    assert_eq!((scene.lens.aperture, scene.lens.focus_distance), (0.5, Some(3.0)));
+    let view = FrameView::of(&scene);
+    assert!(view.integrator.path().is_some() && view.validate().is_ok());
+    assert_eq!((view.lens, view.samples, view.tone.exposure), (scene.lens, 10, 1.0));
+    let gold = scene.materials[scene.spheres[0].material as usize];
+    let model = gold.metallic_roughness.unwrap();
+    assert_eq!((model.metallic, model.roughness, model.texture), (1.0, 0.75, Some(0)));
+    assert_eq!(gold.diffuse, Vec3::new(1.0, 0.75, 0.25), "the base colour");
+    assert_eq!(gold.shown_directly().diffuse, Vec3::ZERO);
 }

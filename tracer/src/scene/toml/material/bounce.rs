@@ -9,14 +9,14 @@ use super::super::value::Value;
 use crate::material::Material;
 use crate::scene::validate::MAX_IOR;
 
-pub(super) fn bounces(table: Table<'_>, base: Material, reading: &mut Reading) -> Read<Material> {
+pub(super) fn bounces(table: Table<'_>, base: Material) -> Read<Material> {
     let share = |value: Value<'_>| value.share();
     let switch = |value: Value<'_>| value.boolean();
     let most = f64::from(MAX_IOR);
     let ior = |value: Value<'_>| value.number("from 0.01 to 100", |n| (1.0 / most..=most).contains(&n));
     let fresnel = table.read("fresnel", switch)?.unwrap_or(false);
     let usual_reflect = if fresnel { Vec3::ONE } else { Vec3::ZERO };
-    let material = Material {
+    Ok(Material {
         reflect: table.read("reflect", share)?.unwrap_or(usual_reflect),
         transmit: table.read("transmit", share)?.unwrap_or(Vec3::ZERO),
         ior: table.read("ior", ior)?.map_or(base.ior, |n| (n as f32).clamp(1.0 / MAX_IOR, MAX_IOR)),
@@ -24,9 +24,7 @@ pub(super) fn bounces(table: Table<'_>, base: Material, reading: &mut Reading) -
         fresnel,
         absorption: table.read("absorption", absorption)?.unwrap_or(Vec3::ONE),
         ..base
-    };
-    warn_about_unused_keys(table, &material, reading);
-    Ok(material)
+    })
 }
 
 /// The share of light that is left after one unit. Nothing at all would be no transmission.
@@ -36,7 +34,8 @@ fn absorption(value: Value<'_>) -> Read<Vec3> {
     if share.min_element() > 0.0 { Ok(share) } else { Err(value.must_be(expected)) }
 }
 
-fn warn_about_unused_keys(table: Table<'_>, material: &Material, reading: &mut Reading) {
+/// Warns about keys that change nothing of a material of reflection and transmission.
+pub(super) fn warn_about_unused_keys(table: Table<'_>, material: &Material, reading: &mut Reading) {
     let transparent = material.is_transparent();
     if !transparent && !material.fresnel {
         reading.idle(table, "ior", "without `transmit` or `fresnel`");

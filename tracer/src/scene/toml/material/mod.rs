@@ -2,6 +2,7 @@
 
 mod bounce;
 mod checker;
+mod metallic;
 mod names;
 mod texture;
 
@@ -12,6 +13,7 @@ use super::fault::Read;
 use super::table::Table;
 use super::value::Value;
 use crate::material::{MAX_EXPONENT, Material};
+use crate::scene::data::Integrator;
 use crate::scene::validate::MAX_LIGHT;
 
 pub(in crate::scene) use texture::{TextureText, TexturesText};
@@ -33,6 +35,11 @@ pub(super) const MATERIAL_KEYS: &[&str] = &[
     "emission",
     "emission_strength",
     "normal_map",
+    "metallic",
+    "roughness",
+    "transmission",
+    "specular_factor",
+    metallic::TEXTURE_KEY,
 ];
 
 /// Default exponent of a material of the scene file.
@@ -45,7 +52,12 @@ pub(super) struct MaterialText {
     pub(super) checker: Option<CheckerText>,
 }
 
-pub(super) fn material(table: Table<'_>, reading: &mut Reading) -> Read<MaterialText> {
+/// Reads a material of a scene that is rendered by `integrator`.
+pub(super) fn material(
+    table: Table<'_>,
+    integrator: &Integrator,
+    reading: &mut Reading,
+) -> Read<MaterialText> {
     let exponent = |value: Value<'_>| {
         value.number("from 0 to 1e6", |n| (0.0..=f64::from(MAX_EXPONENT)).contains(&n)).map(|n| n as f32)
     };
@@ -67,6 +79,7 @@ pub(super) fn material(table: Table<'_>, reading: &mut Reading) -> Read<Material
         diffuse: diffuse.1,
         emission: emission_texture,
         normal_map: table.read("normal_map", texture::normal_map)?,
+        metallic_roughness: table.read(metallic::TEXTURE_KEY, texture::only_texture)?,
     };
     let material = Material {
         diffuse: diffuse.0,
@@ -77,6 +90,13 @@ pub(super) fn material(table: Table<'_>, reading: &mut Reading) -> Read<Material
         checker: checker.as_ref().map(|text| text.pattern),
         ..Material::NEUTRAL
     };
-    let material = bounce::bounces(table, material, reading)?;
+    let material = bounce::bounces(table, material)?;
+    let material = match metallic::model(table)? {
+        Some(model) => metallic::applied(table, material, model, integrator, reading),
+        None => {
+            bounce::warn_about_unused_keys(table, &material, reading);
+            material
+        }
+    };
     Ok(MaterialText { material, textures: Some(textures).filter(|all| !all.is_empty()), checker })
 }

@@ -38,19 +38,25 @@ pub(crate) struct TexturesText {
     pub(crate) diffuse: Option<TextureText>,
     pub(crate) emission: Option<TextureText>,
     pub(crate) normal_map: Option<NormalMapText>,
+    pub(crate) metallic_roughness: Option<TextureText>,
 }
 
 impl TexturesText {
     /// Whether there are none.
     pub(super) fn is_empty(&self) -> bool {
-        self.diffuse.is_none() && self.emission.is_none() && self.normal_map.is_none()
+        self.all().next().is_none()
     }
 
     /// Whether one of the textures needs whole repeats of texture coordinates.
     pub(crate) fn distinguish_repeats(&self) -> bool {
+        self.all().any(|text| text.tiling.distinguishes_repeats())
+    }
+
+    fn all(&self) -> impl Iterator<Item = &TextureText> {
         let normals = self.normal_map.as_ref().map(|map| &map.texture);
-        let all = [self.diffuse.as_ref(), self.emission.as_ref(), normals];
-        all.into_iter().flatten().any(|text| text.tiling.distinguishes_repeats())
+        [self.diffuse.as_ref(), self.emission.as_ref(), normals, self.metallic_roughness.as_ref()]
+            .into_iter()
+            .flatten()
     }
 }
 
@@ -59,8 +65,13 @@ pub(super) fn color_or_texture(value: Value<'_>, limit: f32) -> Read<(Vec3, Opti
     if !value.table() {
         return Ok((value.color(limit)?, None));
     }
+    Ok((Vec3::ONE, Some(only_texture(value)?)))
+}
+
+/// A texture.
+pub(super) fn only_texture(value: Value<'_>) -> Read<TextureText> {
     let name = value.to_string();
-    Ok((Vec3::ONE, Some(texture(Table::open(&name, value.value, TEXTURE_KEYS)?)?)))
+    texture(Table::open(&name, value.value, TEXTURE_KEYS)?)
 }
 
 pub(super) fn normal_map(value: Value<'_>) -> Read<NormalMapText> {

@@ -134,23 +134,7 @@ fn unknown_words_and_materials_are_refused_with_the_nearest() {
 fn unsupported_features_are_refused_by_name() {
     let yet = "not supported yet";
     assert_faults(&[
-        (
-            "[render]\nintegrator = \"path\"",
-            "2:14",
-            &["the path integrator", "`integrator`", yet, "use \"direct\""],
-        ),
-        ("[render]\nseed = 1", "2:1", &["the path integrator (`seed` in [render])", yet, "leave it out"]),
-        ("[render]\nmax_noise = 0", "2:1", &["`max_noise` in [render]", yet]),
-        ("[render]\nclamp_indirect = 0", "2:1", &["`clamp_indirect` in [render]", yet]),
-        ("[render]\nexposure = 1", "2:1", &["tone mapping (`exposure` in [render])", yet]),
-        ("[render]\ntone = \"agx\"", "2:1", &["`tone` in [render]", yet]),
-        ("[camera]\naperture = 0.1", "2:1", &["a lens with an aperture (`aperture` in [camera])", yet]),
-        ("[camera]\nfocus_distance = 1", "2:1", &["`focus_distance`", yet]),
         ("[camera]\nshutter = [0, 1]", "2:1", &["motion blur (`shutter` in [camera])", yet]),
-        ("[material.a]\nmetallic = 1", "2:1", &["metallic-roughness", "`metallic` in [material.a]", yet]),
-        ("[material.a]\nroughness = 1", "2:1", &["`roughness` in [material.a]", yet]),
-        ("[material.a]\ntransmission = 1", "2:1", &["`transmission`", yet]),
-        ("[material.a]\nspecular_factor = 1", "2:1", &["`specular_factor`", yet]),
         ("[[model]]\nfile = \"a.obj\"\ntranslate_end = [0,0,0]", "3:1", &["`translate_end`", yet]),
         ("[[model]]\nfile = \"a.obj\"\nrotate_end = [0,0,0]", "3:1", &["`rotate_end`", yet]),
         ("[[sphere]]\ncenter_end = [0,0,0]", "2:1", &["`center_end` in [[sphere]]", yet]),

@@ -1,5 +1,7 @@
 //! Materials as plain data.
 
+mod direct;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +50,7 @@ pub struct Material {
     /// Whether it casts shadows: without, it lets all light through to what is behind.
     pub casts_shadow: bool,
     /// The metallic-roughness model in place of Blinn-Phong: c_d is then the base colour, and c_s, p_r, c_r and c_t are those by which the
-    /// direct integrator shows the material.
+    /// direct integrator shows the material: see [`Material::shown_directly`].
     pub metallic_roughness: Option<MetallicRoughness>,
 }
 
