@@ -105,7 +105,10 @@ impl PreparedFrame {
             let starts_on = block.starts_on(0, lane).map(|primitive| self.named(primitive));
             RaySegment { origin, direction: ray.direction / self.per_unit, t_max, starts_on }
         };
-        batch.blocks.iter().flat_map(move |block| each_bit(block.live(0)).map(move |lane| segment(block, lane)))
+        batch
+            .blocks
+            .iter()
+            .flat_map(move |block| each_bit(block.live(0)).map(move |lane| segment(block, lane)))
     }
 
     /// The name of a hit's primitive in the scene.

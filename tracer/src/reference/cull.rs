@@ -94,7 +94,8 @@ impl Node {
         let margin = MARGIN * (largest(self.lo).max(largest(self.hi)) + largest(origin));
         let (mut enters, mut leaves) = (0.0_f64, f64::INFINITY);
         for axis in 0..3 {
-            let (below, above) = (self.lo[axis] - margin - origin[axis], self.hi[axis] + margin - origin[axis]);
+            let (below, above) =
+                (self.lo[axis] - margin - origin[axis], self.hi[axis] + margin - origin[axis]);
             if direction[axis] == 0.0 {
                 if below > 0.0 || above < 0.0 {
                     return false;
