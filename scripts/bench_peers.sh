@@ -20,7 +20,9 @@ both give the same picture, and prints milliseconds per frame and their ratio. T
   --rounds N       measurements of both tracers (default 5)
   --frames N       frames a round (default 20)
   --threads LIST   thread counts (default "1 2")
-  --rays           measure 1,000,000 single random rays as well
+  --rays           measure rays as well, on one thread: 1,000,000 single random rays, and the secondary rays of a scene, single
+                   and sixteen together, compared with rtcIntersect1 and rtcOccluded1. Their scenes are models/showroom.toml
+                   and w2 with a mirror for a ground and one glass model
   --only-rays      measure nothing else
   --csv FILE       write the table to FILE as well
   --keep DIR       keep scenes, pictures and all figures in DIR
@@ -37,7 +39,7 @@ fail() { say "bench_peers.sh: $1"; exit "${2:-1}"; }
 workloads=$root/../shared/workloads
 scenes=() rounds=5 frames=20 thread_counts="1 2" csv="" keep=""
 measure_frames=yes measure_rays=no
-rays=1000000 seed=1
+rays=1000000 seed=1 bounced_count=200000
 
 number() { [[ $2 =~ ^[1-9][0-9]*$ ]] || fail "$1: a number from 1 is expected, not \"$2\"" 2; }
 
@@ -110,8 +112,9 @@ target=$(cd "$root" && cargo metadata --format-version 1 --no-deps |
     python3 -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')
 rayfarm=$target/release/rayfarm-master
 single_rays=$target/release/examples/single_rays
+bounced_rays=$target/release/examples/bounced_rays
 if [ "$measure_rays" = yes ]; then
-    (cd "$root" && cargo build --release --package rayfarm-tracer --example single_rays >&2)
+    (cd "$root" && cargo build --release --package rayfarm-tracer --example single_rays --example bounced_rays >&2)
 fi
 
 say "building the tracer on Embree"
@@ -172,6 +175,26 @@ else
     ray_names=("${names[@]}")
 fi
 
+# bounced NAME SCENE: writes the secondary rays of a scene, which are traced in the prepared scene NAME.
+bounced_names=()
+bounced() {
+    say "writing the secondary rays of $1"
+    "$bounced_rays" dump "$2" "$work/$1.rays" --rays "$bounced_count" >&2
+    "$bounced_rays" time "$work/$1.toml" "$work/$1.rays" --hits "$work/$1.rayfarm.hits" >/dev/null
+    "$embree" "$work/$1.txt" --ray-file "$work/$1.rays" --hits "$work/$1.embree.hits" >/dev/null
+    python3 "$peers/compare_hits.py" "$work/$1.rayfarm.hits" "$work/$1.embree.hits" >&2
+    bounced_names+=("$1")
+}
+
+if [ "$measure_rays" = yes ]; then
+    python3 "$peers/prepare_scene.py" "$root/models/showroom.toml" "$work/showroom-rays" --plain
+    bounced showroom-rays "$root/models/showroom.toml"
+    if [ -d "$workloads" ]; then
+        python3 "$peers/prepare_scene.py" "$workloads/w2.toml" "$work/w2-rays" --bounces
+        bounced w2-rays "$work/w2-rays.toml"
+    fi
+fi
+
 # --- the same picture -------------------------------------------------------------------------------------------------
 
 if [ "$measure_frames" = yes ]; then
@@ -212,6 +235,11 @@ for ((round = 1; round <= rounds; ++round)); do
             say "round $round of $rounds: $name, single rays"
             record rays "$name" 1 "$round" rayfarm "$single_rays" "$work/$name.toml" --rays "$rays" --seed "$seed"
             record rays "$name" 1 "$round" embree "$embree" "$work/$name.txt" --rays "$rays" --seed "$seed"
+        done
+        for name in "${bounced_names[@]}"; do
+            say "round $round of $rounds: $name, secondary rays"
+            record bounces "$name" 1 "$round" rayfarm "$bounced_rays" time "$work/$name.toml" "$work/$name.rays"
+            record bounces "$name" 1 "$round" embree "$embree" "$work/$name.txt" --ray-file "$work/$name.rays"
         done
     fi
 done

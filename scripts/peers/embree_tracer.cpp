@@ -9,11 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "bounced_rays.hpp"
 #include "frame.hpp"
 #include "single_rays.hpp"
 
 struct Arguments {
-    std::string scene, picture;
+    std::string scene, picture, ray_file, hit_file;
     EmbreeOptions embree;
     int threads = 1, frames = 20;
     size_t rays = 0;
@@ -22,7 +23,7 @@ struct Arguments {
 
 static const char USAGE[] =
     "usage: embree_tracer SCENE.txt [--threads N] [--frames N] [--out FILE.ppm] [--quality medium|high]\n"
-    "                     [--device EMBREE_CONFIG] [--rays N --seed S]\n"
+    "                     [--device EMBREE_CONFIG] [--rays N --seed S] [--ray-file FILE [--hits FILE]]\n"
     "       embree_tracer --version\n";
 
 static Arguments read_arguments(int argc, char** argv) {
@@ -48,6 +49,8 @@ static Arguments read_arguments(int argc, char** argv) {
         else if (name == "--out") arguments.picture = value;
         else if (name == "--device") arguments.embree.device = value;
         else if (name == "--rays") arguments.rays = std::strtoull(value.c_str(), nullptr, 10);
+        else if (name == "--ray-file") arguments.ray_file = value;
+        else if (name == "--hits") arguments.hit_file = value;
         else if (name == "--seed") arguments.seed = std::strtoull(value.c_str(), nullptr, 10);
         else if (name == "--quality" && value == "medium") arguments.embree.quality = RTC_BUILD_QUALITY_MEDIUM;
         else if (name == "--quality" && value == "high") arguments.embree.quality = RTC_BUILD_QUALITY_HIGH;
@@ -97,7 +100,8 @@ int main(int argc, char** argv) {
         const SceneText text = read_scene_text(arguments.scene);
         arguments.embree.with_triangles = arguments.rays == 0;
         const EmbreeScene scene(text, arguments.embree);
-        if (arguments.rays > 0) single_rays(arguments, scene);
+        if (!arguments.ray_file.empty()) time_bounced_rays(scene, arguments.ray_file, arguments.hit_file);
+        else if (arguments.rays > 0) single_rays(arguments, scene);
         else frames(arguments, text, scene);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "embree_tracer: %s\n", error.what());

@@ -15,15 +15,28 @@ def main():
     parser.add_argument("stem", help="where to write: STEM.toml and STEM.txt")
     parser.add_argument("--plain", action="store_true", help="leave out what the comparison does not have")
     parser.add_argument("--bake", action="store_true", help="make meshes of instances: STEM-MATERIAL.obj")
+    parser.add_argument("--bounces", action="store_true", help="a mirror of the triangles, glass of a model: see bouncing")
     arguments = parser.parse_args()
     try:
         scene = scene_file.load(arguments.scene, arguments.plain)
     except (scene_file.SceneError, OSError, ValueError, KeyError) as error:
         sys.exit(f"prepare_scene.py: {error}")
+    if arguments.bounces:
+        bouncing(scene)
     if arguments.bake:
         scene.models = bake.bake(scene, Path(arguments.stem).resolve())
     Path(arguments.stem + ".toml").write_text(toml_of(scene), encoding="utf-8")
     Path(arguments.stem + ".txt").write_text(numbers_of(scene), encoding="utf-8")
+
+
+def bouncing(scene):
+    """Makes the materials of triangles mirrors, and one model glass: the middle one of the first half."""
+    for triangle in scene.triangles:
+        scene.materials[triangle["material"]]["reflect"] = [0.4, 0.4, 0.4]
+    ones, zeros = [1.0] * 3, [0.0] * 3
+    glass = {"diffuse": zeros, "specular": zeros, "reflect": ones, "transmit": ones, "ior": 1.5, "fresnel": True}
+    scene.materials["glass"] = {"exponent": 32.0, **glass}
+    scene.models[len(scene.models) // 4].material = "glass"
 
 
 def toml_of(scene):

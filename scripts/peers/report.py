@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Makes the tables of bench_peers.sh from what both tracers printed.
 
-Reads lines of `part TAB workload TAB threads TAB round TAB tracer TAB JSON`; a part is `frames` or `rays`.
+Reads lines of `part TAB workload TAB threads TAB round TAB tracer TAB JSON`; a part is `frames`, `rays` or
+`bounces`.
 """
 
 import argparse
@@ -10,12 +11,33 @@ import json
 import sys
 from statistics import median
 
-# Measures of a part: the value in the JSON, its name and its unit.
+
+
+def same(value):
+    return value, value
+
+
+def bounced(ours, theirs, statistic):
+    """Values of one kind of query of rayfarm and of another one of Embree."""
+    return (lambda run: run[ours][statistic]), (lambda run: run[theirs][statistic])
+
+
+# Measures of a part: name, unit, and the values in the JSON of rayfarm and of Embree.
 MEASURES = {
-    "frames": [("frame", "ms", lambda run: run["ms_per_frame"]["median"])],
+    "frames": [("frame", "ms", same(lambda run: run["ms_per_frame"]["median"]))],
     "rays": [
-        ("closest hit", "ns", lambda run: run["ns_per_ray"]),
-        ("any hit", "ns", lambda run: run["ns_per_ray_any_hit"]),
+        ("closest hit", "ns", same(lambda run: run["ns_per_ray"])),
+        ("any hit", "ns", same(lambda run: run["ns_per_ray_any_hit"])),
+    ],
+    "bounces": [
+        (f"{name}, {word}", "ns", bounced(ours, theirs, statistic))
+        for word, statistic in (("median", "median_ns"), ("least", "min_ns"))
+        for name, ours, theirs in (
+            ("closest hit", "closest", "closest"),
+            ("closest hits of sixteen", "closest_sixteen", "closest"),
+            ("any hit", "any", "any"),
+            ("any hits of sixteen", "any_sixteen", "any"),
+        )
     ],
 }
 
@@ -36,9 +58,9 @@ def rows(groups):
         whole = [runs for runs in rounds.values() if len(runs) == 2]
         if not whole:
             continue
-        for name, unit, value in MEASURES[part]:
-            ours = [value(runs["rayfarm"]) for runs in whole]
-            theirs = [value(runs["embree"]) for runs in whole]
+        for name, unit, (our_value, their_value) in MEASURES[part]:
+            ours = [our_value(runs["rayfarm"]) for runs in whole]
+            theirs = [their_value(runs["embree"]) for runs in whole]
             ratios = sorted(a / b for a, b in zip(ours, theirs))
             yield {
                 "part": part,
@@ -73,7 +95,7 @@ def print_table(table, part, unit):
     found = [row for row in table if row["part"] == part]
     if not found:
         return
-    with_measure = part == "rays"
+    with_measure = part != "frames"
     head = ["workload", *(["measure"] if with_measure else []), "threads", f"rayfarm {unit}", f"Embree {unit}"]
     head += ["ratio", "lowest to highest"]
     print("\n| " + " | ".join(head) + " |\n| " + " | ".join("---" for _ in head) + " |")
@@ -94,6 +116,7 @@ def main():
     table = list(rows(groups))
     print_table(table, "frames", "ms")
     print_table(table, "rays", "ns")
+    print_table(table, "bounces", "ns")
     if arguments.csv and table:
         notes = dict(note.split("=", 1) for note in arguments.note)
         with open(arguments.csv, "w", newline="", encoding="utf-8") as file:

@@ -76,6 +76,35 @@ fn every_policy_and_segment_size_renders_the_same_bytes() {
     }
 }
 
+/// A mirror floor with glass, and lamps with soft shadows: by one worker, and by two with another policy.
+#[test]
+fn bounces_and_soft_shadows_are_the_same_bytes_by_one_and_two_workers() {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
+    let scenes = Scenes::new();
+    for name in ["showroom.toml", "room-soft.toml"] {
+        let scene = models.join(name);
+        let expected = traced_at(&scene, |view| (view.width, view.height, view.samples) = (64, 48, 1));
+        let digest = blake3::hash(&expected.pixels).to_string();
+        let picture = |file: &str, workers: &str, more: &[&str]| {
+            let size = ["--size", "64x48", "--samples", "1", "--threads", "1"];
+            let workers = ["--local-workers", workers, "--wait-for-workers", workers];
+            let output = scenes.path(file);
+            let report = render(&scene, &output, &[&size[..], &workers, more].concat());
+            (report, rayfarm_tracer::image::load(&output).unwrap())
+        };
+        let (one, by_one) = picture("one.png", "1", &["--segment", "static:48"]);
+        let (two, by_two) = picture("two.png", "2", &["--segment", "static:5"]);
+        assert!(by_one == expected && by_two == expected, "{name}");
+        for report in [&one, &two] {
+            assert_eq!(report["blake3"], digest, "{name}");
+            assert_eq!(report["rays_per_frame"]["secondary"], one["rays_per_frame"]["secondary"], "{name}");
+        }
+        let bounces = one["rays_per_frame"]["secondary"].as_u64().unwrap() > 0;
+        assert_eq!(bounces, name == "showroom.toml", "{name}");
+        assert_eq!((&one["workers"], &two["workers"]), (&1.into(), &2.into()), "{name}");
+    }
+}
+
 #[test]
 fn compressed_pixels_are_the_same_pixels_in_fewer_bytes() {
     let scenes = Scenes::new();

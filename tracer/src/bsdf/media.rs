@@ -69,7 +69,7 @@ impl Media {
 
     /// Whether light may be absorbed on a way that ends at a surface of a material.
     pub(crate) fn may_absorb(&self, materials: &[Material], end: &Material) -> bool {
-        absorbs(end) || self.innermost().is_some_and(|inside| absorbs(&materials[inside as usize]))
+        end.absorbs() || self.innermost().is_some_and(|inside| materials[inside as usize].absorbs())
     }
 
     /// Share of light that is left after a way inside, which ends at a surface of a material; `way` in world units.
@@ -84,7 +84,7 @@ impl Media {
         let started_inside = !front && self.place_of(material).is_none();
         let body = if started_inside { Some(material) } else { self.innermost() };
         let body = &materials[body? as usize];
-        absorbs(body).then_some(body.absorption)
+        body.absorbs().then_some(body.absorption)
     }
 
     /// Share of light of the background that reaches the start of the ray: a body without end leaves none of a channel that it absorbs.
@@ -93,11 +93,6 @@ impl Media {
         let left = body.absorption.to_array().map(|share| if share < 1.0 { 0.0 } else { 1.0 });
         Some(DVec3::from_array(left))
     }
-}
-
-/// Whether light is absorbed inside of a material.
-fn absorbs(material: &Material) -> bool {
-    material.is_transparent() && !material.thin && material.absorption != Vec3::ONE
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The stages of a tile, for benchmarks: rendering itself reads no clock.
 
+use crate::intersect::RaySegment;
+
 /// A stage of the work on a tile of 256 rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
@@ -23,10 +25,13 @@ impl Stage {
         [Stage::Visible, Stage::Surfaces, Stage::Shading, Stage::Shadows, Stage::Secondary, Stage::Encoding];
 }
 
-/// Receives stage changes. The implementation for `()` compiles to nothing.
+/// Receives stage changes and secondary rays. The implementation for `()` compiles to nothing.
 pub trait Watch {
     /// Ends the previous stage and begins another one.
     fn enter(&mut self, stage: Stage);
+
+    /// Receives the reflected and transmitted rays of a batch, before they are traced.
+    fn secondary_rays(&mut self, _: impl Iterator<Item = RaySegment>) {}
 }
 
 impl Watch for () {

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::Hit;
 use crate::compile::Item;
 use crate::frame::PreparedFrame;
-use crate::rays::{HitBlock, PrimitiveId, RayBlock};
-use crate::simd::LANES;
+use crate::rays::{HitBlock, PrimitiveId, RayBatch, RayBlock, RaySource};
+use crate::simd::{LANES, each_bit};
 
 /// The hit of a ray with the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,6 +95,20 @@ impl PreparedFrame {
             }
         }
         block
+    }
+
+    /// The live rays of a batch in world space, in its order.
+    pub(crate) fn segments_of<'b>(&'b self, batch: &'b RayBatch<'_>) -> impl Iterator<Item = RaySegment> {
+        let segment = move |block: &'b RayBlock<'_>, lane: usize| {
+            let (ray, t_max) = (block.ray(0, lane), block.t_max(lane));
+            let origin = self.view().camera.position + ray.origin / self.per_unit;
+            let starts_on = block.starts_on(0, lane).map(|primitive| self.named(primitive));
+            RaySegment { origin, direction: ray.direction / self.per_unit, t_max, starts_on }
+        };
+        batch
+            .blocks
+            .iter()
+            .flat_map(move |block| each_bit(block.live(0)).map(move |lane| segment(block, lane)))
     }
 
     /// The name of a hit's primitive in the scene.

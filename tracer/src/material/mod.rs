@@ -155,6 +155,11 @@ impl Material {
         self.transmit != Vec3::ZERO
     }
 
+    /// Whether light is absorbed inside of it.
+    pub fn absorbs(&self) -> bool {
+        self.is_transparent() && !self.thin && self.absorption != Vec3::ONE
+    }
+
     /// Whether the emission is not zero.
     pub fn is_emissive(&self) -> bool {
         self.emission != Vec3::ZERO

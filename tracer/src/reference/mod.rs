@@ -1,4 +1,5 @@
-//! The oracle: the shading equations in `f64`, every ray against every primitive, without trees, SIMD or shortcuts.
+//! The oracle: the shading equations in `f64`, without SIMD or shortcuts. Every ray is tested against every
+//! primitive, but for triangles whose boxes it misses clearly.
 //!
 //! Of a frame's quality it applies omitted terms (shadows, highlights) and the filter; it is exact where a setting trades
 //! precision for speed. It shares with the fast path only the scene, the cleaned triangles, the sRGB encoding and on request the
@@ -7,6 +8,7 @@
 //! ```text
 //!   flatten      the scene as a list of primitives
 //!   shape        primitives, and their intersection
+//!   cull         triangles that a ray may hit
 //!   attributes   texture coordinates and vertex colours of points on shapes
 //!   camera       rays of the camera
 //!   visibility   closest hits, and the light that passes between two points
@@ -30,6 +32,7 @@ mod auxiliary;
 mod bodies;
 mod bounce;
 mod camera;
+mod cull;
 mod extent;
 mod flatten;
 mod footprint;
@@ -49,6 +52,7 @@ mod visibility;
 use std::sync::Arc;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::image::RgbImage;
 use crate::intersect::{RayHit, RaySegment};
@@ -57,6 +61,7 @@ use crate::mesh::CompiledMesh;
 use crate::scene::{Filter, FrameView, Light, Scene, TextureMap};
 use crate::srgb;
 use crate::texture::Texture;
+use cull::Boxes;
 use pyramid::Level;
 use shape::Primitive;
 use visibility::Found;
@@ -70,6 +75,7 @@ pub struct Oracle {
     view: FrameView,
     textures: Vec<Arc<Texture>>,
     primitives: Vec<Primitive>,
+    boxes: Boxes,
     /// Points on each light: see [`Oracle::with_light_points`].
     light_points: Vec<Vec<Vec<DVec3>>>,
     /// The levels of each texture; none if no texture is filtered by them.
@@ -87,6 +93,7 @@ impl Oracle {
         view: &FrameView,
     ) -> Self {
         let primitives = flatten::flatten(scene, meshes, view);
+        let boxes = Boxes::new(&primitives);
         let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
         let filter_of = |map: &TextureMap| view.quality.filter.unwrap_or(map.filter);
         let trilinear = scene.textures.iter().any(|map| filter_of(map) == Filter::Trilinear);
@@ -94,7 +101,8 @@ impl Oracle {
             textures.iter().filter(|_| trilinear).map(|texture| pyramid::levels(texture)).collect();
         let shown = scene.shown_directly().filter(|_| view.shows_materials_directly());
         let (scene, textures) = (shown.unwrap_or_else(|| scene.clone()), textures.to_vec());
-        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), pyramids, size }
+        let light_points = Vec::new();
+        Self { scene, view: *view, textures, primitives, boxes, light_points, pyramids, size }
     }
 
     /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,
@@ -140,11 +148,11 @@ impl Oracle {
         srgb::encode(self.shown(&self.camera_ray(x, y)).as_vec3())
     }
 
-    /// The whole picture. The time is proportional to pixels times primitives.
+    /// The whole picture, rows in parallel.
     pub fn render(&self) -> RgbImage {
         let (width, height) = (self.view.width, self.view.height);
-        let pixels =
-            (0..height).flat_map(|y| (0..width).flat_map(move |x| self.encoded_pixel(x, y))).collect();
+        let row = |y: u32| (0..width).flat_map(move |x| self.encoded_pixel(x, y));
+        let pixels = (0..height).into_par_iter().flat_map_iter(row).collect();
         RgbImage { width, height, pixels }
     }
 

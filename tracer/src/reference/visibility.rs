@@ -1,4 +1,4 @@
-//! Closest hits and shadow rays of the oracle: every ray against every primitive.
+//! Closest hits and shadow rays of the oracle: the textbook formulas over all primitives that a ray may hit.
 
 use glam::DVec3;
 
@@ -29,7 +29,9 @@ impl Oracle {
         t_max: f64,
         starts_on: Option<usize>,
     ) -> Option<Found> {
-        let hits = self.primitives.iter().enumerate().filter_map(|(index, primitive)| {
+        let candidates = self.boxes.candidates(origin, direction);
+        let hits = candidates.into_iter().filter_map(|index| {
+            let primitive = &self.primitives[index];
             let hit = if starts_on == Some(index) {
                 primitive.shape.hit_again(origin, direction)
             } else {
@@ -83,7 +85,8 @@ impl Oracle {
         let point = start.position;
         let near = NEAR * (self.size + point.length()) / to_light.length();
         let mut share = DVec3::ONE;
-        for (index, primitive) in self.primitives.iter().enumerate() {
+        for index in self.boxes.candidates(point, to_light) {
+            let primitive = &self.primitives[index];
             let flat = !matches!(primitive.shape, Shape::Sphere { .. });
             if flat && (index == start.on || self.is_on(point, primitive, start.on)) {
                 continue;

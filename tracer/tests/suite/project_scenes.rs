@@ -2,6 +2,7 @@
 //! surface, behind the camera, grazing, many. One pixel in N is compared, because the oracle tests all triangles for
 //! each.
 
+use std::ops::AddAssign;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -18,9 +19,30 @@ fn loaded(name: &str) -> LoadedScene {
     load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(name)).unwrap()
 }
 
-/// Number of compared pixels that differ from the oracle's by more than one step of a channel; every `step`th is
-/// compared.
-fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
+/// Distance in pixels within which a pixel is at an edge: the oracle's colours there bracket the compared colour. Curved glass
+/// and mirrors magnify the rounding of points and normals to `f32`.
+const NEXT_TO: f64 = 1.0 / 128.0;
+
+/// Numbers of compared pixels.
+#[derive(Clone, Copy, Debug, Default)]
+struct Comparison {
+    tested: usize,
+    /// Those that differ from the oracle's by more than one step of a channel, and are at an edge.
+    at_edges: usize,
+    /// Those that differ elsewhere.
+    wrong: usize,
+}
+
+impl AddAssign for Comparison {
+    fn add_assign(&mut self, other: Self) {
+        self.tested += other.tested;
+        self.at_edges += other.at_edges;
+        self.wrong += other.wrong;
+    }
+}
+
+/// Compares every `step`th pixel with the oracle's.
+fn compare(loaded: &LoadedScene, camera: &Camera, step: usize) -> Comparison {
     let scene = &loaded.scene;
     let (width, height, quality) = (WIDTH, HEIGHT, Quality::default());
     let view =
@@ -31,11 +53,29 @@ fn off(loaded: &LoadedScene, camera: &Camera, step: usize) -> usize {
     let mut pixels = vec![0; (WIDTH * HEIGHT * 3) as usize];
     render_rows(&frame, 0..HEIGHT, &mut pixels, &|| false).unwrap();
     let oracle = Oracle::new(scene, &loaded.meshes, &loaded.textures, &view).with_points_of_integrator();
-    let differs = |&i: &u32| {
-        let expected = oracle.encoded_pixel(i % WIDTH, i / WIDTH);
-        pixels[i as usize * 3..][..3].iter().zip(expected).any(|(a, b)| a.abs_diff(b) > 1)
-    };
-    (0..WIDTH * HEIGHT).step_by(step).filter(differs).count()
+    let mut counts = Comparison::default();
+    for i in (0..WIDTH * HEIGHT).step_by(step) {
+        let found = [0, 1, 2].map(|channel| pixels[i as usize * 3 + channel]);
+        let (x, y) = (f64::from(i % WIDTH) + 0.5, f64::from(i / WIDTH) + 0.5);
+        let expected = oracle.encoded_at(x, y);
+        counts.tested += 1;
+        if is_bracketed(found, &[expected]) {
+            continue;
+        }
+        let around = (0..9).map(|k| (f64::from(k % 3 - 1) * NEXT_TO, f64::from(k / 3 - 1) * NEXT_TO));
+        let around: Vec<[u8; 3]> = around.map(|(dx, dy)| oracle.encoded_at(x + dx, y + dy)).collect();
+        if is_bracketed(found, &around) { counts.at_edges += 1 } else { counts.wrong += 1 }
+    }
+    counts
+}
+
+/// Whether each channel is between those of the colours, or within one step of them.
+fn is_bracketed(found: [u8; 3], colors: &[[u8; 3]]) -> bool {
+    (0..3).all(|channel| {
+        let of = || colors.iter().map(|color| color[channel]);
+        let (least, greatest) = (of().min().unwrap(), of().max().unwrap());
+        (least.saturating_sub(1)..=greatest.saturating_add(1)).contains(&found[channel])
+    })
 }
 
 /// The camera of the scene, one amid its objects, and one from the other side.
@@ -89,62 +129,64 @@ fn hard_lights(loaded: &LoadedScene, camera: &Camera) -> Vec<(&'static str, Vec<
     ]
 }
 
-fn check(name: &str, step: usize) {
+/// Compares pictures of a scene. At most `wrong` pixels of all pictures may differ without an edge, and one in 200 at edges.
+fn check(name: &str, step: usize, wrong: usize) {
     let mut loaded = loaded(name);
+    let mut sum = Comparison::default();
     let mut found = Vec::new();
-    for (index, camera) in cameras(&loaded).iter().enumerate() {
-        let count = off(&loaded, camera, step);
-        if count > 0 {
-            found.push(format!("camera {index}: {count}"));
+    let mut add = |what: String, counts: Comparison| {
+        sum += counts;
+        if counts.at_edges + counts.wrong > 0 {
+            found.push(format!("{what}: {counts:?}"));
         }
+    };
+    for (index, camera) in cameras(&loaded).iter().enumerate() {
+        add(format!("camera {index}"), compare(&loaded, camera, step));
     }
     let camera = loaded.scene.camera;
     for (what, lights) in hard_lights(&loaded, &camera) {
         loaded.scene.lights = lights;
-        let count = off(&loaded, &camera, step);
-        if count > 0 {
-            found.push(format!("lights {what}: {count}"));
-        }
+        add(format!("lights {what}"), compare(&loaded, &camera, step));
     }
-    assert!(found.is_empty(), "{name}: {found:?}");
+    assert!(sum.wrong <= wrong && sum.at_edges * 200 <= sum.tested, "{name}: {sum:?}, {found:?}");
 }
 
 #[test]
 fn the_room_matches_the_oracle() {
-    check("room.toml", 281);
+    check("room.toml", 23, 0);
 }
 
 #[test]
 fn the_lights_match_the_oracle() {
-    check("lights.toml", 23);
+    check("lights.toml", 23, 0);
 }
 
 #[test]
 fn the_textures_match_the_oracle() {
-    check("textured.toml", 37);
+    check("textured.toml", 23, 0);
 }
 
 #[test]
 fn the_instances_match_the_oracle() {
-    check("instances.toml", 281);
+    check("instances.toml", 23, 0);
 }
 
 #[test]
 fn the_product_matches_the_oracle() {
-    check("product.toml", 199);
+    check("product.toml", 23, 0);
 }
 
 #[test]
 fn the_table_matches_the_oracle() {
-    check("table.toml", 701);
+    check("table.toml", 23, 0);
 }
 
 #[test]
 fn the_showroom_matches_the_oracle() {
-    check("showroom.toml", 701);
+    check("showroom.toml", 23, 0);
 }
 
 #[test]
 fn the_room_with_soft_shadows_matches_the_oracle() {
-    check("room-soft.toml", 1201);
+    check("room-soft.toml", 23, 0);
 }

@@ -184,6 +184,7 @@ mod tests {
         shadows: false,
         bounces: false,
         transparent: false,
+        absorbing: false,
         shadowless: false,
         soft_shadows: false,
         checkered: false,

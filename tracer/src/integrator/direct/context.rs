@@ -201,6 +201,7 @@ impl<'a, W: Watch> BatchShader<'a> for TileContext<'a, W> {
             return Err(Cancelled);
         }
         self.watch.enter(Stage::Secondary);
+        self.watch.secondary_rays(self.frame.segments_of(batch));
         let live: u32 = (0..BLOCKS).map(|block| batch.live(block).count_ones()).sum();
         self.counts.secondary += u64::from(live);
         self.trace_batch(simd, batch, known);

@@ -1,6 +1,7 @@
 //! The oracle against physics: scenes whose radiance is known by hand.
 //!
 //! ```text
+//!   cull      boxes of triangles
 //!   mirrors   reflection, and the number of rays
 //!   glass     refraction, absorption, total internal reflection, energy
 //!   shadows   penumbrae, transparent occluders, smooth surfaces
@@ -11,6 +12,7 @@
 //! ```
 
 mod cameras;
+mod cull;
 mod filters;
 mod glass;
 mod mirrors;

@@ -27,10 +27,12 @@ pub struct SceneFeatures {
     pub smooth: bool,
     /// A light casts shadows.
     pub shadows: bool,
-    /// A material reflects or transmits: rays bounce.
+    /// A material reflects or transmits: rays bounce, or a transparent body around the camera absorbs.
     pub bounces: bool,
     /// A material transmits: its sides differ, and shadows are not all or nothing.
     pub transparent: bool,
+    /// A transparent material absorbs light: so does the way of a camera's ray that starts inside it.
+    pub absorbing: bool,
     /// A material of some geometry casts no shadow.
     pub shadowless: bool,
     /// A light that casts shadows has an extent.
@@ -63,6 +65,7 @@ impl SceneFeatures {
             shadows: scene.lights.iter().any(|light| light.shadows),
             bounces: any(Material::bounces),
             transparent: any(Material::is_transparent),
+            absorbing: any(Material::absorbs),
             shadowless: any(|material| !material.casts_shadow),
             soft_shadows: scene.lights.iter().any(|light| light.shadows && light.radius > 0.0),
             checkered: any(|material| material.checker.is_some()),
@@ -88,7 +91,7 @@ impl SceneFeatures {
             filtered: shown.filtered && quality.filter != Some(Filter::Nearest),
             shadows: shown.shadows && quality.shadows,
             soft_shadows: shown.soft_shadows && quality.shadows,
-            bounces: shown.bounces && quality.max_depth > 0,
+            bounces: shown.bounces && (quality.max_depth > 0 || shown.absorbing),
             ..shown
         }
     }
@@ -225,6 +228,7 @@ mod tests {
             shadows: true,
             bounces: true,
             transparent: true,
+            absorbing: true,
             shadowless: true,
             soft_shadows: true,
             checkered: true,

@@ -413,6 +413,8 @@ fn check_material(material: &Material, name: &str) -> Check {
         let size = f64::from(*size);
         require(is_positive(size), || format!("{name}.checker.size"), "above zero and finite")?;
     }
+    let one_source = material.checker.is_none() || material.texture.is_none();
+    require(one_source, || format!("{name}.checker"), "without a texture in the same material")?;
     let strength = |map: NormalMap| (0.0..=MAX_NORMAL_STRENGTH).contains(&map.strength);
     let fits = material.normal_map.is_none_or(strength);
     require(fits, || format!("{name}.normal_map.strength"), "from 0 to 100")

@@ -218,6 +218,11 @@ fn patterns_are_bounded_and_laid_on_what_has_coordinates() {
         let message = spoiled(|s| s.materials[1].checker = Some(pattern));
         assert!(message.starts_with("materials[1].checker"), "{message}");
     }
+    let message = spoiled(|s| {
+        laid(s, CheckerSpace::World);
+        s.materials[0].texture = Some(0);
+    });
+    assert_eq!(message, "materials[0].checker must be without a texture in the same material");
     let message = spoiled(|s| s.materials[1].normal_map = Some(NormalMap { texture: 0, strength: 1.0 }));
     assert_eq!(message, "materials[1].texture must be one of the scene's textures");
     let message = spoiled(|s| s.materials[1].normal_map = Some(NormalMap { texture: 0, strength: 101.0 }));

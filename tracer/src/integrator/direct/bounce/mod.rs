@@ -154,6 +154,7 @@ impl<'a> Bounces<'a> {
             self.patterns = std::array::from_fn(|block| tile.pattern(block));
         }
         let materials = &frame.scene().materials;
+        let goes_on = frame.view().quality.max_depth > 0;
         let Shaded { hits, surfaces, colors } = shader.shaded();
         for block in 0..BLOCKS {
             let surface = &surfaces.blocks[block];
@@ -174,7 +175,9 @@ impl<'a> Bounces<'a> {
                 if let Some(left) = left {
                     absorb(&mut colors[block], lane, left);
                 }
-                self.enqueue(&interaction, frame);
+                if goes_on {
+                    self.enqueue(&interaction, frame);
+                }
             }
         }
     }

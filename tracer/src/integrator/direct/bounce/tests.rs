@@ -168,6 +168,13 @@ fn light_is_absorbed_along_its_way_inside() {
     scene.camera.position = DVec3::Z * 0.5;
     scene.camera.look_at = DVec3::Z * 4.0;
     assert_near(center(&render(&scene).0), [0.5_f32.sqrt(), 1.0, 0.8_f32.sqrt()]);
+    // Without a bounce, the same way takes its share of the light of the surface.
+    scene.ambient = Vec3::ONE;
+    scene.materials[0].diffuse = Vec3::splat(0.5);
+    scene.render.quality.max_depth = 0;
+    let (pixels, counts) = render(&scene);
+    assert_near(center(&pixels), [0.5 * 0.5_f32.sqrt(), 0.5, 0.5 * 0.8_f32.sqrt()]);
+    assert_eq!(counts.secondary, 0);
 }
 
 #[test]
