@@ -1,6 +1,7 @@
 //! Batches: up to 256 rays of any origins and directions, as sixteen blocks, so that they are shaded as a tile is.
 
-use super::block::LocalBlock;
+use glam::{DMat3, DVec3};
+
 use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
@@ -103,7 +104,7 @@ impl SurfaceSource for RayBatch<'_> {
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalBatch {
-        LocalBatch(Box::new(std::array::from_fn(|block| self.blocks[block].local(instance))))
+        LocalBatch(instance.map(|instance| (instance.inverse, instance.translation)))
     }
 
     fn are_of_camera(&self) -> bool {
@@ -127,17 +128,26 @@ impl SurfaceSource for RayBatch<'_> {
     }
 }
 
-/// A batch of rays in the space of a mesh, rounded.
-pub(crate) struct LocalBatch(Box<[LocalBlock; BLOCKS]>);
+/// The map from eye space to the space of a mesh, if that is another one: its linear part, after a shift by the negative of a
+/// translation. A block is transformed when a hit of its rays needs it: most rays of a batch hit other meshes.
+pub(crate) struct LocalBatch(Option<(DMat3, DVec3)>);
 
 impl LocalRays<RayBatch<'_>> for LocalBatch {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
-        self.0[block].origins(simd)
+    fn origins<S: Simd>(&self, simd: S, batch: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+        match &self.0 {
+            Some((inverse, translation)) => {
+                batch.blocks[block].mapped(simd, |ray| *inverse * (ray.origin - *translation))
+            }
+            None => batch.blocks[block].origins(simd),
+        }
     }
 
     #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, _: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
-        self.0[block].directions(simd)
+    fn directions<S: Simd>(&self, simd: S, batch: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+        match &self.0 {
+            Some((inverse, _)) => batch.blocks[block].mapped(simd, |ray| *inverse * ray.direction),
+            None => batch.blocks[block].directions(simd),
+        }
     }
 }

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::{PrimitiveId, Ray, RaySource};
-use crate::frame::{Instance, PreparedFrame};
+use crate::frame::PreparedFrame;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd, each_bit};
+use crate::simd::{LANES, Lanes, Simd};
 
 /// Up to sixteen rays of any origins and directions.
 #[derive(Clone)]
@@ -70,18 +70,14 @@ impl<'a> RayBlock<'a> {
         Vec3x16::load(simd, &self.origin)
     }
 
-    /// The live rays in the space of an instance's mesh, or in eye space.
-    pub(crate) fn local(&self, instance: Option<&Instance>) -> LocalBlock {
-        let Some(instance) = instance else {
-            return LocalBlock { origin: self.origin, direction: self.direction };
-        };
-        let mut local = LocalBlock { origin: [Lanes::ZERO; 3], direction: [Lanes::ZERO; 3] };
-        for lane in each_bit(self.live) {
-            let Ray { origin, direction } = instance.to_mesh(&self.rays[lane]);
-            put(&mut local.origin, lane, origin);
-            put(&mut local.direction, lane, direction);
+    /// A vector of each ray, rounded; undefined for rays that are not live.
+    #[inline(always)]
+    pub(crate) fn mapped<S: Simd>(&self, simd: S, of: impl Fn(&Ray) -> DVec3) -> Vec3x16<S> {
+        let mut lanes = [Lanes::ZERO; 3];
+        for (lane, ray) in self.rays.iter().enumerate() {
+            put(&mut lanes, lane, of(ray));
         }
-        local
+        Vec3x16::load(simd, &lanes)
     }
 }
 
@@ -103,24 +99,7 @@ impl RaySource for RayBlock<'_> {
     }
 }
 
-/// A block of rays in the space of a mesh, rounded.
-pub(crate) struct LocalBlock {
-    origin: [Lanes; 3],
-    direction: [Lanes; 3],
-}
-
-impl LocalBlock {
-    #[inline(always)]
-    pub(crate) fn origins<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16::load(simd, &self.origin)
-    }
-
-    #[inline(always)]
-    pub(crate) fn directions<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16::load(simd, &self.direction)
-    }
-}
-
+#[inline(always)]
 fn put(lanes: &mut [Lanes; 3], lane: usize, vector: DVec3) {
     for axis in 0..3 {
         lanes[axis].0[lane] = vector[axis] as f32;
