@@ -8,6 +8,7 @@
 //!   camera     pixels to rays, and the camera's map from eye space to its picture
 //!   affine     the maps
 //!   instance   placed meshes
+//!   passage    how light passes items along shadow rays
 //!   rounding   error bounds of placed geometry
 //!   few        the primitives of scenes with few of them
 //!   sources    the lights that paths select from
@@ -17,6 +18,7 @@ mod affine;
 mod camera;
 mod few;
 mod instance;
+mod passage;
 mod rounding;
 mod sources;
 
@@ -41,6 +43,7 @@ pub(crate) use camera::{CameraRays, FisheyeRay, FisheyeRays, ParallelRays, Pinho
 pub(crate) use few::{Few, FewSphere, FewTriangle};
 pub(crate) use instance::Instance;
 use instance::ToEye;
+use passage::Passage;
 use rounding::placement_rounding;
 pub(crate) use rounding::{F64_ERROR, corner_rounding, mesh_rounding};
 
@@ -77,8 +80,10 @@ pub struct PreparedFrame {
     /// The scene's tree, with the boxes of this frame.
     pub(crate) nodes: Vec<WideNode>,
     pub(crate) features: SceneFeatures,
-    /// Whether light may pass each item and plane; empty in scenes where none lets it pass.
-    translucent: Vec<bool>,
+    /// How light passes each item and plane; empty in scenes where none lets it pass.
+    passages: Vec<Passage>,
+    /// Whether an item dims the light that passes it.
+    has_translucent_items: bool,
     /// The level of SIMD that renders the frame.
     pub(crate) level: Level,
 }
@@ -154,7 +159,8 @@ impl PreparedFrame {
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
-            translucent: Vec::new(),
+            passages: Vec::new(),
+            has_translucent_items: false,
             features: scene.features().at(&view.quality),
             level: simd::best(),
             scene,
@@ -165,7 +171,8 @@ impl PreparedFrame {
         let bounces = frame.features.bounces || view.integrator.path().is_some();
         frame.few = bounces.then(|| Few::of(&frame)).flatten();
         frame.light_table = view.integrator.path().and_then(|_| sources::light_table(&frame));
-        frame.translucent = frame.find_translucent();
+        frame.passages = frame.find_passages();
+        frame.has_translucent_items = frame.passages.contains(&Passage::Dimmed);
         frame.nodes = frame.scene.tree().refitted(|item| frame.item_bounds(frame.items.get(item)));
         Ok(frame)
     }
@@ -224,33 +231,46 @@ impl PreparedFrame {
         &self.scene.tree().blocks[block as usize]
     }
 
-    /// Whether light may pass an item or plane: one of its materials is transparent, or casts no shadow.
+    /// Whether some but not all light may pass an item or plane along shadow rays.
     #[inline(always)]
     pub(crate) fn is_translucent(&self, item: u32) -> bool {
-        self.translucent.get(item as usize).is_some_and(|&translucent| translucent)
+        self.passages.get(item as usize) == Some(&Passage::Dimmed)
     }
 
-    /// Whether light may pass anything.
+    /// Whether all light passes an item or plane along shadow rays.
+    #[inline(always)]
+    pub(crate) fn is_clear(&self, item: u32) -> bool {
+        self.passages.get(item as usize) == Some(&Passage::Free)
+    }
+
+    /// Whether there are items that some but not all light may pass.
+    #[inline(always)]
     pub(crate) fn has_translucent_items(&self) -> bool {
-        !self.translucent.is_empty()
+        self.has_translucent_items
     }
 
-    fn find_translucent(&self) -> Vec<bool> {
+    /// Whether light may pass anything along shadow rays.
+    pub(crate) fn has_passages(&self) -> bool {
+        !self.passages.is_empty()
+    }
+
+    fn find_passages(&self) -> Vec<Passage> {
         let scene = self.scene();
-        let lets_pass = |index: &u32| {
-            let material = &scene.materials[*index as usize];
-            material.is_transparent() || !material.casts_shadow
-        };
-        if !(self.features.transparent || self.features.shadowless) {
+        let of_paths = self.view.integrator.path().is_some();
+        if !(self.features.transparent && !of_paths || self.features.shadowless) {
             return Vec::new();
         }
+        let of = |indices: &[u32]| {
+            let materials = indices.iter().map(|index| &scene.materials[*index as usize]);
+            if of_paths { Passage::of_paths(materials) } else { Passage::of(materials) }
+        };
         let of_items = self.items.range().map(|index| match self.items.get(index) {
-            Item::Model(i) => scene.models[i].materials.iter().any(lets_pass),
-            Item::Sphere(i) => lets_pass(&scene.spheres[i].material),
-            Item::Triangle(i) => lets_pass(&scene.triangles[i].material),
-            Item::Disk(i) => lets_pass(&scene.disks[i].material),
+            Item::Model(i) => of(&scene.models[i].materials),
+            Item::Sphere(i) => of(&[scene.spheres[i].material]),
+            Item::Triangle(i) => of(&[scene.triangles[i].material]),
+            Item::Disk(i) => of(&[scene.disks[i].material]),
         });
-        of_items.chain(scene.planes.iter().map(|plane| lets_pass(&plane.material))).collect()
+        of_items.chain(scene.planes.iter().map(|plane| of(&[plane.material]))).collect()
     }
 
     /// Bounds of an item in eye space, padded.

@@ -42,9 +42,10 @@ impl PreparedFrame {
         self.slack_of(ray, &self.crossing(ray, primitive, t), t)
     }
 
-    /// Whether a ray hits the front of a primitive at `t`.
-    pub(super) fn is_front(&self, ray: &Ray, primitive: PrimitiveId, t: f64) -> bool {
-        self.crossing(ray, primitive, t).faces
+    /// Whether a ray hits the front of a primitive at `t`, and [`PreparedFrame::slack`].
+    pub(super) fn side_and_slack(&self, ray: &Ray, primitive: PrimitiveId, t: f64) -> (bool, f64) {
+        let crossing = self.crossing(ray, primitive, t);
+        (crossing.faces, self.slack_of(ray, &crossing, t))
     }
 
     fn slack_of(&self, ray: &Ray, crossing: &Crossing, t: f64) -> f64 {

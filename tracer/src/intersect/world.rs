@@ -70,7 +70,7 @@ impl PreparedFrame {
 
     /// Whether there is a hit with 0 < t < `t_max`. The same as [`PreparedFrame::closest_hit`], in less time.
     pub fn any_hit(&self, origin: DVec3, direction: DVec3, t_max: f64) -> bool {
-        self.to_eye(origin, direction).is_some_and(|ray| self.occluded(&ray, t_max, None))
+        self.to_eye(origin, direction).is_some_and(|ray| self.hits_anything(&ray, t_max, None))
     }
 
     /// The closest hits of up to sixteen rays of any origins and directions, each that of [`PreparedFrame::closest_hit`],

@@ -1,6 +1,7 @@
 //! Batches: up to 256 rays of any origins and directions, as sixteen blocks, so that they are shaded as a tile is.
 
-use super::block::ToMesh;
+use glam::{DMat3, DVec3};
+
 use super::{BLOCKS, LocalRays, PrimitiveId, Ray, RayBlock, RaySource, SurfaceSource, TileRays, TileSamples};
 use crate::frame::{Instance, PreparedFrame};
 use crate::simd::vector::Vec3x16;
@@ -103,7 +104,7 @@ impl SurfaceSource for RayBatch<'_> {
     }
 
     fn local(&self, instance: Option<&Instance>) -> LocalBatch {
-        LocalBatch(instance.map(ToMesh::of))
+        LocalBatch(instance.map(|instance| (instance.inverse, instance.translation)))
     }
 
     fn are_of_camera(&self) -> bool {
@@ -127,24 +128,26 @@ impl SurfaceSource for RayBatch<'_> {
     }
 }
 
-/// The space of a mesh, or eye space. Rays are transformed block by block, when they are needed: those of bounces hit many items, and each
-/// of them in few blocks.
-pub(crate) struct LocalBatch(Option<ToMesh>);
+/// The map from eye space to the space of a mesh, if that is another one: its linear part, after a shift by the negative of a
+/// translation. A block is transformed when a hit of its rays needs it: most rays of a batch hit other meshes.
+pub(crate) struct LocalBatch(Option<(DMat3, DVec3)>);
 
 impl LocalRays<RayBatch<'_>> for LocalBatch {
     #[inline(always)]
-    fn origins<S: Simd>(&self, simd: S, rays: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+    fn origins<S: Simd>(&self, simd: S, batch: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
         match &self.0 {
-            None => rays.blocks[block].origins(simd),
-            Some(to_mesh) => rays.blocks[block].origins_in(simd, to_mesh),
+            Some((inverse, translation)) => {
+                batch.blocks[block].mapped(simd, |ray| *inverse * (ray.origin - *translation))
+            }
+            None => batch.blocks[block].origins(simd),
         }
     }
 
     #[inline(always)]
-    fn directions<S: Simd>(&self, simd: S, rays: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
+    fn directions<S: Simd>(&self, simd: S, batch: &RayBatch<'_>, block: usize) -> Vec3x16<S> {
         match &self.0 {
-            None => rays.blocks[block].directions(simd),
-            Some(to_mesh) => rays.blocks[block].directions_in(simd, to_mesh),
+            Some((inverse, _)) => batch.blocks[block].mapped(simd, |ray| *inverse * ray.direction),
+            None => batch.blocks[block].directions(simd),
         }
     }
 }

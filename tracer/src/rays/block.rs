@@ -1,11 +1,11 @@
 //! Blocks of any sixteen rays: the rays of bounces, which have no origin in common.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::{PrimitiveId, Ray, RaySource};
-use crate::frame::{Instance, PreparedFrame};
+use crate::frame::PreparedFrame;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{LANES, Lanes, Simd, each_bit};
+use crate::simd::{LANES, Lanes, Simd};
 
 /// Up to sixteen rays of any origins and directions.
 #[derive(Clone)]
@@ -70,24 +70,14 @@ impl<'a> RayBlock<'a> {
         Vec3x16::load(simd, &self.origin)
     }
 
-    /// Origins of the live rays in the space of a mesh, rounded.
+    /// A vector of each ray, rounded; undefined for rays that are not live.
     #[inline(always)]
-    pub(super) fn origins_in<S: Simd>(&self, simd: S, to_mesh: &ToMesh) -> Vec3x16<S> {
-        let mut origins = [Lanes::ZERO; 3];
-        for lane in each_bit(self.live) {
-            put(&mut origins, lane, to_mesh.inverse * (self.rays[lane].origin - to_mesh.translation));
+    pub(crate) fn mapped<S: Simd>(&self, simd: S, of: impl Fn(&Ray) -> DVec3) -> Vec3x16<S> {
+        let mut lanes = [Lanes::ZERO; 3];
+        for (lane, ray) in self.rays.iter().enumerate() {
+            put(&mut lanes, lane, of(ray));
         }
-        Vec3x16::load(simd, &origins)
-    }
-
-    /// Directions of the live rays in the space of a mesh, rounded.
-    #[inline(always)]
-    pub(super) fn directions_in<S: Simd>(&self, simd: S, to_mesh: &ToMesh) -> Vec3x16<S> {
-        let mut directions = [Lanes::ZERO; 3];
-        for lane in each_bit(self.live) {
-            put(&mut directions, lane, to_mesh.inverse * self.rays[lane].direction);
-        }
-        Vec3x16::load(simd, &directions)
+        Vec3x16::load(simd, &lanes)
     }
 }
 
@@ -109,19 +99,7 @@ impl RaySource for RayBlock<'_> {
     }
 }
 
-/// Map from eye space to the space of a mesh.
-pub(super) struct ToMesh {
-    inverse: DMat3,
-    translation: DVec3,
-}
-
-impl ToMesh {
-    /// The map of an instance.
-    pub(super) fn of(instance: &Instance) -> Self {
-        Self { inverse: instance.inverse, translation: instance.translation }
-    }
-}
-
+#[inline(always)]
 fn put(lanes: &mut [Lanes; 3], lane: usize, vector: DVec3) {
     for axis in 0..3 {
         lanes[axis].0[lane] = vector[axis] as f32;

@@ -348,7 +348,7 @@ impl Group<'_> {
                 self.shadow_rays.set(lane, ray, end, self.hits[block].primitive(lane));
             }
             self.counts.shadow += u64::from(shadowed.count_ones());
-            visible &= !self.frame.any_hits_of(&self.shadow_rays);
+            visible &= !self.frame.occluded_of(&self.shadow_rays);
             watch.enter(Stage::Shading);
         }
         self.add(simd, block, visible, bounce + 1, light);

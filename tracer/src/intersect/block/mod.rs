@@ -12,7 +12,7 @@ mod few;
 mod tests;
 
 use super::Hit;
-use super::single::{Stack, with_stack};
+use super::single::{Any, Stack, with_stack};
 use crate::frame::PreparedFrame;
 use crate::rays::{HitBlock, RayBlock, RaySource};
 use crate::simd::{Simd, dispatch, each_bit};
@@ -40,15 +40,28 @@ impl PreparedFrame {
 
     /// Bits of the live rays of a block that hit anything.
     pub(crate) fn any_hits_of(&self, block: &RayBlock<'_>) -> u32 {
+        self.hits_of(block, false)
+    }
+
+    /// Bits of the live rays of a block that hit anything that does not let all light pass.
+    pub(crate) fn occluded_of(&self, block: &RayBlock<'_>) -> u32 {
+        self.hits_of(block, true)
+    }
+
+    fn hits_of(&self, block: &RayBlock<'_>, of_light: bool) -> u32 {
         let [occluded, undecided] = match &self.few {
-            Some(few) => dispatch!(self.level, simd => few.find_any(simd, block)),
-            None => [0, block.live(0)],
+            Some(few) if !(of_light && self.has_passages()) => {
+                dispatch!(self.level, simd => few.find_any(simd, block))
+            }
+            _ => [0, block.live(0)],
         };
         if undecided == 0 {
             return occluded;
         }
-        occluded
-            | with_stack(|stack| dispatch!(self.level, simd => self.find_any(simd, stack, block, undecided)))
+        let found = with_stack(
+            |stack| dispatch!(self.level, simd => self.find_any(simd, stack, block, undecided, of_light)),
+        );
+        occluded | found
     }
 
     /// The exact hit of a ray whose primitive is known.
@@ -77,11 +90,19 @@ impl PreparedFrame {
     }
 
     #[inline(always)]
-    fn find_any<S: Simd>(&self, simd: S, mut stack: Stack, block: &RayBlock<'_>, lanes: u32) -> u32 {
+    fn find_any<S: Simd>(
+        &self,
+        simd: S,
+        mut stack: Stack,
+        block: &RayBlock<'_>,
+        lanes: u32,
+        of_light: bool,
+    ) -> u32 {
         let mut occluded = 0;
         for lane in each_bit(lanes) {
-            let (ray, starts_on) = (block.ray(0, lane), block.starts_on(0, lane));
-            let hit = self.hits_any(simd, stack.above(), &ray, block.t_max(lane), starts_on);
+            let (ray, starts_on) = (&block.ray(0, lane), block.starts_on(0, lane));
+            let any = Any { of_light, frame: self, ray, t_max: block.t_max(lane), starts_on };
+            let hit = self.hits_any(simd, stack.above(), &any);
             occluded |= u32::from(hit) << lane;
         }
         occluded

@@ -28,11 +28,14 @@ impl PreparedFrame {
         query: &mut impl RayQuery,
     ) -> ControlFlow<()> {
         for plane in 0..self.planes.len() as u32 {
-            self.visit_item(ray, self.items.first_plane() + plane, query)?;
+            let plane = self.items.first_plane() + plane;
+            if !query.skips(plane) {
+                self.visit_item(ray, plane, query)?;
+            }
         }
         // A single model: its own tree is all there is to walk.
         if let ([instance], 1) = (&self.instances[..], self.items.first_plane()) {
-            return instance.search(simd, ray, 0, stack, query);
+            return if query.skips(0) { Continue(()) } else { instance.search(simd, ray, 0, stack, query) };
         }
         let bounds = || self.nodes[0].bounds();
         let Some(near) = NearRay::new(*ray, 0.0, bounds) else { return Continue(()) };
@@ -66,6 +69,9 @@ impl<S: Simd, T: RayQuery> LeafVisitor<S> for ItemLeaves<'_, T> {
     #[inline(always)]
     fn visit(&mut self, simd: S, leaf: u32, _: f32, mut stack: Stack) -> ControlFlow<(), bool> {
         for &item in self.frame.items_of(leaf) {
+            if self.query.skips(item) {
+                continue;
+            }
             if let Item::Model(index) = self.frame.items.get(item) {
                 let instance = &self.frame.instances[index];
                 instance.search(simd, self.ray, item, stack.above(), self.query)?;

@@ -21,8 +21,8 @@ mod tests;
 mod transmittance;
 mod traversal;
 
-use query::{Any, Closest};
-pub(super) use query::{Candidate, RayQuery};
+use query::Closest;
+pub(super) use query::{Any, Candidate, RayQuery};
 pub(crate) use transmittance::Crossings;
 pub(super) use traversal::{Stack, with_stack};
 
@@ -45,8 +45,17 @@ impl PreparedFrame {
     }
 
     /// Whether anything is hit within 0 < t < `t_max` by a ray that may start on a primitive.
+    pub(crate) fn hits_anything(&self, ray: &Ray, t_max: f64, starts_on: Option<PrimitiveId>) -> bool {
+        self.any_of(&Any { of_light: false, frame: self, ray, t_max, starts_on })
+    }
+
+    /// Whether anything that does not let all light pass is hit within 0 < t < `t_max` by a ray that may start on a primitive.
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f64, starts_on: Option<PrimitiveId>) -> bool {
-        with_stack(|stack| dispatch!(self.level, simd => self.hits_any(simd, stack, ray, t_max, starts_on)))
+        self.any_of(&Any { of_light: true, frame: self, ray, t_max, starts_on })
+    }
+
+    fn any_of(&self, any: &Any<'_>) -> bool {
+        with_stack(|stack| dispatch!(self.level, simd => self.hits_any(simd, stack, any)))
     }
 
     /// The primitive of the nearest hit, and whether others may coincide with it: then [`PreparedFrame::preferred`] decides,
@@ -67,16 +76,9 @@ impl PreparedFrame {
 
     /// Whether anything is hit.
     #[inline(always)]
-    pub(super) fn hits_any<S: Simd>(
-        &self,
-        simd: S,
-        stack: Stack,
-        ray: &Ray,
-        t_max: f64,
-        starts_on: Option<PrimitiveId>,
-    ) -> bool {
-        let mut any = Any { frame: self, ray, t_max, starts_on };
-        self.search(simd, ray, stack, &mut any).is_break()
+    pub(super) fn hits_any<S: Simd>(&self, simd: S, stack: Stack, any: &Any<'_>) -> bool {
+        let mut any = *any;
+        self.search(simd, any.ray, stack, &mut any).is_break()
     }
 
     /// Passes every primitive that the ray may hit to a query, those in nearer boxes first.

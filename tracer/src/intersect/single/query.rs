@@ -27,6 +27,12 @@ pub(in crate::intersect) trait RayQuery {
     /// Whether the ray starts on this primitive.
     fn starts_on(&self, primitive: PrimitiveId) -> bool;
 
+    /// Whether no primitive of an item or plane matters.
+    #[inline(always)]
+    fn skips(&self, _item: u32) -> bool {
+        false
+    }
+
     /// Considers a candidate. Breaks when no further candidate matters.
     fn consider(&mut self, candidate: Candidate) -> ControlFlow<()>;
 }
@@ -108,7 +114,10 @@ impl RayQuery for Closest<'_> {
 }
 
 /// Query for any hit with t in (0, `t_max`).
-pub(super) struct Any<'a> {
+#[derive(Clone, Copy)]
+pub(in crate::intersect) struct Any<'a> {
+    /// Whether items do not count that let all light pass.
+    pub of_light: bool,
     pub frame: &'a PreparedFrame,
     pub ray: &'a Ray,
     pub t_max: f64,
@@ -132,6 +141,11 @@ impl RayQuery for Any<'_> {
     #[inline(always)]
     fn starts_on(&self, primitive: PrimitiveId) -> bool {
         self.starts_on == Some(primitive)
+    }
+
+    #[inline(always)]
+    fn skips(&self, item: u32) -> bool {
+        self.of_light && self.frame.is_clear(item)
     }
 
     #[inline(always)]

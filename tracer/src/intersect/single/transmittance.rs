@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow::{self, Break, Continue};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::query::{Candidate, RayQuery};
 use crate::compile::Item;
@@ -32,9 +32,10 @@ struct Crossing {
 
 impl PreparedFrame {
     /// Share of light, linear RGB, that passes all surfaces within 0 < t < `t_max`: the product of their c_t, in the order of
-    /// their distances. Surfaces that cast no shadow let all light pass, opaque ones none, and more than 256 transparent ones
-    /// none. Of a sphere both sides count. Light is neither bent nor absorbed on its way inside. Of surfaces that coincide (see
-    /// `coincide`) and are hit from the same side one counts: two triangles at the edge that they share are one surface.
+    /// their distances. Surfaces that cast no shadow or whose c_t is 1 let all light pass, opaque ones none, and more than 256
+    /// other ones none. Of a sphere both sides count. Light is neither bent nor absorbed on its way inside. Of surfaces that
+    /// coincide (see `coincide`) and are hit from the same side one counts: two triangles at the edge that they share are one
+    /// surface.
     pub(crate) fn transmittance(
         &self,
         ray: &Ray,
@@ -107,10 +108,11 @@ impl Transmitted<'_> {
         if self.crossings.0.len() == MOST_CROSSINGS {
             return self.block();
         }
+        let (front, slack) = self.frame.side_and_slack(self.ray, primitive, t);
         self.crossings.0.push(Crossing {
             t,
-            front: self.frame.is_front(self.ray, primitive, t),
-            slack: self.frame.slack(self.ray, primitive, t),
+            front,
+            slack,
             rank: self.frame.rank(primitive),
             transmit: material.transmit.as_dvec3(),
         });
@@ -132,10 +134,15 @@ impl RayQuery for Transmitted<'_> {
         self.starts_on == Some(primitive)
     }
 
+    #[inline(always)]
+    fn skips(&self, item: u32) -> bool {
+        self.frame.is_clear(item)
+    }
+
     fn consider(&mut self, Candidate { primitive, .. }: Candidate) -> ControlFlow<()> {
         let frame = self.frame;
         let material = frame.material_of(primitive);
-        if !material.casts_shadow {
+        if !material.casts_shadow || material.transmit == Vec3::ONE {
             return Continue(());
         }
         let t = frame.t_of(self.ray, primitive, self.starts_on).filter(|&t| t < self.t_max);

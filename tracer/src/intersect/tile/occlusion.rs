@@ -39,12 +39,13 @@ impl<'a> OcclusionQuery<'a> {
         Self { tile, rays, points, item: NO_ITEM, cutouts: &[], is_translucent: false }
     }
 
-    /// Selects the item that is tested next.
+    /// Selects the item that is tested next. Returns whether it stops any light.
     #[inline(always)]
-    pub(super) fn turn_to(&mut self, item: u32) {
+    pub(super) fn turn_to(&mut self, item: u32) -> bool {
         self.item = item;
         self.cutouts = self.tile.frame.cutouts_of(item);
         self.is_translucent = self.tile.frame.is_translucent(item);
+        !self.tile.frame.is_clear(item)
     }
 
     /// Tests the selected item against all open points.

@@ -64,13 +64,15 @@ impl ShadowTile<'_> {
                 continue;
             }
             for &item in self.frame.items_of(leaf.index) {
-                query.turn_to(item);
-                query.cover_item(simd, &projection, mesh_frontier, projected);
+                if query.turn_to(item) {
+                    query.cover_item(simd, &projection, mesh_frontier, projected);
+                }
             }
         }
         for plane in 0..self.frame.planes.len() as u32 {
-            query.turn_to(self.frame.items.first_plane() + plane);
-            query.test_item();
+            if query.turn_to(self.frame.items.first_plane() + plane) {
+                query.test_item();
+            }
         }
     }
 }

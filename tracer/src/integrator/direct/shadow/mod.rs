@@ -15,10 +15,10 @@ use crate::rays::{BLOCKS, HitBlock, RayBlock, RaySource, ShadowTarget, ShadowTil
 use crate::simd::{Lanes, Simd, each_bit};
 pub(super) use partial::add as add_partly_occluded;
 
-/// Whether S_j of a light may be other than 0 and 1, or surfaces may be no occluders.
+/// Whether S_j of a light may be other than 0 and 1.
 #[inline(always)]
 pub(super) fn is_partial(frame: &PreparedFrame, light: &EyeLight) -> bool {
-    light.extent.is_some() || frame.features.transparent || frame.features.shadowless
+    light.extent.is_some() || frame.has_translucent_items()
 }
 
 /// Bits of the lit points of a tile that are in the shadow of a light.
@@ -75,7 +75,7 @@ fn occluded_one_by_one(tile: &ShadowTile<'_>) -> [u32; BLOCKS] {
         for lane in each_bit(lit[block]) {
             block_rays.set(lane, tile.ray(block, lane), t_max, tile.starts_on(block, lane));
         }
-        frame.any_hits_of(&block_rays)
+        frame.occluded_of(&block_rays)
     })
 }
 
