@@ -280,7 +280,7 @@ fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
 fn lights(scene: &Scene, quality: &Quality, to_eye: &ToEye) -> Vec<EyeLight> {
     let cast = |light: &Light| Light {
         shadows: light.shadows && quality.shadows,
-        shadow_samples: light.shadow_samples.or(Some(quality.shadow_samples)),
+        shadow_samples: Some(light.shadow_samples_at(&scene.render.quality, quality)),
         ..*light
     };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
