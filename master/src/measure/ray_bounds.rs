@@ -41,7 +41,7 @@ fn shadow(scene: &Scene, features: &SceneFeatures, quality: &Quality) -> u64 {
     }
     let points = |light: &Light| {
         let soft = light.radius > 0.0;
-        if soft { u64::from(light.shadow_samples.unwrap_or(quality.shadow_samples)) } else { 1 }
+        if soft { u64::from(light.shadow_samples_at(&scene.render.quality, quality)) } else { 1 }
     };
     scene.lights.iter().filter(|light| light.shadows).map(points).sum()
 }

@@ -117,7 +117,8 @@ impl Oracle {
     #[must_use]
     pub fn with_points_of_integrator(self) -> Self {
         let sets_of = |light: &Light| {
-            let sets = Sets::of(light.shadow_samples.unwrap_or(self.view.quality.shadow_samples).max(1));
+            let full = &self.scene.render.quality;
+            let sets = Sets::of(light.shadow_samples_at(full, &self.view.quality));
             (0..sets.count()).map(|set| sets.points(set).to_vec()).collect()
         };
         let light_points = self.scene.lights.iter().map(sets_of).collect();
