@@ -321,7 +321,7 @@ fn lights(scene: &CompiledScene, view: &FrameView, to_eye: &ToEye) -> Vec<EyeLig
     }
     let cast = |light: &Light| Light {
         shadows: light.shadows && quality.shadows,
-        shadow_samples: Some(light.shadow_samples_at(&scene.render.quality, quality)),
+        shadow_samples: Some(light.shadow_samples_at(&source.render.quality, quality)),
         ..*light
     };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
