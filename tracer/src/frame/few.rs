@@ -1,7 +1,12 @@
 //! The primitives of a scene that has only few of them, for blocks of rays: see `intersect::block`.
 
-use super::PreparedFrame;
+use glam::DVec3;
+
+use super::{EyeTriangle, PreparedFrame};
 use crate::compile::Item;
+
+/// Largest distance of the fourth corner of a parallelogram from its place, relative to the edges.
+const FLAT: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// Most primitives: more are searched by their tree.
 const MOST: u32 = 40;
@@ -9,16 +14,19 @@ const MOST: u32 = 40;
 /// The primitives of a scene without models and planes, in `f32`.
 #[derive(Clone, Debug)]
 pub(crate) struct Few {
+    /// Triangles, with both halves of a parallelogram as one.
     pub triangles: Vec<FewTriangle>,
     pub spheres: Vec<FewSphere>,
     /// Largest difference of coincident surfaces.
     pub drift: f32,
 }
 
-/// A triangle.
+/// A triangle, or the parallelogram of two.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FewTriangle {
     pub item: u32,
+    /// The half of the parallelogram that is across the edge between the ends of `edges`.
+    pub other_half: Option<u32>,
     pub corner: [f32; 3],
     pub edges: [[f32; 3]; 2],
     /// Largest coordinate of the corners.
@@ -50,6 +58,7 @@ impl Few {
         }
         let mut few =
             Self { triangles: Vec::new(), spheres: Vec::new(), drift: (4.0 * frame.coarsest) as f32 };
+        let mut previous = [DVec3::ZERO; 3];
         for item in items {
             match frame.items.get(item) {
                 Item::Sphere(index) => {
@@ -62,21 +71,50 @@ impl Few {
                     });
                 }
                 Item::Triangle(index) => {
-                    let [a, b, c] = frame.triangles[index].corners;
-                    let (ab, ac) = (b - a, c - a);
-                    few.triangles.push(FewTriangle {
-                        item,
-                        corner: a.as_vec3().to_array(),
-                        edges: [ab.as_vec3().to_array(), ac.as_vec3().to_array()],
-                        reach: a.abs().max(b.abs()).max(c.abs()).max_element() as f32,
-                        size: ab.abs().max(ac.abs()).max_element() as f32,
-                        area: ab.cross(ac).length() as f32,
-                        cut: frame.triangles[index].cut,
-                    });
+                    let EyeTriangle { corners, cut, .. } = frame.triangles[index];
+                    let half = few.triangles.last_mut().filter(|last| last.item + 1 == item && !cut);
+                    if !half.is_some_and(|last| last.add_half(item, &previous, &corners)) {
+                        few.triangles.push(FewTriangle::new(item, &corners, cut));
+                    }
+                    previous = corners;
                 }
                 Item::Disk(_) | Item::Model(_) => return None,
             }
         }
         Some(few)
+    }
+}
+
+impl FewTriangle {
+    fn new(item: u32, &[a, b, c]: &[DVec3; 3], cut: bool) -> Self {
+        let (ab, ac) = (b - a, c - a);
+        Self {
+            item,
+            other_half: None,
+            corner: a.as_vec3().to_array(),
+            edges: [ab.as_vec3().to_array(), ac.as_vec3().to_array()],
+            reach: a.abs().max(b.abs()).max(c.abs()).max_element() as f32,
+            size: ab.abs().max(ac.abs()).max_element() as f32,
+            area: ab.cross(ac).length() as f32,
+            cut,
+        }
+    }
+
+    /// Adds the next item as the other half of a parallelogram, if that is what it is; `own` are the corners of this one. Both halves
+    /// are in one plane, but for a small part of the coincidence of surfaces.
+    fn add_half(&mut self, item: u32, own: &[DVec3; 3], other: &[DVec3; 3]) -> bool {
+        if self.other_half.is_some() || self.cut {
+            return false;
+        }
+        let Some(apex) = own.iter().position(|corner| !other.contains(corner)) else { return false };
+        let Some(far) = other.iter().find(|corner| !own.contains(corner)) else { return false };
+        let [corner, b, c] = [0, 1, 2].map(|step| own[(apex + step) % 3]);
+        let size = (b - corner).abs().max((c - corner).abs()).max_element();
+        if ((b + c - corner) - *far).abs().max_element() > size * FLAT {
+            return false;
+        }
+        *self = Self { other_half: Some(item), ..Self::new(self.item, &[corner, b, c], false) };
+        self.reach = self.reach.max(far.abs().max_element() as f32);
+        true
     }
 }

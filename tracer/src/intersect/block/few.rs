@@ -59,10 +59,12 @@ impl Few {
         let mut other = infinite;
         let mut consider = Nearest { best: &mut best, other: &mut other };
         for triangle in &self.triangles {
-            consider.add(simd, triangle.item, triangle.candidates(simd, &rays, self.drift));
+            let (found, items) = triangle.candidates(simd, &rays, self.drift);
+            consider.add(simd, items, found);
         }
         for sphere in &self.spheres {
-            consider.add(simd, sphere.item, sphere.candidates(simd, &rays, self.drift));
+            let items = u32x16::splat(simd, sphere.item);
+            consider.add(simd, items, sphere.candidates(simd, &rays, self.drift));
         }
         let decided = bits(best.1.simd_lt(other)) | bits(other.simd_eq(infinite));
         let decided = decided & lanes;
@@ -82,7 +84,7 @@ impl Few {
         let live = block.live(0);
         let (mut occluded, mut possible) = (0, 0);
         for triangle in &self.triangles {
-            let found = triangle.candidates(simd, &rays, self.drift);
+            let found = triangle.candidates(simd, &rays, self.drift).0;
             occluded |= bits(found.certain);
             possible |= bits(found.possible);
         }
@@ -104,16 +106,15 @@ struct Nearest<'a, S: Simd> {
 
 impl<S: Simd> Nearest<'_, S> {
     #[inline(always)]
-    fn add(&mut self, simd: S, item: u32, found: Candidates<S>) {
+    fn add(&mut self, simd: S, items: u32x16<S>, found: Candidates<S>) {
         let (low, high, best) = *self.best;
         let infinite = splat(simd, f32::INFINITY);
         let wins = found.certain & found.high.simd_lt(high);
         // What does not win may still be before the end of the best one.
         let beaten = select(wins, low, select(found.possible, found.low, infinite));
         *self.other = self.other.min(beaten);
-        let item = u32x16::splat(simd, item);
         *self.best =
-            (select(wins, found.low, low), select(wins, found.high, high), select_indices(wins, item, best));
+            (select(wins, found.low, low), select(wins, found.high, high), select_indices(wins, items, best));
     }
 }
 
@@ -161,7 +162,7 @@ impl<S: Simd> Rays<S> {
 
 impl FewTriangle {
     #[inline(always)]
-    fn candidates<S: Simd>(&self, simd: S, rays: &Rays<S>, drift: f32) -> Candidates<S> {
+    fn candidates<S: Simd>(&self, simd: S, rays: &Rays<S>, drift: f32) -> (Candidates<S>, u32x16<S>) {
         let zero = splat(simd, 0.0);
         let one = splat(simd, 1.0);
         let [first, second] = splat_both(simd, &self.edges);
@@ -178,18 +179,35 @@ impl FewTriangle {
         let flat = size * size * splat(simd, ERROR);
         let sum = u + v - determinant;
         let wide = error + error + flat;
-        let outside = u.simd_lt(-error) | v.simd_lt(-error) | sum.simd_gt(wide);
-        let inside = u.simd_gt(error) & v.simd_gt(error) & sum.simd_lt(-wide);
+        let (outside, inside) = match self.other_half {
+            None => (
+                u.simd_lt(-error) | v.simd_lt(-error) | sum.simd_gt(wide),
+                u.simd_gt(error) & v.simd_gt(error) & sum.simd_lt(-wide),
+            ),
+            Some(_) => {
+                let (low, high) = (u.min(v), u.max(v));
+                let beyond = high - determinant;
+                // On the edge between the halves it is not known which of them is hit.
+                let clear = sum.abs().simd_gt(wide);
+                (
+                    low.simd_lt(-error) | beyond.simd_gt(wide),
+                    low.simd_gt(error) & beyond.simd_lt(-wide) & clear,
+                )
+            }
+        };
         let steep = determinant.simd_gt(flat * splat(simd, 8.0));
         let per = one / select(steep, determinant, flat);
         let t = dot(second, q) * sign * per;
         let error = (error * size + splat(simd, drift * self.area)) * per + t.abs() * flat * per;
         // Along the plane nothing is known of the distance.
         let error = select(steep, error, splat(simd, f32::INFINITY));
-        let own = rays.starts_on.simd_eq(u32x16::splat(simd, self.item));
+        let (item, other) = (u32x16::splat(simd, self.item), self.other_half.unwrap_or(self.item));
+        let other = u32x16::splat(simd, other);
+        let own = rays.starts_on.simd_eq(item) | rays.starts_on.simd_eq(other);
         let possible = !outside & !own;
         let certain = inside & steep & possible & mask_of(simd, if self.cut { 0 } else { 0xffff });
-        rays.within(simd, [possible, certain], t, error)
+        let items = select_indices(sum.simd_gt(zero), other, item);
+        (rays.within(simd, [possible, certain], t, error), items)
     }
 }
 
