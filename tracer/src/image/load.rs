@@ -1,7 +1,7 @@
 //! Decoding of picture files. Announced sizes are checked against limits before memory is allocated.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -110,14 +110,15 @@ fn broken(path: &Path, source: ::image::ImageError) -> ImageError {
 }
 
 /// A reader that allocates at most `memory` bytes.
-fn open(path: &Path, memory: u64) -> Result<ImageReader<BufReader<File>>, ImageError> {
+fn open(path: &Path, memory: u64) -> Result<ImageReader<Box<dyn BufReadSeek>>, ImageError> {
     let unreadable = |source| ImageError::Read { path: path.to_owned(), source };
     let file = open_regular(path).map_err(unreadable)?;
     if file.metadata().map_err(unreadable)?.len() > MAX_FILE_BYTES {
         let reason = format!("the file is larger than {MAX_FILE_BYTES} bytes, the limit");
         return Err(unreadable(io::Error::new(io::ErrorKind::FileTooLarge, reason)));
     }
-    let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().map_err(unreadable)?;
+    let bytes = with_known_signature(file).map_err(unreadable)?;
+    let mut reader = ImageReader::new(bytes).with_guessed_format().map_err(unreadable)?;
     if reader.format().is_none() && is_targa(path).map_err(unreadable)? {
         reader.set_format(ImageFormat::Tga);
     }
@@ -127,6 +128,28 @@ fn open(path: &Path, memory: u64) -> Result<ImageReader<BufReader<File>>, ImageE
     limits.max_alloc = Some(memory);
     reader.limits(limits);
     Ok(reader)
+}
+
+/// A buffered file, or bytes in memory.
+trait BufReadSeek: BufRead + Seek {}
+
+impl<T: BufRead + Seek> BufReadSeek for T {}
+
+/// The bytes of a file. Radiance pictures of many programs begin with `#?RGBE` or another name, and the decoder only knows
+/// `#?RADIANCE`: those are read with that in place of their first line.
+fn with_known_signature(mut file: File) -> io::Result<Box<dyn BufReadSeek>> {
+    const KNOWN: &[u8] = b"#?RADIANCE";
+    let mut start = Vec::new();
+    file.by_ref().take(KNOWN.len() as u64).read_to_end(&mut start)?;
+    file.rewind()?;
+    if !start.starts_with(b"#?") || start == KNOWN {
+        return Ok(Box::new(BufReader::new(file)));
+    }
+    let mut bytes = Vec::new();
+    file.take(MAX_FILE_BYTES).read_to_end(&mut bytes)?;
+    let line = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
+    bytes.splice(..line, KNOWN.iter().copied());
+    Ok(Box::new(Cursor::new(bytes)))
 }
 
 /// Whether a file is TGA. The format has no magic number: the extension decides, or the signature at the end of newer

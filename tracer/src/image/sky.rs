@@ -79,6 +79,20 @@ mod tests {
     }
 
     #[test]
+    fn radiance_pictures_of_other_programs_are_read() {
+        let (_folder, path) = written("a.hdr", light());
+        let expected = linear(&path);
+        let bytes = std::fs::read(&path).unwrap();
+        let line = bytes.iter().position(|&byte| byte == b'\n').unwrap();
+        for name in ["#?RGBE", "#?AUTOPANO_PRO 4.4"] {
+            std::fs::write(&path, [name.as_bytes(), &bytes[line..]].concat()).unwrap();
+            assert!(has_high_range(&path));
+            assert_eq!(size(&path).unwrap(), (16, 8));
+            assert_eq!(linear(&path), expected, "{name}");
+        }
+    }
+
+    #[test]
     fn formats_of_high_range_are_linear_and_for_skies_only() {
         for name in ["a.hdr", "a.exr"] {
             let (_folder, path) = written(name, light());

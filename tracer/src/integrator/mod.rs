@@ -73,7 +73,9 @@ pub fn render_rows_watched<W: Watch>(
         let bottom = (top + 1).next_multiple_of(band_rows).min(rows.end);
         let start = (top - rows.start) as usize * row_bytes;
         let band = &mut out[start..start + (bottom - top) as usize * row_bytes];
-        counts += if let Integrator::Path(settings) = &frame.view().integrator {
+        counts += if let Integrator::Path(settings) = &frame.view().integrator
+            && frame.view().quality.shading.is_light()
+        {
             dispatch!(frame.level, simd => path::render_band(simd, frame, settings, top..bottom, band, cancelled, &mut *watch))?
         } else if adaptive {
             dispatch!(frame.level, simd => adaptive::render_band(simd, frame, top..bottom, band, cancelled, &mut *watch))?
