@@ -41,7 +41,7 @@ fn mistakes_in_a_scene_are_reported_with_line_and_remedy() {
         ("look_at = [0.0, 0.3, 0.0]", "look_at = [0.0, nan, 0.0]", &["changed.toml:", "look_at"]),
         ("fov = 45.0", "kind = \"fish\"", &["changed.toml:", "fisheye"]),
         ("exponent = 30.0", "reflect = 1.5", &["changed.toml:", "reflect"]),
-        ("exponent = 30.0", "roughness = 0.5", &["changed.toml:", "roughness"]),
+        ("exponent = 30.0", "roughness = 1.5", &["changed.toml:", "roughness"]),
         (
             "diffuse = [0.7, 0.4, 0.3]",
             "diffuse = { texture = \"clay.png\" }",

@@ -95,8 +95,8 @@ fn a_knob_is_set_by_its_option_or_its_name() {
     for (line, facts) in [
         ("set", &["samples", "adaptive"][..]),
         ("set fly 3", &["fly", "samples"]),
-        ("set samples", &["samples", "16"]),
-        ("set samples 3", &["samples", "16"]),
+        ("set samples", &["samples", "65536"]),
+        ("set samples 0", &["samples", "65536"]),
         ("set adaptive perhaps", &["adaptive", "on", "off"]),
         ("set max-depth 99999999", &["max-depth"]),
     ] {

@@ -166,7 +166,7 @@ pub enum SkyPicture {
     Cubemap([u32; 6]),
 }
 
-/// The part of a frame that changes while the scene stays the same: under 200 bytes on the wire.
+/// The part of a frame that changes while the scene stays the same: under 256 bytes on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameView {
     /// Camera of this frame.

@@ -73,7 +73,7 @@ impl Renders {
             path(output),
             self.address
         );
-        let parsed = Invocation::parse(words.split(' ').map(Into::into)).unwrap();
+        let parsed = Invocation::parse(words.split_whitespace().map(Into::into)).unwrap();
         let Invocation::Command(command, _) = parsed else { panic!("no command") };
         tokio::task::spawn_blocking(|| crate::app::commands::run(*command))
     }
