@@ -188,10 +188,10 @@ mod tests {
                 for display in sixteen(0.0, curve, &light) {
                     let dark = display.into_iter().fold(f32::INFINITY, f32::min);
                     // Rounding may lower a value by some units in the last place.
-                    assert!(dark >= last * (1.0 - 2e-6), "{word}: {display:?} after {last}");
+                    assert!(dark >= last * (1.0 - 2e-6) - 1e-9, "{word}: {display:?} after {last}");
                     last = dark;
                     let spread = display.into_iter().fold(0.0, f32::max) - dark;
-                    assert!(spread <= 6e-4 * dark, "{word}: grey became {display:?}");
+                    assert!(spread <= 6e-4 * dark + 1e-6, "{word}: grey became {display:?}");
                 }
             }
             assert!(last > 0.99, "{word} ends at {last}");
