@@ -39,6 +39,8 @@ pub struct SceneFeatures {
     pub checkered: bool,
     /// A material has a normal map.
     pub normal_mapped: bool,
+    /// A material is metallic-roughness.
+    pub metallic_roughness: bool,
 }
 
 impl SceneFeatures {
@@ -65,6 +67,7 @@ impl SceneFeatures {
             soft_shadows: scene.lights.iter().any(|light| light.shadows && light.radius > 0.0),
             checkered: any(|material| material.checker.is_some()),
             normal_mapped: any(|material| material.normal_map.is_some()),
+            metallic_roughness: any(|material| material.metallic_roughness.is_some()),
         }
     }
 
@@ -210,6 +213,7 @@ mod tests {
             soft_shadows: true,
             checkered: true,
             normal_mapped: true,
+            metallic_roughness: true,
         };
         let at = |shading| everything.at(&Quality { shading, ..Quality::default() });
         assert_eq!(at(Shading::Full), everything);
