@@ -125,3 +125,80 @@ const fn rising_side(k: f32) -> f32 {
     let (k4, j4) = (k * k * k * k, j * j * j * j);
     0.8 * (k4 * k - j4 * j) - j * (k4 - j4)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The integrals of f1 cos x over directions, for x = s(l), 1, c and c s(l), from the viewer's cosine: the mean of f1 cos / p over
+    /// mirrored directions at visible half vectors, in double precision.
+    fn integrals(cosine: f64, alpha: f64, scale: impl Fn(f64) -> f64) -> [f64; 4] {
+        const COUNT: usize = 96;
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        let length = (alpha * sine).hypot(cosine);
+        let (x, z) = (alpha * sine / length, cosine / length);
+        let square = alpha * alpha;
+        let smith = |cosine: f64| (square + (1.0 - square) * cosine * cosine).sqrt();
+        let mut sums = [0.0; 4];
+        for i in 0..COUNT * COUNT {
+            let number = |k: usize| (k as f64 + 0.5) / COUNT as f64;
+            let angle = number(i % COUNT) * std::f64::consts::PI;
+            let height = (1.0 - number(i / COUNT)) * (1.0 + z) - z;
+            let radius = (1.0 - height * height).max(0.0).sqrt();
+            let half = glam::DVec3::new(
+                (radius * libm::cos(angle) + x) * alpha,
+                radius * libm::sin(angle) * alpha,
+                height + z,
+            );
+            let half = half.normalize();
+            let along = sine * half.x + cosine * half.z;
+            let light = 2.0 * along * half.z - cosine;
+            if light <= 0.0 {
+                continue;
+            }
+            let (of_viewer, of_light) = (smith(cosine), smith(light));
+            let weight = light * (cosine + of_viewer) / (light * of_viewer + cosine * of_light);
+            let edge = libm::pow(1.0 - along.min(1.0), 5.0);
+            let factors = [scale(light), 1.0, edge, edge * scale(light)];
+            for (sum, factor) in sums.iter_mut().zip(factors) {
+                *sum += weight * factor / (COUNT * COUNT) as f64;
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn the_table_holds_the_integrals() {
+        for (row, terms) in TABLE.iter().enumerate() {
+            let root = |step: usize| step as f64 / STEPS as f64;
+            let alpha = root(row) * root(row);
+            let scale = |cosine: f64| {
+                let (column, across) = split((cosine.sqrt() * STEPS as f64) as f32);
+                let [low, high] = [column, column + 1].map(|at| f64::from(terms[at][0]));
+                low + f64::from(across) * (high - low)
+            };
+            for (column, found) in terms.iter().enumerate().step_by(2) {
+                let cosine = (root(column) * root(column)).max(1e-4);
+                let [s, a, b] = found.map(f64::from);
+                if row == 0 {
+                    let edge = libm::pow(1.0 - cosine, 5.0);
+                    assert!(s == 1.0 && (a - (1.0 - edge)).abs() < 1e-3 && b == 0.0);
+                    continue;
+                }
+                let [scaled, all, edge, scaled_edge] = integrals(cosine, alpha, scale);
+                let expected = [1.0 / scaled, 1.0 - edge, 1.0 - all - (s * scaled_edge - edge)];
+                for (found, expected) in [s, a, b].into_iter().zip(expected) {
+                    assert!((found - expected).abs() < 4e-3, "{alpha} {cosine}: {found}, not {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn means_weigh_columns_by_their_solid_angles() {
+        let total: f32 = (0..=STEPS).map(weight_of).sum();
+        assert!((total - 1.0).abs() < 1e-5, "{total}");
+        // Without roughness a is 1 - (1 - cos)^5, whose cosine-weighted mean is 1 - 2 / 42.
+        assert!((MEANS[0][0] - (1.0 - 2.0 / 42.0)).abs() < 2e-3, "{}", MEANS[0][0]);
+    }
+}

@@ -22,7 +22,7 @@
 //! Blinn-Phong          f1 F(c_s) + c_d g(v) g(l) / (pi G), alpha = sqrt(2 / (p + 2)): at most 1 where c_d + c_s is
 //! mirror               c_r R, with `fresnel` c_r Fx R; added to the diffuse part, whose colour stays
 //! glass                max(c_r, c_t) Fx R + c_t (1 - Fx) T; `thin`: T goes straight through, and Fx is that of a sheet
-//! metallic-roughness   m f1 F(base) + (1 - m) (1 - t) (k f1 F(d) + base c(v) c(l) / (pi C)) + (1 - m) t (f1 Fx + base (1 - Fx) T)
+//! metallic-roughness   m f1 F(base) + (1 - m) (1 - t) (k f1 F(d) + base c(v) c(l) / (pi C)) + (1 - m) t (f1 s s Fx + base (1 - Fx) T)
 //!                      with alpha = roughness^2, d = ((ior - 1) / (ior + 1))^2, k = specular_factor, c = 1 - k E the share that the
 //!                      dielectric leaves, and C its mean
 //! ```
@@ -143,9 +143,8 @@ fn gather_parts<S: Simd>(
         #[inline(always)]
         || {
             let indices = &surfaces.blocks[block].material;
-            let recipe_of = |index: u32| {
-                Recipe::of(&frame.scene().materials[index as usize], frame.features.specular)
-            };
+            let recipe_of =
+                |index: u32| Recipe::of(&frame.scene().materials[index as usize], frame.features.specular);
             let first = recipe_of(indices.0[0]);
             let mut any = first.is_more_than_diffuse();
             let mut recipe = Recipe::splat(simd, &first);
@@ -172,12 +171,7 @@ fn eval_parts<S: Simd>(simd: S, parts: &Parts<S>, direction: &Vec3x16<S>) -> Eva
 }
 
 #[inline(never)]
-fn sample_parts<S: Simd>(
-    simd: S,
-    parts: &Parts<S>,
-    part: f32x16<S>,
-    at: [f32x16<S>; 2],
-) -> Scattered<S> {
+fn sample_parts<S: Simd>(simd: S, parts: &Parts<S>, part: f32x16<S>, at: [f32x16<S>; 2]) -> Scattered<S> {
     simd.vectorize(
         #[inline(always)]
         || parts.sample(simd, part, at),

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! diffuse     D c(v) c(l) / (pi C): what the lobe leaves, see [`super::albedo`]
-//! lobe        f1 (m F(b) + w F(d) + t Fx), F(x) = (x + (1 - x) (1 - v.h)^5) (1 + x (s(v) s(l) - 1)), Fx the exact share
+//! lobe        f1 (m F(b) + w F(d) + t s(v) s(l) Fx), Fx the exact share
+//!             F(x) = (x + (1 - x) (1 - v.h)^5) (1 + x (s(v) s(l) - 1))
 //! mirrored    perfectly smooth
 //! refracted   perfectly smooth
 //! frosted     refraction by microfacets
@@ -111,9 +112,9 @@ impl<S: Simd> Weights<S> {
     #[inline(always)]
     fn reflected(&self, simd: S, edge: f32x16<S>, more: f32x16<S>, glass: f32x16<S>) -> Vec3x16<S> {
         let one = splat(simd, 1.0);
-        let scaled = |share: f32x16<S>, straight: f32x16<S>| share * (one + straight * more);
-        let of = |straight: f32x16<S>| scaled(straight + (one - straight) * edge, straight);
-        let grey = self.opaque * of(self.opaque_straight) + self.glass * scaled(glass, glass);
+        let of = |straight: f32x16<S>| (straight + (one - straight) * edge) * (one + straight * more);
+        // Glass absorbs nothing: all that the microfacets lose comes back.
+        let grey = self.opaque * of(self.opaque_straight) + self.glass * glass * (one + more);
         Vec3x16(three!(i => self.metal * of(self.metal_straight.0[i]) + grey))
     }
 
@@ -143,9 +144,7 @@ impl<S: Simd> Parts<S> {
         let (solid, clear) = (rest * (one - recipe.transmission), rest * recipe.transmission);
         let weights = Weights {
             metal: select(metallic_roughness, recipe.metallic, select(highlight, one, zero)),
-            metal_straight: Vec3x16(
-                three!(i => select(metallic_roughness, base.0[i], recipe.specular[i])),
-            ),
+            metal_straight: Vec3x16(three!(i => select(metallic_roughness, base.0[i], recipe.specular[i]))),
             opaque: select(metallic_roughness, solid * recipe.specular_factor, zero),
             opaque_straight: recipe.dielectric,
             glass: select(metallic_roughness, clear, zero),
@@ -158,16 +157,13 @@ impl<S: Simd> Parts<S> {
         let rest = Rest {
             q: select(metallic_roughness, one - recipe.specular_factor, zero),
             r: select(metallic_roughness, recipe.specular_factor * (one - recipe.dielectric), one),
-            straight: Vec3x16(
-                three!(i => select(metallic_roughness, recipe.dielectric, recipe.specular[i])),
-            ),
+            straight: Vec3x16(three!(i => select(metallic_roughness, recipe.dielectric, recipe.specular[i]))),
         };
         let below = metallic_roughness | highlight;
         let share = select(metallic_roughness, solid, one);
         let (left, mean) = (rest.of([terms.a, terms.b]), rest.of(rows.means(simd)));
         let least = splat(simd, 1e-6);
-        let albedo =
-            Vec3x16(three!(i => base.0[i] * share * select(below, left.0[i].max(zero), one)));
+        let albedo = Vec3x16(three!(i => base.0[i] * share * select(below, left.0[i].max(zero), one)));
         let color = Vec3x16(three!(i => albedo.0[i] / select(below, mean.0[i].max(least), one)));
 
         let thin = on(recipe.thin);
@@ -197,8 +193,7 @@ impl<S: Simd> Parts<S> {
         let [diffuse, lobe, mirrored, refracted, scattered] = estimates;
         let total = diffuse + lobe + mirrored + refracted + scattered;
         let total = select(on(total), total, one);
-        let shares =
-            [diffuse / total, lobe / total, mirrored / total, refracted / total, scattered / total];
+        let shares = [diffuse / total, lobe / total, mirrored / total, refracted / total, scattered / total];
         let alpha = select(rough, recipe.alpha, one);
         Self {
             diffuse_alone: !(reflects | on(largest(recipe.reflect)) | on(largest(recipe.transmit))),
@@ -243,8 +238,7 @@ impl<S: Simd> Parts<S> {
         let Evaluated { value, density } = lambert::eval(simd, *color, normals.dot(direction));
         let terms = self.lobe.rows.at(simd, self.normals.dot(direction));
         let left = rest.of([terms.a, terms.b]);
-        let value =
-            Vec3x16(three!(i => value.0[i] * select(*below, left.0[i].max(splat(simd, 0.0)), one)));
+        let value = Vec3x16(three!(i => value.0[i] * select(*below, left.0[i].max(splat(simd, 0.0)), one)));
         Evaluated { value, density: select(self.diffuse_alone, density, density * self.shares[0]) }
     }
 
@@ -306,9 +300,7 @@ impl<S: Simd> Parts<S> {
         let density = select(mask_of(simd, only), splat(simd, f32::INFINITY), density);
         Scattered {
             direction,
-            weight: Vec3x16(
-                three!(i => select(self.diffuse_alone, self.diffuse.color.0[i], weight.0[i])),
-            ),
+            weight: Vec3x16(three!(i => select(self.diffuse_alone, self.diffuse.color.0[i], weight.0[i]))),
             density: select(self.diffuse_alone, alone, density),
             scattered: bits(self.diffuse_alone) | only | ((diffuse | lobe) & bits(found)),
             refracted: refracted | frosted,

@@ -70,10 +70,7 @@ impl Recipe<f32> {
     /// Whether the material is more than a diffuse surface.
     pub(super) fn is_more_than_diffuse(&self) -> bool {
         let any = |color: &[f32; 3]| color.iter().any(|&channel| channel > 0.0);
-        self.metallic_roughness > 0.0
-            || any(&self.specular)
-            || any(&self.reflect)
-            || any(&self.transmit)
+        self.metallic_roughness > 0.0 || any(&self.specular) || any(&self.reflect) || any(&self.transmit)
     }
 }
 
@@ -102,12 +99,20 @@ impl<S: Simd> Recipe<f32x16<S>> {
     /// The numbers of one material at all points.
     #[inline(always)]
     pub(super) fn splat(simd: S, recipe: &Recipe<f32>) -> Self {
-        recipe.zip(recipe, #[inline(always)] |number, _| splat(simd, number))
+        recipe.zip(
+            recipe,
+            #[inline(always)]
+            |number, _| splat(simd, number),
+        )
     }
 
     /// Puts the numbers of a material into some lanes.
     #[inline(always)]
     pub(super) fn put(&mut self, simd: S, lanes: mask32x16<S>, recipe: &Recipe<f32>) {
-        *self = self.zip(recipe, #[inline(always)] |old, number| select(lanes, splat(simd, number), old));
+        *self = self.zip(
+            recipe,
+            #[inline(always)]
+            |old, number| select(lanes, splat(simd, number), old),
+        );
     }
 }
