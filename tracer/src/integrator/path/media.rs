@@ -21,10 +21,10 @@ impl Group<'_> {
         (&self.frame.scene().materials[index as usize], index, front)
     }
 
-    /// n_from / n_to for a path that enters the surface that it hits; 1 for all but transparent bodies.
+    /// n_from / n_to for a path that enters the surface that it hits; 1 for all but bodies with Fresnel shares.
     pub(super) fn eta_at(&self, block: usize, lane: usize) -> f32 {
         let (material, index, front) = self.hit_side(block, lane);
-        if !material.is_transparent() || material.thin {
+        if !(material.is_transparent() || material.fresnel) || material.thin {
             return 1.0;
         }
         let media = &self.path(block, lane).media;

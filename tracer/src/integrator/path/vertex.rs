@@ -233,6 +233,11 @@ impl Group<'_> {
             weight = weight.scale(splat(simd, 1.0) / survival);
         }
         let side = self.surfaces.to_shadow_origins(simd, block, along);
+        let side = if through == 0 {
+            side
+        } else {
+            select(mask_of(simd, through), -self.surfaces.blocks[block].bias.load(simd), side)
+        };
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
         let origins = points.add(setting.geometric.scale(side));
         let (origins, directions) = (arrays(origins), arrays(scattered.direction));
@@ -269,7 +274,7 @@ impl Group<'_> {
         let normals = if shaded { Vec3x16::load(simd, &surface.ns) } else { geometric };
         let to_viewer = incoming.direction.scale(splat(simd, -1.0));
         let mut eta = Lanes([1.0; LANES]);
-        if self.frame.features.transparent {
+        if self.frame.features.bounces {
             for lane in each_bit(lanes) {
                 eta.0[lane] = self.eta_at(block, lane);
             }

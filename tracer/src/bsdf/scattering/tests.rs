@@ -1,0 +1,437 @@
+//! Physics of all materials: furnace, reciprocity, and directions that follow their density.
+
+use glam::{DVec3, Vec3};
+
+use super::parts::Parts;
+use super::recipe::Recipe;
+use super::{Scattered, Scattering, Setting};
+use crate::scene::{Material, MetallicRoughness};
+use crate::simd::vector::Vec3x16;
+use crate::simd::{LANES, Lanes, Simd, SimdBase, all, best, dispatch, f32x16, splat, three};
+
+const BLACK: Material = Material { diffuse: Vec3::ZERO, specular: Vec3::ZERO, ..Material::NEUTRAL };
+
+fn white(color: f32) -> Material {
+    Material { diffuse: Vec3::splat(color), ..BLACK }
+}
+
+fn blinn_phong(diffuse: f32, specular: f32, exponent: f32) -> Material {
+    Material { specular: Vec3::splat(specular), exponent, ..white(diffuse) }
+}
+
+/// White metallic-roughness; the index of refraction is 1.5.
+fn metallic_roughness(metallic: f32, roughness: f32, transmission: f32) -> Material {
+    let model = MetallicRoughness { metallic, roughness, transmission, specular_factor: 1.0, texture: None };
+    Material { metallic_roughness: Some(model), ..white(1.0) }
+}
+
+fn glass() -> Material {
+    Material { transmit: Vec3::ONE, ..BLACK }
+}
+
+/// A vector at an angle to z, given by its cosine, and at an angle around it.
+fn at(cosine: f64, turn: f64) -> DVec3 {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    DVec3::new(sine * libm::cos(turn), sine * libm::sin(turn), cosine)
+}
+
+/// The normal of all tests: along no axis.
+fn normal() -> DVec3 {
+    DVec3::new(0.3, -0.5, 0.8).normalize()
+}
+
+/// A vector out of the frame of the normal, and into it.
+fn turned(vector: DVec3) -> DVec3 {
+    let tangent = normal().cross(DVec3::X).normalize();
+    tangent * vector.x + normal().cross(tangent) * vector.y + normal() * vector.z
+}
+
+fn back(vector: DVec3) -> DVec3 {
+    let tangent = normal().cross(DVec3::X).normalize();
+    DVec3::new(vector.dot(tangent), vector.dot(normal().cross(tangent)), vector.dot(normal()))
+}
+
+/// A surface of one material, seen from a cosine to its normal, on the side of n_from.
+#[derive(Clone, Copy)]
+struct Seen {
+    material: Material,
+    viewer: DVec3,
+    eta: f32,
+}
+
+fn seen(material: Material, cosine: f64, eta: f32) -> Seen {
+    Seen { material, viewer: turned(at(cosine, 0.7)), eta }
+}
+
+#[inline(always)]
+fn splat_vector<S: Simd>(simd: S, vector: DVec3) -> Vec3x16<S> {
+    Vec3x16::splat(simd, vector.as_vec3().to_array())
+}
+
+impl Seen {
+    #[inline(always)]
+    fn scattering<S: Simd>(&self, simd: S) -> Scattering<S> {
+        let geometric = splat_vector(simd, normal());
+        let setting = Setting {
+            to_viewer: splat_vector(simd, self.viewer),
+            geometric,
+            normals: geometric,
+            eta: Lanes([self.eta; LANES]),
+        };
+        let recipe = Recipe::of(&self.material, true);
+        let diffuse = Vec3x16::splat(simd, self.material.diffuse.to_array());
+        let numbers = Recipe::splat(simd, &recipe);
+        let parts =
+            recipe.is_more_than_diffuse().then(|| Box::new(Parts::new(simd, &numbers, diffuse, &setting)));
+        Scattering { normals: geometric, diffuse, parts }
+    }
+}
+
+/// Red value and density of a direction.
+fn eval(seen: &Seen, direction: DVec3) -> [f64; 2] {
+    #[inline(always)]
+    fn with<S: Simd>(simd: S, seen: &Seen, direction: DVec3) -> [f32; 2] {
+        let evaluated = seen.scattering(simd).eval(simd, splat_vector(simd, direction));
+        [evaluated.value.0[0][0], evaluated.density[0]]
+    }
+    dispatch!(best(), simd => with(simd, seen, direction)).map(f64::from)
+}
+
+/// A random direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sample {
+    direction: DVec3,
+    weight: [f32; 3],
+    density: f32,
+    alive: bool,
+    refracted: bool,
+}
+
+/// Directions for some random numbers.
+fn sample(level: crate::simd::Level, seen: &Seen, numbers: &[[f32; LANES]; 3]) -> [Sample; LANES] {
+    #[inline(always)]
+    fn with<S: Simd>(simd: S, seen: &Seen, numbers: &[[f32; LANES]; 3]) -> [Sample; LANES] {
+        let [part, u, v] = three!(i => f32x16::load_array(simd, numbers[i]));
+        let Scattered { direction, weight, density, scattered, refracted } =
+            seen.scattering(simd).sample(simd, part, [u, v]);
+        std::array::from_fn(|lane| Sample {
+            direction: DVec3::from_array(three!(i => f64::from(direction.0[i][lane]))),
+            weight: three!(i => weight.0[i][lane]),
+            density: density[lane],
+            alive: scattered >> lane & 1 == 1,
+            refracted: refracted >> lane & 1 == 1,
+        })
+    }
+    dispatch!(level, simd => with(simd, seen, numbers))
+}
+
+/// Additive recurrence with the roots of x^4 = x + 1: evenly spread in three dimensions (Roberts, "The unreasonable effectiveness of
+/// quasirandom sequences", 2018).
+fn numbers(index: usize) -> [f32; 3] {
+    let g = 1.220_744_084_605_759_5_f64;
+    [1.0 / g, 1.0 / (g * g), 1.0 / (g * g * g)].map(|step| {
+        let x = 0.5 + step * (index + 1) as f64;
+        ((x - x.floor()) as f32).min(1.0 - f32::EPSILON)
+    })
+}
+
+fn numbers_of_block(block: usize) -> [[f32; LANES]; 3] {
+    let mut all = [[0.0; LANES]; 3];
+    for lane in 0..LANES {
+        for (row, number) in all.iter_mut().zip(numbers(block * LANES + lane)) {
+            row[lane] = number;
+        }
+    }
+    all
+}
+
+fn samples(seen: &Seen, blocks: usize) -> impl Iterator<Item = Sample> {
+    (0..blocks).flat_map(move |block| sample(best(), seen, &numbers_of_block(block)))
+}
+
+/// Mean red weight of directions on the side that they belong to: the albedo.
+fn albedo(seen: &Seen, blocks: usize) -> f64 {
+    let side = |sample: &Sample| (sample.direction.dot(normal()) < 0.0) == sample.refracted;
+    let weight = |s: Sample| if s.alive && side(&s) { f64::from(s.weight[0]) } else { 0.0 };
+    samples(seen, blocks).map(weight).sum::<f64>() / (blocks * LANES) as f64
+}
+
+const ROUGHNESSES: [f32; 8] = [0.0, 0.04, 0.1, 0.2, 0.33, 0.5, 0.7, 1.0];
+const COSINES: [f64; 5] = [0.07, 0.2, 0.45, 0.8, 1.0];
+
+#[test]
+fn white_models_pass_the_furnace() {
+    for roughness in ROUGHNESSES {
+        for cosine in COSINES {
+            for (metallic, transmission) in [(1.0, 0.0), (0.0, 0.0), (0.4, 0.0)] {
+                let material = metallic_roughness(metallic, roughness, transmission);
+                let found = albedo(&seen(material, cosine, 1.0), 1024);
+                let at = format!("metal {metallic}, roughness {roughness}, cosine {cosine}");
+                // Next to the horizon of smooth metals the table is coarse.
+                let most = if cosine < 0.1 && roughness < 0.2 { 0.016 } else { 0.01 };
+                assert!((found - 1.0).abs() < most, "{at}: {found}");
+            }
+        }
+    }
+    for eta in [1.0 / 1.5, 1.5] {
+        for cosine in COSINES {
+            assert!((albedo(&seen(glass(), cosine, eta), 64) - 1.0).abs() < 1e-3);
+            let sheet = Material { thin: true, ..glass() };
+            assert!((albedo(&seen(sheet, cosine, 1.0), 64) - 1.0).abs() < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn white_rough_glass_passes_the_furnace_from_either_side() {
+    for roughness in ROUGHNESSES {
+        for (eta, cosine) in [1.0 / 1.5, 1.5].into_iter().flat_map(|eta| COSINES.map(|c| (eta, c))) {
+            let material = metallic_roughness(0.0, roughness, 1.0);
+            let found = albedo(&seen(material, cosine, eta), 1024);
+            assert!((found - 1.0).abs() < 0.04, "roughness {roughness}, eta {eta}, cosine {cosine}: {found}");
+        }
+        let sheet = Material { thin: true, ..metallic_roughness(0.0, roughness, 1.0) };
+        let found = albedo(&seen(sheet, 0.6, 1.0), 1024);
+        assert!((found - 1.0).abs() < 0.02, "sheet of roughness {roughness}: {found}");
+    }
+}
+
+#[test]
+fn blinn_phong_adds_no_energy_where_the_colours_do_not() {
+    for exponent in [0.0, 3.0, 50.0, 1e4, 1e6] {
+        for cosine in COSINES {
+            let of = |diffuse, specular| {
+                albedo(&seen(blinn_phong(diffuse, specular, exponent), cosine, 1.0), 1024)
+            };
+            for specular in [0.04, 0.3, 0.7, 1.0] {
+                let full = of(1.0 - specular, specular);
+                assert!((full - 1.0).abs() < 0.016, "{exponent} {specular} {cosine}: {full}");
+                assert!(specular == 1.0 || of(0.5 * (1.0 - specular), specular) < full);
+            }
+            // Seen from above, a faint highlight leaves the diffuse colour as it is.
+            if cosine == 1.0 && exponent >= 50.0 {
+                assert!((of(0.6, 0.02) - 0.62).abs() < 0.01);
+            }
+        }
+    }
+}
+
+#[test]
+fn mirrors_and_glass_have_their_shares() {
+    let mirror = Material { reflect: Vec3::splat(0.9), ..BLACK };
+    assert!((albedo(&seen(mirror, 0.5, 1.0), 16) - 0.9).abs() < 1e-5);
+    for (cosine, eta) in [(0.2, 1.0 / 1.5), (0.9, 1.5), (0.5, 1.5)] {
+        let seen = seen(Material { transmit: Vec3::splat(0.5), ..BLACK }, cosine, eta);
+        let share = crate::bsdf::fresnel(cosine, f64::from(eta));
+        for found in samples(&seen, 16).filter(|sample| sample.alive) {
+            assert!(found.density.is_infinite());
+            let expected = if found.refracted {
+                crate::bsdf::refracted(-seen.viewer, normal(), f64::from(eta)).unwrap()
+            } else {
+                crate::bsdf::reflected(-seen.viewer, normal())
+            };
+            assert!((found.direction - expected).length() < 2e-6);
+        }
+        let through: f64 = samples(&seen, 64).filter(|s| s.refracted).map(|s| f64::from(s.weight[0])).sum();
+        let through = through / (64 * LANES) as f64;
+        assert!((through - 0.5 * (1.0 - share)).abs() < 2e-3, "{through} at {cosine}");
+    }
+    // Varnish: the exact share of the mirrored light, and the diffuse colour.
+    let varnish = Material { reflect: Vec3::ONE, fresnel: true, ..white(0.5) };
+    let expected = 0.5 + crate::bsdf::fresnel(0.3, 1.0 / 1.5);
+    assert!((albedo(&seen(varnish, 0.3, 1.0 / 1.5), 64) - expected).abs() < 2e-3);
+}
+
+/// Materials without perfectly smooth parts.
+fn rough() -> Vec<Material> {
+    let plastic = Material { diffuse: Vec3::new(0.2, 0.9, 0.1), ..metallic_roughness(0.3, 0.4, 0.0) };
+    let dull = MetallicRoughness { specular_factor: 0.3, ..plastic.metallic_roughness.unwrap() };
+    vec![
+        white(0.7),
+        blinn_phong(0.4, 0.3, 20.0),
+        blinn_phong(0.0, 0.9, 300.0),
+        metallic_roughness(1.0, 0.25, 0.0),
+        metallic_roughness(1.0, 1.0, 0.0),
+        metallic_roughness(0.0, 0.5, 0.0),
+        plastic,
+        Material { metallic_roughness: Some(dull), ..plastic },
+    ]
+}
+
+#[test]
+fn reflection_is_reciprocal() {
+    for material in rough() {
+        for (from, to, turn) in [(0.2, 0.9, 2.0), (0.5, 0.6, 3.0), (0.05, 0.4, 3.6), (1.0, 0.3, 0.0)] {
+            let (v, l) = (turned(at(from, 0.0)), turned(at(to, turn)));
+            let there = eval(&Seen { material, viewer: v, eta: 1.0 }, l)[0] / to;
+            let back = eval(&Seen { material, viewer: l, eta: 1.0 }, v)[0] / from;
+            assert!((there - back).abs() <= 1e-3 * there.max(1e-3), "{material:?}: {there} and {back}");
+        }
+    }
+}
+
+#[test]
+fn weights_are_values_over_densities() {
+    for material in rough() {
+        let seen = seen(material, 0.6, 1.0);
+        for sample in samples(&seen, 64).filter(|s| s.alive && s.direction.dot(normal()) > 1e-3) {
+            let [value, density] = eval(&seen, sample.direction);
+            let [weight, found] = [f64::from(sample.weight[0]), f64::from(sample.density)];
+            assert!((density / found - 1.0).abs() < 1e-3, "{density} and {found} of {material:?}");
+            assert!((value / density - weight).abs() < 1e-3 * weight.max(1e-3));
+        }
+    }
+}
+
+/// Number of bins of the cosine, and of the angle around.
+const BINS: [usize; 2] = [24, 24];
+
+/// Expected numbers of samples in bins of equal solid angle above the surface, of `count` in all.
+fn expected(seen: &Seen, count: usize) -> Vec<f64> {
+    const FINE: usize = 12;
+    let mut bins = vec![0.0; BINS[0] * BINS[1]];
+    let (rows, columns) = (BINS[0] * FINE, BINS[1] * FINE);
+    for row in 0..rows {
+        for column in 0..columns {
+            let cosine = (row as f64 + 0.5) / rows as f64;
+            let turn = (column as f64 + 0.5) / columns as f64 * std::f64::consts::TAU;
+            let [_, density] = eval(seen, turned(at(cosine, turn)));
+            let solid_angle = std::f64::consts::TAU / (rows * columns) as f64;
+            bins[row / FINE * BINS[1] + column / FINE] += density * solid_angle * count as f64;
+        }
+    }
+    bins
+}
+
+/// Pseudo-random numbers in [0, 1): splitmix64.
+fn random(state: &mut u64) -> f32 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
+}
+
+/// Chi-square of the directions of independent samples. The bound is that of p = 1e-4 by Wilson and Hilferty's approximation.
+#[test]
+fn directions_follow_their_density() {
+    for material in rough() {
+        for cosine in [0.95, 0.35] {
+            let seen = seen(material, cosine, 1.0);
+            let (blocks, mut state) = (4096, 7);
+            let mut found = vec![0_u32; BINS[0] * BINS[1]];
+            for _ in 0..blocks {
+                let numbers = three!(_i => std::array::from_fn(|_| random(&mut state)));
+                for sample in sample(best(), &seen, &numbers).iter().filter(|sample| sample.alive) {
+                    let local = back(sample.direction);
+                    if local.z > 0.0 {
+                        let row = (local.z * BINS[0] as f64) as usize;
+                        let turn = libm::atan2(local.y, local.x) / std::f64::consts::TAU;
+                        let column = ((turn - turn.floor()) * BINS[1] as f64) as usize;
+                        let (row, column) = (row.min(BINS[0] - 1), column.min(BINS[1] - 1));
+                        found[row * BINS[1] + column] += 1;
+                    }
+                }
+            }
+            let (mut sum, mut bins) = (0.0, 0.0_f64);
+            let (mut rare, mut rare_found) = (0.0, 0.0);
+            for (found, expected) in found.iter().zip(expected(&seen, blocks * LANES)) {
+                if expected < 10.0_f64 {
+                    rare += expected;
+                    rare_found += f64::from(*found);
+                    continue;
+                }
+                let difference = f64::from(*found) - expected;
+                sum += difference * difference / expected;
+                bins += 1.0;
+            }
+            if rare >= 10.0 {
+                sum += (rare_found - rare) * (rare_found - rare) / rare;
+                bins += 1.0;
+            }
+            let spread = 2.0 / (9.0 * bins);
+            let bound = bins * f64::powi(1.0 - spread + 3.72 * spread.sqrt(), 3);
+            assert!(bins > 20.0 && sum < bound, "{sum} over {bins} bins at {cosine}: {material:?}");
+        }
+    }
+}
+
+#[test]
+fn samples_have_the_same_bits_on_every_level() {
+    let clear = [
+        glass(),
+        metallic_roughness(0.1, 0.6, 0.8),
+        Material { thin: true, ..metallic_roughness(0.0, 0.3, 1.0) },
+        Material { reflect: Vec3::splat(0.5), ..blinn_phong(0.3, 0.1, 40.0) },
+    ];
+    for material in rough().into_iter().chain(clear) {
+        for cosine in [1e-4, 0.3, 1.0] {
+            let seen = seen(material, cosine, 1.0 / 1.5);
+            for block in 0..16 {
+                let numbers = numbers_of_block(block);
+                let first = sample(all()[0], &seen, &numbers);
+                assert!(first.iter().all(|s| s.weight.iter().all(|w| w.is_finite() && *w >= 0.0)));
+                assert!(first.iter().all(|s| (s.direction.length() - 1.0).abs() < 1e-5));
+                for level in all() {
+                    assert_eq!(sample(level, &seen, &numbers), first, "{material:?} at {cosine}");
+                }
+            }
+        }
+    }
+}
+
+/// A diffuse point scatters the same whatever materials the other points of its block have.
+#[test]
+fn diffuse_points_do_not_depend_on_their_neighbours() {
+    #[inline(always)]
+    fn with<S: Simd>(simd: S, mixed: bool) -> [Sample; LANES] {
+        let viewer = splat_vector(simd, turned(at(0.4, 1.0)));
+        let geometric = splat_vector(simd, normal());
+        let setting = Setting { to_viewer: viewer, geometric, normals: geometric, eta: Lanes([1.0; LANES]) };
+        let mut recipe = Recipe::splat(simd, &Recipe::of(&white(0.7), true));
+        let other = Recipe::of(&blinn_phong(0.7, 0.3, 30.0), true);
+        recipe.put(simd, crate::simd::mask_of(simd, 0xff00), &other);
+        let diffuse = Vec3x16::splat(simd, [0.7; 3]);
+        let parts = mixed.then(|| Box::new(Parts::new(simd, &recipe, diffuse, &setting)));
+        let scattering = Scattering { normals: geometric, diffuse, parts };
+        let numbers = numbers_of_block(3);
+        let [part, u, v] = three!(i => f32x16::load_array(simd, numbers[i]));
+        let found = scattering.sample(simd, part, [u, v]);
+        let value = scattering.eval(simd, found.direction);
+        std::array::from_fn(|lane| Sample {
+            direction: DVec3::from_array(three!(i => f64::from(found.direction.0[i][lane]))),
+            weight: [found.weight.0[0][lane], value.value.0[1][lane], value.density[lane]],
+            density: found.density[lane],
+            alive: found.scattered >> lane & 1 == 1,
+            refracted: found.refracted >> lane & 1 == 1,
+        })
+    }
+    let alone = dispatch!(best(), simd => with(simd, false));
+    let mixed = dispatch!(best(), simd => with(simd, true));
+    assert_eq!(alone[..8], mixed[..8]);
+    assert_ne!(alone[8..], mixed[8..]);
+}
+
+/// Smooth meshes are seen at points whose shading normal looks away: they are not black.
+#[test]
+fn normals_that_look_away_reflect() {
+    let level = best();
+    let found = dispatch!(level, simd => {
+        let away = turned(at(-0.2, 0.0));
+        let viewer = turned(at(0.05, 0.0));
+        let setting = Setting {
+            to_viewer: splat_vector(simd, viewer),
+            geometric: splat_vector(simd, normal()),
+            normals: splat_vector(simd, away),
+            eta: Lanes([1.0; LANES]),
+        };
+        let mirror = Material { reflect: Vec3::ONE, ..BLACK };
+        let recipe = Recipe::splat(simd, &Recipe::of(&mirror, true));
+        let parts = Parts::new(simd, &recipe, Vec3x16::splat(simd, [0.0; 3]), &setting);
+        let half = splat(simd, 0.5);
+        let found = parts.sample(simd, half, [half, half]);
+        let direction = DVec3::from_array(three!(i => f64::from(found.direction.0[i][0])));
+        (found.scattered, found.weight.0[0][0], direction)
+    });
+    assert_eq!(found.0, 0xffff);
+    assert!((found.1 - 1.0).abs() < 1e-6 && found.2.dot(normal()) > 0.0);
+}
