@@ -248,8 +248,8 @@ fn surfaces_that_cast_no_shadow_change_no_light() {
 #[test]
 fn light_ends_behind_256_transparent_surfaces() {
     let mut scene = ground(0.0);
-    let full = picture(&scene, 1);
-    scene.materials[PANE as usize].transmit = Vec3::ONE;
+    // As near to clear as a number may be: clear surfaces are no occluders at all, and do not count.
+    scene.materials[PANE as usize].transmit = Vec3::splat(1.0 - f32::EPSILON / 2.0);
     let disk = |index: u32| Disk {
         center: DVec3::Y * (0.6 + 0.005 * f64::from(index)),
         normal: DVec3::Y,
@@ -257,7 +257,10 @@ fn light_ends_behind_256_transparent_surfaces() {
         material: PANE,
     };
     scene.disks = (0..256).map(disk).collect();
-    assert!(picture(&scene, 1).pixels == full.pixels);
+    let lit = picture(&scene, 1);
+    assert!(lit.pixels.iter().any(|&byte| byte > 0));
     scene.disks.push(disk(256));
     assert!(picture(&scene, 1).pixels.iter().all(|&byte| byte == 0));
+    scene.materials[PANE as usize].transmit = Vec3::ONE;
+    assert!(picture(&scene, 1).pixels == lit.pixels);
 }

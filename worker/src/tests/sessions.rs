@@ -117,14 +117,20 @@ async fn a_pong_reports_progress_within_a_lease_and_none_of_a_stuck_thread() {
 #[tokio::test]
 async fn a_pong_reports_progress_of_a_compilation() {
     let body = scene(SLOW_SCENE, &[]);
-    let mut master = FakeMaster::start(persistent(1, LARGE_CACHE).0, &[&body]);
+    let (kept, gate) = persistent(1, LARGE_CACHE);
+    gate.open();
+    let calls = Arc::clone(&kept.renderer.calls);
+    let mut master = FakeMaster::start(kept, &[&body]);
     master.announce(0, &body, b"v").await;
+    master.serve_request().await;
+    until(&calls.compiled, 1).await;
     master.send(ToWorker::Segment(lease(0, 0..8))).await;
     // The compilation lasts until it is cancelled, and goes on polling.
     for _ in 0..5 {
         until_progressed(&mut master).await;
     }
-    master.send(ToWorker::Cancel { before: FrameId(1) }).await;
+    master.close().await;
+    until(&calls.cancelled, 1).await;
 }
 
 #[tokio::test]
