@@ -183,7 +183,8 @@ fn the_table_matches_the_oracle() {
 
 #[test]
 fn the_showroom_matches_the_oracle() {
-    check("showroom.toml", 23, 0);
+    // Two pixels of the light that is a millionth off a surface: their shadow rays graze it, within the rounding of f32 points.
+    check("showroom.toml", 23, 2);
 }
 
 #[test]
