@@ -10,7 +10,7 @@ pub(crate) fn all_cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Traces a frame into `pixels` (RGB8 rows) with `threads` threads. Each takes the next band of rows, calls `cancelled` before
+/// Traces a frame into `pixels` (rows in its format) with `threads` threads. Each takes the next band of rows, calls `cancelled` before
 /// it and `done` with its row count after it.
 ///
 /// # Errors
@@ -23,7 +23,7 @@ pub(crate) fn trace(
     done: &(dyn Fn(u32) + Sync),
 ) -> Result<RayCounts, Cancelled> {
     let band_rows = frame.tile_rows();
-    let band_bytes = frame.width() as usize * 3 * band_rows as usize;
+    let band_bytes = frame.row_bytes() * band_rows as usize;
     let bands = Mutex::new(pixels.chunks_mut(band_bytes).zip(bands(frame.height(), band_rows)));
     let work = || {
         let mut rays = RayCounts::default();

@@ -13,7 +13,8 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use rayfarm_protocol::{
-    AssetId, FrameAnnounce, FrameId, Lease, Reconnect, ToMaster, ToWorker, Welcome, handshake, session,
+    AssetId, FrameAnnounce, FrameId, Lease, PixelFormat, Reconnect, ToMaster, ToWorker, Welcome, handshake,
+    session,
 };
 use rayfarm_worker::{Cancelled, RayCounts, Renderer, Share, ShutdownHandle, WorkerOptions, run_with};
 use tokio::net::TcpListener;
@@ -125,7 +126,8 @@ async fn render_frame(listener: TcpListener, scene: Bytes) -> Result<Bytes, Box<
 
     let frame = FrameId(1);
     let id = AssetId::of(&scene);
-    let announce = FrameAnnounce { frame, scene: id, width: WIDTH, height: HEIGHT, view: Bytes::new() };
+    let (format, view) = (PixelFormat::Rgb8, Bytes::new());
+    let announce = FrameAnnounce { frame, scene: id, width: WIDTH, height: HEIGHT, format, view };
     sender.send(ToWorker::Frame(announce)).await?;
     let lease = Lease { frame, segment: 0, attempt: 0, first_row: 0, row_count: HEIGHT };
     sender.send(ToWorker::Segment(lease)).await?;

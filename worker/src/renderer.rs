@@ -63,7 +63,7 @@ pub trait Renderer: Send + Sync + 'static {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self::Scene, String>;
 
-    /// Prepares a frame of a scene. The view must match the announced size.
+    /// Prepares a frame of a scene. The view must match the announced size and the announced format.
     ///
     /// # Errors
     /// A view that cannot be rendered; a cancellation, whose text is discarded.
@@ -74,11 +74,12 @@ pub trait Renderer: Send + Sync + 'static {
         cancelled: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self::Frame, String>;
 
-    /// Whether every pixel of the frame has a colour of RGB 5-6-5, so that it takes two bytes on the wire.
+    /// Whether every pixel of the frame has a colour of RGB 5-6-5, so that it takes two bytes on the wire. Only called for
+    /// frames in [`PixelFormat::Rgb8`](rayfarm_protocol::PixelFormat::Rgb8).
     fn is_rgb565(&self, frame: &Self::Frame) -> bool;
 
-    /// Renders rows into `out`, from top to bottom without gaps, in the format
-    /// [`PixelFormat::SEGMENT`](rayfarm_protocol::PixelFormat::SEGMENT).
+    /// Renders rows into `out`, from top to bottom without gaps, in the announced
+    /// [`PixelFormat`](rayfarm_protocol::PixelFormat).
     ///
     /// # Errors
     /// A cancellation. The content of `out` is unspecified then.

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use rayfarm_protocol::limits::{MAX_DECODE_BYTES, MAX_VIEW_BYTES};
-use rayfarm_protocol::{AssetId, FrameAnnounce, codec};
+use rayfarm_protocol::{AssetId, FrameAnnounce, PixelFormat, codec};
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::{ColorDepth, FrameView, Scene};
 use rayfarm_tracer::texture::{self, Texture};
@@ -91,6 +91,13 @@ impl Renderer for TracerRenderer {
             let (w, h) = (view.width, view.height);
             return Err(format!("the frame is announced as {width} x {height}, its view has {w} x {h}"));
         }
+        let format = format_of(view.format);
+        if format != announce.format {
+            return Err(format!(
+                "the frame is announced with {:?} pixels, its view has {format:?}",
+                announce.format
+            ));
+        }
         PreparedFrame::new_unless(scene, &view, cancelled)
             .map_err(|error| format!("the frame cannot be prepared: {error}"))
     }
@@ -108,5 +115,27 @@ impl Renderer for TracerRenderer {
     ) -> Result<RayCounts, Cancelled> {
         let counts = render_rows(frame, rows, out, cancelled).map_err(|_| Cancelled)?;
         Ok(RayCounts { primary: counts.primary, shadow: counts.shadow, secondary: counts.secondary })
+    }
+}
+
+/// The format of the protocol for one of the tracer.
+fn format_of(format: rayfarm_tracer::PixelFormat) -> PixelFormat {
+    match format {
+        rayfarm_tracer::PixelFormat::Rgb8 => PixelFormat::Rgb8,
+        rayfarm_tracer::PixelFormat::Linear => PixelFormat::Linear,
+        rayfarm_tracer::PixelFormat::Sums => PixelFormat::Sums,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_have_the_same_bytes_in_tracer_and_protocol() {
+        use rayfarm_tracer::PixelFormat as Tracer;
+        for format in [Tracer::Rgb8, Tracer::Linear, Tracer::Sums] {
+            assert_eq!(format_of(format).row_bytes(9), format.row_bytes(9), "{format:?}");
+        }
     }
 }

@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use rayfarm_protocol::FrameId;
+use rayfarm_tracer::image::LinearImage;
 use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::{PixelFormat, PixelSums};
 
 use crate::accounting::FrameAccount;
 use crate::framebuffer::FramePixels;
@@ -20,7 +22,7 @@ pub struct FinishedFrame {
     pub request: ViewRequest,
     /// The rendered view: the requested one at its scale.
     pub view: FrameView,
-    /// RGB8 sRGB rows, top to bottom: `view.width * view.height * 3` bytes.
+    /// Rows in the format of [`Self::format`], top to bottom.
     pub pixels: FramePixels,
     /// The costs of the picture's segments, summed: nanoseconds over all threads, and rays by kind. Each row counts once,
     /// even if several workers rendered it.
@@ -41,4 +43,34 @@ pub struct FinishedFrame {
     pub scene_bytes: u64,
     /// Thread time of the workers since the previous frame, by use, and the worker of each row.
     pub account: FrameAccount,
+}
+
+impl FinishedFrame {
+    /// Format of the pixels: the requested one.
+    pub fn format(&self) -> PixelFormat {
+        self.view.format
+    }
+
+    /// The sums of the pixels, rows from top to bottom; `None` in other formats. They are of the samples from
+    /// `view.first_sample` on, `view.samples` of them.
+    pub fn sums(&self) -> Option<impl ExactSizeIterator<Item = PixelSums>> {
+        let sums = self.pixels.as_chunks().0.iter().map(PixelSums::from_bytes);
+        (self.format() == PixelFormat::Sums).then_some(sums)
+    }
+
+    /// Adds the sums of the pixels to those of other passes of the same picture. Returns whether it did: not in other formats, nor
+    /// to a film of another size.
+    #[must_use]
+    pub fn add_sums_to(&self, film: &mut [PixelSums]) -> bool {
+        let Some(sums) = self.sums().filter(|sums| sums.len() == film.len()) else { return false };
+        film.iter_mut().zip(sums).for_each(|(pixel, sums)| pixel.add(&sums));
+        true
+    }
+
+    /// The picture in linear light; `None` in other formats than [`PixelFormat::Linear`].
+    pub fn linear(&self) -> Option<LinearImage> {
+        let FrameView { width, height, format, .. } = self.view;
+        let numbers = || self.pixels.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        (format == PixelFormat::Linear).then(|| LinearImage { width, height, pixels: numbers().collect() })
+    }
 }

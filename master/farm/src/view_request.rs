@@ -1,7 +1,9 @@
 //! Requested pictures.
 
 use rayfarm_tracer::image::{self, ImageError, RgbImage};
-use rayfarm_tracer::scene::{FrameView, RenderScale, Setting};
+use rayfarm_tracer::scene::{
+    FrameView, Integrator, Lens, PixelFormat, Quality, RenderScale, Setting, Shading,
+};
 
 /// A requested picture, and the scale at which the farm renders it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +39,22 @@ impl ViewRequest {
         self.view.at(&self.setting())
     }
 
+    /// The request for an auxiliary picture of the same view: numbers of what the centre of each pixel shows, without light. See
+    /// [`Shading`].
+    #[must_use]
+    pub fn auxiliary(&self, shading: Shading) -> Self {
+        let view = FrameView {
+            integrator: Integrator::Direct,
+            lens: Lens::default(),
+            samples: 1,
+            first_sample: 0,
+            quality: Quality { shading, ..self.view.quality },
+            format: PixelFormat::Linear,
+            ..self.view
+        };
+        Self { view, ..*self }
+    }
+
     /// Resizes a rendered picture to the size in which it is delivered.
     ///
     /// # Errors
@@ -64,6 +82,18 @@ mod tests {
         assert_eq!(FrameView { width: view.width, height: view.height, ..rendered }, view);
         let picture = RgbImage::new(rendered.width, rendered.height);
         assert_eq!(request.delivered(picture).unwrap(), RgbImage::new(view.width, view.height));
+    }
+
+    #[test]
+    fn an_auxiliary_picture_shows_the_same_view_without_light() {
+        let lens = Lens { aperture: 0.5, focus_distance: None };
+        let view = FrameView { samples: 64, first_sample: 3, lens, spin: 4.0, ..test_scene::view() };
+        let auxiliary = ViewRequest::from(view).auxiliary(Shading::Depth);
+        let FrameView { quality, format, samples, first_sample, lens, .. } = auxiliary.view;
+        assert_eq!((quality.shading, format), (Shading::Depth, PixelFormat::Linear));
+        assert_eq!((samples, first_sample, lens), (1, 0, Lens::default()));
+        assert_eq!((auxiliary.view.camera, auxiliary.view.spin), (view.camera, view.spin));
+        assert_eq!(auxiliary.view.validate(), Ok(()));
     }
 
     #[test]

@@ -161,7 +161,7 @@ impl Scheduler {
     pub(super) fn adaptive_rows(&mut self, index: usize, fleet: &Fleet, candidate: usize) -> Option<u32> {
         let frame = self.frames.get(index)?;
         let range = frame.queue.front()?;
-        let limit = self.max_rows(frame.width);
+        let limit = frame.max_rows;
         let candidate = fleet.candidates.get(candidate)?;
         let Some(speed) = candidate.speed else {
             let rows = first_rows(frame, fleet.candidates.len(), candidate.threads);

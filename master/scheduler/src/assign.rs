@@ -52,7 +52,7 @@ impl Scheduler {
         if matches!(self.policy, SegmentPolicy::Smart(_)) {
             self.halve_if_near_the_end(index);
         }
-        let limit = self.max_rows(self.frames.get(index)?.width);
+        let limit = self.frames.get(index)?.max_rows;
         self.frames.get_mut(index)?.lease_front(id, limit)
     }
 

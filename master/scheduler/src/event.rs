@@ -31,6 +31,8 @@ pub enum Event {
         width: u32,
         /// Rows.
         height: u32,
+        /// Bytes of the pixels of a row; leases are as small as the scheduler's limit of bytes makes them.
+        row_bytes: u64,
         /// Rows of a tile band; bands begin at multiples of it. Cutting a band adds cost.
         tile_rows: u32,
     },

@@ -10,6 +10,7 @@ pub(super) struct Request {
     pub(super) frame: FrameId,
     pub(super) width: u32,
     pub(super) height: u32,
+    pub(super) row_bytes: u64,
     pub(super) tile_rows: u32,
 }
 
@@ -76,12 +77,15 @@ impl Scheduler {
 
     /// Begins the waiting request, if there is one.
     pub(super) fn begin_waiting(&mut self) {
-        let Some(Request { frame, width, height, tile_rows }) = self.waiting.take() else { return };
+        let Some(Request { frame, width, height, row_bytes, tile_rows }) = self.waiting.take() else {
+            return;
+        };
         self.set_width(width);
-        let ranges = self.policy.ranges(height, self.max_rows(width));
+        let max_rows = self.max_rows(row_bytes);
+        let ranges = self.policy.ranges(height, max_rows);
         let tiles = Tiles { rows: tile_rows, share: self.tile_share };
         let forecast = self.costs.forecast(height, self.frames.len() + 1, tiles);
-        self.frames.push_back(Frame::new(frame, (width, height), forecast, ranges));
+        self.frames.push_back(Frame::new(frame, (width, height), forecast, ranges).with_max_rows(max_rows));
         self.actions.push_back(Action::BeginFrame { frame });
     }
 
@@ -96,9 +100,8 @@ impl Scheduler {
     }
 
     /// Largest number of rows of one lease.
-    pub(super) fn max_rows(&self, width: u32) -> u32 {
-        let row_bytes = u64::from(width.max(1)) * 3;
-        u32::try_from(self.max_segment_bytes / row_bytes).unwrap_or(u32::MAX).max(1)
+    fn max_rows(&self, row_bytes: u64) -> u32 {
+        u32::try_from(self.max_segment_bytes / row_bytes.max(1)).unwrap_or(u32::MAX).max(1)
     }
 
     /// Reports complete frames, oldest first, and lets the next one begin.

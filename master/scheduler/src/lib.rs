@@ -16,7 +16,7 @@
 //! let now = Duration::ZERO;
 //! scheduler.handle(now, Event::WorkerJoined { worker: WorkerId(1), threads: 2, host: HostId(1) });
 //! let frame = FrameId(1);
-//! scheduler.handle(now, Event::FrameRequested { frame, width: 64, height: 32, tile_rows: 16 });
+//! scheduler.handle(now, Event::FrameRequested { frame, width: 64, height: 32, row_bytes: 192, tile_rows: 16 });
 //!
 //! let actions = std::iter::from_fn(|| scheduler.poll_action());
 //! let rows: Vec<(u32, u32)> = actions
@@ -131,7 +131,7 @@ pub struct Scheduler {
 }
 
 impl Scheduler {
-    /// Creates a scheduler without workers and frames. No lease covers more than `max_segment_bytes` bytes of RGB8
+    /// Creates a scheduler without workers and frames. No lease covers more than `max_segment_bytes` bytes of pixels
     /// pixels, except that a single row is always one lease.
     pub fn new(policy: SegmentPolicy, max_segment_bytes: u64) -> Self {
         Self {
@@ -178,8 +178,8 @@ impl Scheduler {
     pub fn handle(&mut self, now: Duration, event: Event) {
         self.detect_own_pause(now);
         match event {
-            Event::FrameRequested { frame, width, height, tile_rows } => {
-                self.request(Request { frame, width, height, tile_rows });
+            Event::FrameRequested { frame, width, height, row_bytes, tile_rows } => {
+                self.request(Request { frame, width, height, row_bytes, tile_rows });
             }
             Event::RequestsDropped { next } => self.drop_requests(next),
             Event::WorkerJoined { worker, threads, host } => {

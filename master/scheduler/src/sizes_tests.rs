@@ -29,7 +29,13 @@ fn drive_two(scheduler: &mut Scheduler, speeds: [u32; 2], frames: u64) -> Vec<[u
         let mut done = [0; 2];
         let mut queues: [Vec<Lease>; 2] = Default::default();
         let mut busy_until_us = [now_us; 2];
-        let request = Event::FrameRequested { frame: FrameId(frame), width: 64, height: 512, tile_rows: 16 };
+        let request = Event::FrameRequested {
+            frame: FrameId(frame),
+            width: 64,
+            height: 512,
+            row_bytes: 192,
+            tile_rows: 16,
+        };
         scheduler.handle(Duration::from_micros(now_us), request);
         'frame: loop {
             while let Some(action) = scheduler.poll_action() {
@@ -76,7 +82,7 @@ fn the_first_leases_have_one_band_per_thread_at_most() {
         let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
         let join = Event::WorkerJoined { worker: WorkerId(1), threads, host: HostId(1) };
         scheduler.handle(Duration::ZERO, join);
-        let request = Event::FrameRequested { frame: FrameId(1), width: 1920, height, tile_rows };
+        let request = Event::FrameRequested { frame: FrameId(1), width: 1920, height, tile_rows, row_bytes: 1920 * 3 };
         scheduler.handle(Duration::ZERO, request);
         let rows: Vec<u32> = std::iter::from_fn(|| scheduler.poll_action())
             .filter_map(|action| match action {
@@ -94,13 +100,23 @@ fn a_lease_never_exceeds_the_bytes_of_a_message() {
     for policy in ["static:1000", "smart:1000", "adaptive"] {
         let mut scheduler = Scheduler::new(policy.parse().unwrap(), 3000);
         scheduler.handle(Duration::ZERO, joined(1));
-        let request = Event::FrameRequested { frame: FrameId(1), width: 300, height: 100, tile_rows: 16 };
-        scheduler.handle(Duration::ZERO, request);
-        while let Some(action) = scheduler.poll_action() {
-            if let Action::Grant { lease, .. } = action {
-                assert!(lease.row_count <= 3, "{policy}: {lease:?}");
+        let (mut now, mut most) = (Duration::ZERO, 0);
+        // RGB8, then a format of 24 bytes a pixel, of the same size.
+        for (frame, row_bytes, limit) in [(1, 900, 3), (2, 7200, 1), (3, 900, 3)] {
+            let frame = FrameId(frame);
+            let request = Event::FrameRequested { frame, width: 300, height: 100, row_bytes, tile_rows: 16 };
+            scheduler.handle(now, request);
+            while let Some(action) = scheduler.poll_action() {
+                let Action::Grant { worker, lease } = action else { continue };
+                assert!(lease.row_count <= limit, "{policy}: {lease:?} of rows of {row_bytes} bytes");
+                most = most.max(lease.row_count);
+                now += Duration::from_millis(1);
+                let cost = Cost { trace_ns: 1_000_000, span_ns: 1_000_000, ..Cost::default() };
+                scheduler.handle(now, Event::SegmentDone { worker, lease, cost });
             }
+            assert!(scheduler.frames.is_empty(), "{policy}: frame {frame} is complete");
         }
+        assert_eq!(most, 3, "{policy}");
     }
 }
 
@@ -110,7 +126,10 @@ fn begun_and_done(second: (u32, u32)) -> Vec<Action> {
     drive_two(&mut scheduler, [1, 2], 3);
     let mut now = scheduler.handled_at;
     for (frame, (width, height)) in [(4, (64, 512)), (5, second)] {
-        scheduler.handle(now, Event::FrameRequested { frame: FrameId(frame), width, height, tile_rows: 16 });
+        scheduler.handle(
+            now,
+            Event::FrameRequested { frame: FrameId(frame), width, height, row_bytes: 192, tile_rows: 16 },
+        );
     }
     let (mut granted, mut log) = (VecDeque::new(), Vec::new());
     loop {
@@ -153,6 +172,9 @@ fn speeds_follow_the_width() {
     };
     let before = speeds(&scheduler);
     let now = scheduler.handled_at;
-    scheduler.handle(now, Event::FrameRequested { frame: FrameId(9), width: 32, height: 256, tile_rows: 16 });
+    scheduler.handle(
+        now,
+        Event::FrameRequested { frame: FrameId(9), width: 32, height: 256, row_bytes: 96, tile_rows: 16 },
+    );
     assert_eq!(speeds(&scheduler), before.iter().map(|speed| 2.0 * speed).collect::<Vec<_>>());
 }

@@ -6,6 +6,7 @@ pub(crate) mod control;
 mod knob_values;
 pub(crate) mod logging;
 pub(crate) mod output;
-pub(crate) mod plan;
+pub(crate) mod picture;
+mod plan;
 pub(crate) mod progress;
 pub(crate) mod reports;

@@ -3,13 +3,14 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
-use rayfarm_tracer::image::{self, RgbImage};
+use rayfarm_tracer::image;
 use tokio::task::JoinHandle;
 
+use super::picture::Picture;
 use crate::error::CommandError;
 
 /// Extensions of pictures.
-const EXTENSIONS: [&str; 2] = ["png", "ppm"];
+const EXTENSIONS: [&str; 4] = ["png", "ppm", "exr", "hdr"];
 /// Largest number of frames being written; each holds a whole picture.
 const MAX_PENDING: usize = 2;
 /// Largest number of digits of a frame number; more would only be zeros.
@@ -54,7 +55,7 @@ impl OutputPattern {
             .and_then(|extension| extension.to_str())
             .is_some_and(|extension| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(extension)));
         if !known {
-            return refuse("pictures are written as .png or .ppm; end the name with one of them".to_owned());
+            return refuse("pictures are written as .png or .ppm, linear ones as .exr or .hdr; end the name with one of them".to_owned());
         }
         let Some(name) = output.file_name().and_then(|name| name.to_str()) else {
             return refuse("the file's name is not Unicode text".to_owned());
@@ -71,6 +72,16 @@ impl OutputPattern {
                 Ok(Self::Sequence { folder, prefix, digits, suffix })
             }
         }
+    }
+
+    /// Whether the files have linear light.
+    pub(crate) fn is_linear(&self) -> bool {
+        self.path(0).is_some_and(|path| image::is_linear(&path))
+    }
+
+    /// Whether the files may have several layers.
+    pub(crate) fn has_layers(&self) -> bool {
+        self.path(0).is_some_and(|path| image::has_layers(&path))
     }
 
     /// Path of the file of frame `index`, from 0; `None` without files.
@@ -180,13 +191,14 @@ impl FrameWriter {
 
     /// Accepts frame `index`, and calls `picture` if it has a file. At most one call per completion of
     /// [`FrameWriter::ready`]. The function that `picture` returns runs on a blocking thread.
-    pub(crate) fn write<P>(&mut self, index: u64, picture: impl FnOnce() -> P)
+    pub(crate) fn write<P, I>(&mut self, index: u64, picture: impl FnOnce() -> P)
     where
-        P: FnOnce() -> Result<RgbImage, image::ImageError> + Send + 'static,
+        P: FnOnce() -> Result<I, image::ImageError> + Send + 'static,
+        I: Into<Picture>,
     {
         let Some(path) = self.pattern.path(index) else { return };
         let picture = picture();
-        self.pending.push_back(tokio::task::spawn_blocking(move || image::save(&path, &picture()?)));
+        self.pending.push_back(tokio::task::spawn_blocking(move || picture()?.into().save(&path)));
     }
 
     /// Waits until all accepted frames are on the disk.
@@ -224,6 +236,8 @@ impl FrameWriter {
 
 #[cfg(test)]
 mod tests {
+    use rayfarm_tracer::image::RgbImage;
+
     use super::*;
 
     fn parse(name: &str, frames: u32) -> Result<OutputPattern, String> {
@@ -235,6 +249,16 @@ mod tests {
         for name in ["picture.png", "out/picture.PPM", "/a/b.c/d.e.png"] {
             assert_eq!(parse(name, 1), Ok(OutputPattern::Single(name.into())));
         }
+    }
+
+    #[test]
+    fn linear_files_are_known_by_their_extension() {
+        let kinds = |name: &str| parse(name, 1).map(|pattern| (pattern.is_linear(), pattern.has_layers()));
+        assert_eq!(
+            ["a.png", "a.ppm", "none"].map(kinds),
+            [Ok((false, false)), Ok((false, false)), Ok((false, false))]
+        );
+        assert_eq!(["a%02d.HDR", "a.exr"].map(kinds), [Ok((true, false)), Ok((true, true))]);
     }
 
     #[test]

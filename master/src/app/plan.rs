@@ -17,7 +17,7 @@ const MAX_NAMED: usize = 5;
 const PNG_END: [u8; 12] = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xae, 0x42, 0x60, 0x82];
 
 /// Treatment of existing files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Existing {
     /// Frames are rendered again.
     Replace,
@@ -29,6 +29,8 @@ pub(crate) enum Existing {
         width: u32,
         /// Rows.
         height: u32,
+        /// Names of the layers of files that have layers.
+        layers: Vec<&'static str>,
     },
 }
 
@@ -66,7 +68,7 @@ impl Plan {
             ));
         }
         let all = first..end;
-        let Existing::Resume { width, height } = existing else {
+        let Existing::Resume { width, height, ref layers } = existing else {
             let is_kept = |frame: &u64| {
                 existing == Existing::Skip
                     && pattern.path(*frame).is_some_and(|path| path.symlink_metadata().is_ok())
@@ -79,7 +81,7 @@ impl Plan {
             .filter_map(|frame| Some((frame, pattern.path(frame)?)))
             .filter(|(_, path)| path.symlink_metadata().is_ok())
             .collect();
-        let kept = complete_files(&existing, width, height)?;
+        let kept = complete_files(&existing, width, height, layers)?;
         let mut kept = kept.into_iter().peekable();
         let frames: Vec<u64> = all.filter(|frame| kept.next_if_eq(frame).is_none()).collect();
         Ok(Self { skipped: end - first - frames.len() as u64, frames })
@@ -96,7 +98,12 @@ impl Plan {
 }
 
 /// Numbers of the frames whose files are complete pictures, ascending. Reads files on several threads.
-fn complete_files(files: &[(u64, PathBuf)], width: u32, height: u32) -> Result<Vec<u64>, CommandError> {
+fn complete_files(
+    files: &[(u64, PathBuf)],
+    width: u32,
+    height: u32,
+    layers: &[&str],
+) -> Result<Vec<u64>, CommandError> {
     if files.len() > 1 {
         tracing::info!("checking {} existing pictures", files.len());
     }
@@ -104,7 +111,7 @@ fn complete_files(files: &[(u64, PathBuf)], width: u32, height: u32) -> Result<V
     let found = Mutex::new(Vec::with_capacity(files.len()));
     let check = || {
         while let Some((frame, path)) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let state = state_of(path, width, height);
+            let state = state_of(path, width, height, layers);
             found.lock().unwrap_or_else(PoisonError::into_inner).push((*frame, path, state));
         }
     };
@@ -143,7 +150,7 @@ enum State {
     Damaged(String),
 }
 
-fn state_of(path: &Path, width: u32, height: u32) -> Result<State, CommandError> {
+fn state_of(path: &Path, width: u32, height: u32, layers: &[&str]) -> Result<State, CommandError> {
     let refuse = |problem: String| Err(CommandError::WrongInput(format!("{}: {problem}", path.display())));
     match path.metadata() {
         Ok(metadata) if metadata.is_file() => {}
@@ -161,7 +168,21 @@ fn state_of(path: &Path, width: u32, height: u32) -> Result<State, CommandError>
         Err(image::ImageError::Read { source, .. }) => return refuse(format!("cannot be read: {source}")),
         Err(error) => return Ok(State::Damaged(format!("is not a complete picture ({error})"))),
     }
-    match image::load(path) {
+    if image::has_layers(path) {
+        return Ok(match image::layer_names(path, width, height) {
+            Err(error) => State::Damaged(format!("is not a complete picture ({error})")),
+            Ok(names) if names != layers => {
+                let (found, expected) = (names.join(", "), layers.join(", "));
+                State::Damaged(format!("has the layers {found}, and this run writes {expected}"))
+            }
+            Ok(_) => State::Complete,
+        });
+    }
+    let decoded = match image::is_linear(path) {
+        true => image::load_sky(path).map(drop),
+        false => image::load(path).map(drop),
+    };
+    match decoded {
         Err(error) => Ok(State::Damaged(format!("is not a complete picture ({error})"))),
         Ok(_) if !has_end(path) => {
             Ok(State::Damaged("is not a complete picture: its end is missing".to_owned()))
@@ -186,11 +207,13 @@ fn has_end(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use rayfarm_tracer::image::{RgbImage, save};
+    use rayfarm_tracer::image::{LinearImage, RgbImage, save};
 
     use super::*;
+    use crate::app::cli::Aov;
+    use crate::app::picture::{BEAUTY, Picture};
 
-    const SIZE: Existing = Existing::Resume { width: 6, height: 4 };
+    const SIZE: Existing = Existing::Resume { width: 6, height: 4, layers: Vec::new() };
 
     fn sequence(folder: &Path, extension: &str) -> OutputPattern {
         OutputPattern::parse(&folder.join(format!("f%02d.{extension}")), 10).unwrap()
@@ -232,6 +255,33 @@ mod tests {
             assert_eq!(plan, Plan { frames: vec![1, 7], skipped: 6 }, "{extension}");
             let plan = Plan::new(2, 8, SIZE, &pattern).unwrap();
             assert_eq!(plan, Plan { frames: vec![3, 4, 5, 6, 7], skipped: 1 }, "{extension}");
+        }
+    }
+
+    fn linear(aov: &[Aov]) -> Picture {
+        let pixels = (0..6 * 4 * 3).map(|i| (i * 37 % 251) as f32 / 16.0).collect();
+        let picture = LinearImage { width: 6, height: 4, pixels };
+        Picture::of_layers(picture.clone(), aov.iter().map(|aov| (*aov, picture.clone())))
+    }
+
+    #[test]
+    fn only_complete_linear_pictures_with_the_same_layers_are_kept() {
+        for (extension, aov) in [("hdr", &[][..]), ("exr", &[]), ("exr", &[Aov::Depth, Aov::Item])] {
+            let folder = tempfile::tempdir().unwrap();
+            let pattern = sequence(folder.path(), extension);
+            let path = |frame| pattern.path(frame).unwrap();
+            (0..4).for_each(|frame| linear(aov).save(&path(frame)).unwrap());
+            let whole = std::fs::read(path(0)).unwrap();
+            std::fs::write(path(1), &whole[..whole.len() - 1]).unwrap();
+            std::fs::write(path(2), &whole[..whole.len() / 2]).unwrap();
+            let layers = std::iter::once(BEAUTY).chain(aov.iter().map(|aov| aov.name())).collect();
+            let same = Existing::Resume { width: 6, height: 4, layers };
+            assert_eq!(Plan::new(0, 5, same, &pattern).unwrap().frames, [1, 2, 4], "{extension}");
+            let more = Existing::Resume { width: 6, height: 4, layers: vec![BEAUTY, "albedo"] };
+            let frames = Plan::new(0, 5, more, &pattern).unwrap().frames;
+            assert_eq!(frames, if extension == "exr" { vec![0, 1, 2, 3, 4] } else { vec![1, 2, 4] });
+            let other = Existing::Resume { width: 7, height: 4, layers: vec![BEAUTY] };
+            assert!(Plan::new(0, 1, other, &pattern).unwrap_err().to_string().contains("6x4"));
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayfarm_farm::ViewRequest;
+use rayfarm_tracer::scene::Shading;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::handle::PresentedFrame;
@@ -56,25 +58,41 @@ impl SequenceSender {
 #[derive(Clone, Debug)]
 pub(super) struct SequencePlan {
     numbers: Arc<[u64]>,
+    /// Auxiliary pictures that follow each frame.
+    auxiliary: Arc<[Shading]>,
     slots: Arc<Semaphore>,
 }
 
 impl SequencePlan {
-    /// The plan and both ends of its delivery. `numbers` are frames of the camera path, in order.
-    pub(super) fn new(numbers: &[u64]) -> (Self, SequenceSender, FrameSequence) {
+    /// The plan and both ends of its delivery. `numbers` are frames of the camera path, in order; each is followed by its
+    /// auxiliary pictures.
+    pub(super) fn new(numbers: &[u64], auxiliary: &[Shading]) -> (Self, SequenceSender, FrameSequence) {
         let (sender, receiver) = mpsc::channel(MAX_FRAMES);
-        let plan = Self { numbers: numbers.into(), slots: Arc::new(Semaphore::new(MAX_FRAMES)) };
+        let slots = Arc::new(Semaphore::new(MAX_FRAMES));
+        let plan = Self { numbers: numbers.into(), auxiliary: auxiliary.into(), slots };
         (plan, SequenceSender(sender), FrameSequence(receiver))
     }
 
-    /// Frames of the plan.
+    /// Pictures of the plan.
     pub(super) fn len(&self) -> u64 {
-        self.numbers.len() as u64
+        self.numbers.len() as u64 * self.per_frame()
     }
 
-    /// Number of the frame at an index of the plan.
+    /// Pictures of each frame.
+    fn per_frame(&self) -> u64 {
+        1 + self.auxiliary.len() as u64
+    }
+
+    /// Number of the frame of the picture at an index of the plan.
     pub(super) fn number(&self, index: u64) -> Option<u64> {
-        self.numbers.get(usize::try_from(index).ok()?).copied()
+        self.numbers.get(usize::try_from(index / self.per_frame()).ok()?).copied()
+    }
+
+    /// The request for the picture at an index of the plan: that of its frame, or for an auxiliary picture.
+    pub(super) fn request(&self, index: u64, frame: ViewRequest) -> ViewRequest {
+        let place = (index % self.per_frame()).checked_sub(1).and_then(|place| usize::try_from(place).ok());
+        let shading = place.and_then(|place| self.auxiliary.get(place));
+        shading.map_or(frame, |shading| frame.auxiliary(*shading))
     }
 
     /// A slot for another frame, if one is free.
@@ -92,17 +110,33 @@ impl SequencePlan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_scene;
 
     #[test]
     fn frames_are_numbered_by_the_plan() {
-        let (plan, _, _) = SequencePlan::new(&[3, 5, 9]);
+        let (plan, _, _) = SequencePlan::new(&[3, 5, 9], &[]);
         assert_eq!(plan.len(), 3);
         assert_eq!([0, 1, 2, 3].map(|index| plan.number(index)), [Some(3), Some(5), Some(9), None]);
     }
 
+    #[test]
+    fn auxiliary_pictures_follow_their_frame() {
+        let (plan, _, _) = SequencePlan::new(&[3, 5], &[Shading::Depth, Shading::Albedo]);
+        assert_eq!(plan.len(), 6);
+        assert_eq!(
+            [0, 2, 3, 5, 6].map(|index| plan.number(index)),
+            [Some(3), Some(3), Some(5), Some(5), None]
+        );
+        let frame = ViewRequest::from(test_scene::view());
+        let shadings = [0, 1, 2, 3, 5].map(|index| plan.request(index, frame).view.quality.shading);
+        let own = frame.view.quality.shading;
+        assert_eq!(shadings, [own, Shading::Depth, Shading::Albedo, own, Shading::Albedo]);
+        assert_eq!(plan.request(3, frame), frame);
+    }
+
     #[tokio::test]
     async fn a_slot_is_free_again_when_its_frame_is_dropped() {
-        let (plan, _, _) = SequencePlan::new(&[0]);
+        let (plan, _, _) = SequencePlan::new(&[0], &[]);
         let mut slots: Vec<Slot> = std::iter::from_fn(|| plan.free_slot()).collect();
         assert_eq!(slots.len(), MAX_FRAMES);
         slots.pop();

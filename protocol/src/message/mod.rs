@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 
 use crate::envelope::{Envelope, Kind};
-use crate::{AssetId, FrameId, ProtocolError};
+use crate::{AssetId, FrameId, PixelFormat, ProtocolError};
 
 pub use to_master::ToMaster;
 pub use to_worker::ToWorker;
@@ -60,6 +60,8 @@ pub struct FrameAnnounce {
     pub width: u32,
     /// Number of rows, 1 to [`crate::limits::MAX_FRAME_SIDE`].
     pub height: u32,
+    /// Format of the pixels of its segments.
+    pub format: PixelFormat,
     /// Everything that changes from frame to frame, opaque to the protocol; at most [`crate::limits::MAX_VIEW_BYTES`]
     /// bytes.
     pub view: Bytes,

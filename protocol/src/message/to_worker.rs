@@ -9,7 +9,7 @@ use super::{FrameAnnounce, Message, Reconnect};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
 use crate::token::{ShareKey, Token};
-use crate::{AssetId, FrameId, Lease, ProtocolError};
+use crate::{AssetId, FrameId, Lease, PixelFormat, ProtocolError};
 
 /// Message from a master to a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ pub enum ToWorker {
     },
 }
 
-const FRAME_HEAD_BYTES: usize = 48;
+const FRAME_HEAD_BYTES: usize = 52;
 const CHUNK_HEAD_BYTES: usize = 40;
 
 impl Message for ToWorker {
@@ -167,6 +167,7 @@ fn encode_frame(announce: &FrameAnnounce) -> Result<Envelope, ProtocolError> {
     rest.put_slice(&announce.scene.0);
     rest.put_u32_le(announce.width);
     rest.put_u32_le(announce.height);
+    rest.put_u32_le(announce.format.code());
     Envelope::new(Kind::Frame, &head, announce.view.clone())
 }
 
@@ -176,7 +177,10 @@ fn decode_frame(mut body: Bytes) -> Result<FrameAnnounce, ProtocolError> {
     let frame = FrameId(rest.get_u64_le());
     let scene = take_id(&mut rest);
     let (width, height) = (rest.get_u32_le(), rest.get_u32_le());
-    let announce = FrameAnnounce { frame, scene, width, height, view: body };
+    let code = rest.get_u32_le();
+    let format = PixelFormat::from_code(code)
+        .ok_or_else(|| ProtocolError::malformed(Kind::Frame, format!("pixel format {code} is not known")))?;
+    let announce = FrameAnnounce { frame, scene, width, height, format, view: body };
     checked_frame(&announce)?;
     Ok(announce)
 }

@@ -42,6 +42,12 @@ pub enum BlockError {
         /// Raw bytes that the block announces.
         announced: usize,
     },
+    /// A block does not hold whole pixels, although its planes are made of such.
+    #[error("a block of planes announces {announced} bytes, which are no whole pixels")]
+    Pixels {
+        /// Raw bytes that the block announces.
+        announced: usize,
+    },
     /// The blocks hold fewer bytes than the rows.
     #[error("{missing} bytes of pixels are missing after the last block")]
     Missing {
@@ -88,7 +94,32 @@ impl std::fmt::Debug for Packer {
 ///
 /// # Errors
 /// Bytes that are no blocks, or blocks of another total size. The content of `raw` is unspecified then.
-pub fn unpack(mut packed: &[u8], mut raw: &mut [u8]) -> Result<(), BlockError> {
+pub fn unpack(packed: &[u8], raw: &mut [u8]) -> Result<(), BlockError> {
+    each_block(packed, raw, |block, target| block.unpack(target))
+}
+
+/// The body of a block.
+pub(super) struct BlockBody<'a>(&'a [u8]);
+
+impl BlockBody<'_> {
+    /// Decompresses the block to as many bytes as it announces.
+    pub(super) fn unpack(&self, target: &mut [u8]) -> Result<(), BlockError> {
+        let (Self(body), announced) = (self, target.len());
+        if body.len() == announced {
+            target.copy_from_slice(body);
+        } else if decompress_into(body, target).ok() != Some(announced) {
+            return Err(BlockError::Corrupt { announced });
+        }
+        Ok(())
+    }
+}
+
+/// Calls `unpack_one` for each block with its part of `raw`. The blocks must fill `raw` exactly.
+pub(super) fn each_block(
+    mut packed: &[u8],
+    mut raw: &mut [u8],
+    mut unpack_one: impl FnMut(BlockBody<'_>, &mut [u8]) -> Result<(), BlockError>,
+) -> Result<(), BlockError> {
     while !packed.is_empty() {
         let (announced, body) = split_block(&mut packed)?;
         let room = raw.len();
@@ -97,11 +128,7 @@ pub fn unpack(mut packed: &[u8], mut raw: &mut [u8]) -> Result<(), BlockError> {
             .filter(|_| announced > 0)
             .ok_or(BlockError::Size { announced, room })?;
         raw = rest;
-        if body.len() == announced {
-            target.copy_from_slice(body);
-        } else if decompress_into(body, target).ok() != Some(announced) {
-            return Err(BlockError::Corrupt { announced });
-        }
+        unpack_one(BlockBody(body), target)?;
     }
     match raw.len() {
         0 => Ok(()),

@@ -18,14 +18,16 @@ pub(crate) const PIXELS_HEAD_BYTES: usize = 88;
 /// Encoding of the pixels of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Rows from top to bottom without gaps, in the format [`PixelFormat::SEGMENT`](super::PixelFormat::SEGMENT).
+    /// Rows from top to bottom without gaps, in the [`PixelFormat`](super::PixelFormat) of the frame.
     Raw,
     /// The same bytes in blocks of LZ4: see [`unpack`](super::unpack).
     Lz4,
-    /// Rows of two bytes per pixel: see [`to_rgb565`](super::to_rgb565).
+    /// RGB8 in rows of two bytes per pixel: see [`to_rgb565`](super::to_rgb565).
     Rgb565,
     /// RGB 5-6-5 in blocks of LZ4.
     Rgb565Lz4,
+    /// The bytes of each band sorted by their place in the pixel, in blocks of LZ4: see [`unpack_planes`](super::unpack_planes).
+    PlanesLz4,
 }
 
 impl Encoding {
@@ -36,6 +38,7 @@ impl Encoding {
             Self::Lz4 => 1,
             Self::Rgb565 => 2,
             Self::Rgb565Lz4 => 3,
+            Self::PlanesLz4 => 4,
         }
     }
 
@@ -45,6 +48,7 @@ impl Encoding {
             1 => Some(Self::Lz4),
             2 => Some(Self::Rgb565),
             3 => Some(Self::Rgb565Lz4),
+            4 => Some(Self::PlanesLz4),
             _ => None,
         }
     }

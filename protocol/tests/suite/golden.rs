@@ -6,8 +6,8 @@ use rayfarm_protocol::envelope::{Kind, read_body, read_header};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::peer::{PeerRequest, ShareKey, Token, send_request};
 use rayfarm_protocol::{
-    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelsHeader, Reconnect, ToMaster,
-    ToWorker, Welcome, codec, limits,
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelFormat, PixelsHeader, Reconnect,
+    ToMaster, ToWorker, Welcome, codec, limits,
 };
 
 use crate::common::{lease, pixels, wire};
@@ -33,13 +33,15 @@ fn the_golden_bytes_are_those_of_version_6() {
 #[tokio::test]
 async fn messages_to_a_worker() {
     let view = Bytes::from_static(b"view");
-    let announce = FrameAnnounce { frame: FrameId(7), scene: ID, width: 640, height: 480, view };
-    let frame: [&[u8]; 6] = [
-        &[52, 0, 0, 0, 0x10, 0, 0, 0],
+    let format = PixelFormat::Sums;
+    let announce = FrameAnnounce { frame: FrameId(7), scene: ID, width: 640, height: 480, format, view };
+    let frame: [&[u8]; 7] = [
+        &[56, 0, 0, 0, 0x10, 0, 0, 0],
         &[7, 0, 0, 0, 0, 0, 0, 0],
         &[0xab; 32],
         &[0x80, 2, 0, 0],
         &[0xe0, 1, 0, 0],
+        &[2, 0, 0, 0],
         b"view",
     ];
     golden(ToWorker::Frame(announce), &frame).await;
@@ -96,10 +98,11 @@ async fn messages_to_a_master() {
     ];
     golden(pixels(2, 2), &rows).await;
     let ToMaster::Pixels { header, bytes } = pixels(2, 2) else { panic!("`pixels` makes another message") };
-    let codes: [&[u8]; 3] = [&[1, 0, 0, 0, 0, 0, 0, 0], &[2, 0, 0, 0, 0, 0, 0, 0], &[3, 0, 0, 0, 0, 0, 0, 0]];
-    for (encoding, code) in [Encoding::Lz4, Encoding::Rgb565, Encoding::Rgb565Lz4].into_iter().zip(codes) {
+    let encodings = [Encoding::Lz4, Encoding::Rgb565, Encoding::Rgb565Lz4, Encoding::PlanesLz4];
+    for (encoding, code) in encodings.into_iter().zip(1..) {
         let mut rows = rows;
-        rows[3] = code;
+        let code = [code, 0, 0, 0, 0, 0, 0, 0];
+        rows[3] = &code;
         let (header, bytes) = (PixelsHeader { encoding, ..header }, bytes.clone());
         golden(ToMaster::Pixels { header, bytes }, &rows).await;
     }

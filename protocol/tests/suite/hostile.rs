@@ -7,7 +7,9 @@ use bytes::Bytes;
 use rayfarm_protocol::envelope::{HEADER_BYTES, Header, Kind, read_header};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::session::spawn;
-use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ProtocolError, ToMaster, ToWorker, limits};
+use rayfarm_protocol::{
+    AssetId, FrameAnnounce, FrameId, Lease, PixelFormat, ProtocolError, ToMaster, ToWorker, limits,
+};
 use tokio::io::{AsyncWriteExt, duplex};
 
 thread_local! {
@@ -135,11 +137,14 @@ fn malformed_bodies_are_refused_with_the_rule() {
     }
     assert!(malformed(Kind::Drain, &[0]).contains("1 bytes"));
 
-    let mut frame = vec![0; 48];
+    let mut frame = vec![0; 52];
     assert!(malformed(Kind::Frame, &frame).contains("0 x 0"));
     frame[40..48].copy_from_slice(&[1, 0, 0, 0, 1, 0, 1, 0]);
     assert!(malformed(Kind::Frame, &frame).contains("65537"));
     frame[46] = 0;
+    frame[48] = 3;
+    assert!(malformed(Kind::Frame, &frame).contains("pixel format 3 is not known"));
+    frame[48] = 2;
     frame.extend([0; limits::MAX_VIEW_BYTES + 1]);
     assert!(malformed(Kind::Frame, &frame).contains("4097"));
 
@@ -191,7 +196,8 @@ fn malformed_bodies_are_refused_with_the_rule() {
 #[test]
 fn malformed_messages_are_not_sent() {
     let view = Bytes::from(vec![0; limits::MAX_VIEW_BYTES + 1]);
-    let announce = FrameAnnounce { frame: FrameId(1), scene: AssetId([0; 32]), width: 1, height: 1, view };
+    let (frame, scene, format) = (FrameId(1), AssetId([0; 32]), PixelFormat::Rgb8);
+    let announce = FrameAnnounce { frame, scene, width: 1, height: 1, format, view };
     let none = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count: 0 };
     for message in [
         ToWorker::Frame(announce.clone()),

@@ -7,8 +7,8 @@ use rayfarm_protocol::message::Message;
 use rayfarm_protocol::peer::{ShareKey, Token};
 use rayfarm_protocol::session::spawn;
 use rayfarm_protocol::{
-    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelsHeader, ToMaster,
-    ToWorker, Welcome, codec, handshake, limits,
+    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelFormat,
+    PixelsHeader, ToMaster, ToWorker, Welcome, codec, handshake, limits,
 };
 use rayfarm_text::printable;
 use tokio::io::{AsyncWriteExt, duplex};
@@ -42,10 +42,11 @@ fn without_scope(address: std::net::SocketAddr) -> std::net::SocketAddr {
 
 fn to_worker() -> impl Strategy<Value = ToWorker> {
     let side = 1..=limits::MAX_FRAME_SIDE;
+    let format = proptest::sample::select(PixelFormat::ALL.to_vec());
     prop_oneof![
-        (any::<u64>(), ids(), side.clone(), side, bytes(0..300)).prop_map(
-            |(frame, scene, width, height, view)| {
-                ToWorker::Frame(FrameAnnounce { frame: FrameId(frame), scene, width, height, view })
+        (any::<u64>(), ids(), side.clone(), side, format, bytes(0..300)).prop_map(
+            |(frame, scene, width, height, format, view)| {
+                ToWorker::Frame(FrameAnnounce { frame: FrameId(frame), scene, width, height, format, view })
             }
         ),
         leases().prop_map(ToWorker::Segment),
@@ -76,7 +77,8 @@ fn headers() -> impl Strategy<Value = PixelsHeader> {
         Just(Encoding::Raw),
         Just(Encoding::Lz4),
         Just(Encoding::Rgb565),
-        Just(Encoding::Rgb565Lz4)
+        Just(Encoding::Rgb565Lz4),
+        Just(Encoding::PlanesLz4)
     ];
     (leases(), encodings, any::<[u64; 7]>()).prop_map(|(lease, encoding, numbers)| {
         let [trace_ns, wait_ns, encode_ns, span_ns, primary, shadow, secondary] = numbers;

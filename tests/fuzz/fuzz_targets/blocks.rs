@@ -2,12 +2,14 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use rayfarm_protocol::pixels::{Packer, unpack};
+use rayfarm_protocol::pixels::{Packer, unpack, unpack_planes};
 
 fuzz_target!(|data: &[u8]| {
     let Some(([low, high], rest)) = data.split_first_chunk() else { return };
     let mut rows = vec![0; usize::from(u16::from_le_bytes([*low, *high]))];
     let _ = unpack(rest, &mut rows);
+    let mut planes = rows.clone();
+    let _ = unpack_planes(rest, &mut rows, 24, &mut planes);
 
     let mut packer = Packer::new();
     let cut = rest.len().min(rows.len());

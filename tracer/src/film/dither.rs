@@ -4,12 +4,9 @@
 //! Thresholds depend on a pixel's place in the whole frame only, so any cut of a frame gives the same bytes. All channels of a
 //! pixel have the same threshold, so that grey stays grey. Values that are whole steps do not change.
 
-use std::ops::Range;
-
 use super::PixelFormat;
-use crate::frame::PreparedFrame;
-use crate::scene::ColorDepth;
-use crate::simd::{LANES, Lanes};
+use crate::scene::{ColorDepth, FrameView};
+use crate::simd::Lanes;
 
 /// Bytes of a pixel.
 const BYTES: usize = PixelFormat::Rgb8.bytes_per_pixel();
@@ -20,35 +17,37 @@ const STEPS: f32 = (SIDE * SIDE) as f32;
 
 /// The thresholds of some rows of a frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Dither {
+pub(super) struct Dither {
     width: usize,
     first_row: usize,
 }
 
 impl Dither {
-    /// The thresholds of these rows; `None` if pixels are rounded, or dithered later because they have fewer colours.
-    pub(crate) fn of(frame: &PreparedFrame, rows: &Range<u32>) -> Option<Self> {
-        let quality = frame.view().quality;
-        (quality.dither && quality.colors == ColorDepth::Exact).then(|| Self::new(frame, rows))
+    /// The thresholds of the rows from `first_row` on; `None` if pixels are rounded, or dithered later because they have fewer
+    /// colours.
+    pub(super) fn of(view: &FrameView, first_row: u32) -> Option<Self> {
+        let quality = view.quality;
+        (quality.dither && quality.colors == ColorDepth::Exact).then(|| Self::new(view, first_row))
     }
 
-    fn new(frame: &PreparedFrame, rows: &Range<u32>) -> Self {
-        Self { width: frame.width() as usize, first_row: rows.start as usize }
+    fn new(view: &FrameView, first_row: u32) -> Self {
+        Self { width: view.width as usize, first_row: first_row as usize }
     }
 
-    /// Terms that are added to pixels before they are rounded, in steps of the encoding; `places` are the offsets of the pixels'
-    /// bytes among those of the rows.
-    pub(super) fn offsets(&self, places: &[usize; LANES]) -> Lanes {
-        Lanes(std::array::from_fn(|lane| {
-            let pixel = places[lane] / BYTES;
-            offset(pixel % self.width, self.first_row + pixel / self.width)
-        }))
+    /// Terms that are added to pixels before they are rounded, in steps of the encoding; `indices` are those of the pixels among
+    /// those of the rows.
+    pub(super) fn offsets(&self, indices: &[usize]) -> Lanes {
+        let mut offsets = Lanes::ZERO;
+        for (to, pixel) in offsets.0.iter_mut().zip(indices) {
+            *to = offset(pixel % self.width, self.first_row + pixel / self.width);
+        }
+        offsets
     }
 }
 
-/// Rounds the pixels of these rows to fewer colours, by their thresholds.
-pub(super) fn reduce_colors(frame: &PreparedFrame, rows: &Range<u32>, bytes: &mut [u8]) {
-    let Dither { width, first_row } = Dither::new(frame, rows);
+/// Rounds the pixels of the rows from `first_row` on to fewer colours, by their thresholds.
+pub(super) fn reduce_colors(view: &FrameView, first_row: u32, bytes: &mut [u8]) {
+    let Dither { width, first_row } = Dither::new(view, first_row);
     for (index, pixel) in bytes.as_chunks_mut::<BYTES>().0.iter_mut().enumerate() {
         let offset = offset(index % width, first_row + index / width);
         let [r, g, b] = *pixel;

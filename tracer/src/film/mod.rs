@@ -3,24 +3,29 @@
 //! ```text
 //!   pixel_format   bytes per pixel and their range
 //!   encode         means of samples, sixteen pixels at a time
+//!   development    from linear light to bytes, in every format
+//!   tone           exposure and tone curves
 //!   dither         ordered dither, and reduction to fewer colours
 //!   sums           exact sums of samples
 //! ```
 
+mod development;
 mod dither;
 mod encode;
 mod pixel_format;
 mod sums;
+mod tone;
 
 use std::ops::Range;
 
 use crate::frame::PreparedFrame;
 use crate::image;
-use crate::scene::{ColorDepth, PixelFormat, Quality};
+use crate::scene::{ColorDepth, FrameView, PixelFormat, Quality};
+use crate::simd;
 
-pub(crate) use dither::Dither;
-pub(crate) use encode::{Means, PixelBytes, write_corner_means, write_samples};
-pub(crate) use sums::write_sums;
+pub(crate) use development::Development;
+use dither::Dither;
+pub(crate) use encode::{Means, PixelIndex, write_corner_means, write_samples};
 pub use sums::{MAX_RADIANCE, PixelSums};
 
 /// The requested pixels of a tile.
@@ -34,11 +39,28 @@ pub(crate) struct TilePixels {
     pub rows: Range<u32>,
 }
 
-/// Reduces the colours of finished rows, if the frame's quality has fewer.
-pub(crate) fn finish_rows(frame: &PreparedFrame, rows: &Range<u32>, bytes: &mut [u8]) {
-    match frame.view().quality {
+/// Writes the pixels of some rows of a frame, of which `sums` has the sums of all samples, in the frame's format. Reduction to fewer
+/// colours follows for the whole rows: see [`finish_rows`].
+pub(crate) fn write_sums(frame: &PreparedFrame, rows: &Range<u32>, sums: &[PixelSums], out: &mut [u8]) {
+    let view = frame.view();
+    Development::new(frame.level, view, rows.start).write_sums(view.samples, sums, out);
+}
+
+/// Writes the pixels that sums show: whole rows of a view's picture from `first_row` on, after a number of samples, in the view's
+/// format. The bytes are those that [`crate::render_rows`] writes for these samples.
+///
+/// `out` has [`PixelFormat::bytes_per_pixel`] bytes for each sum. What is too much on either side is ignored.
+pub fn develop(view: &FrameView, first_row: u32, samples: u32, sums: &[PixelSums], out: &mut [u8]) {
+    Development::new(simd::best(), view, first_row).write_sums(samples, sums, out);
+    finish_rows(view, first_row, out);
+}
+
+/// Reduces the colours of finished rows from `first_row` on, if they are RGB8 and the view's quality has fewer.
+pub(crate) fn finish_rows(view: &FrameView, first_row: u32, bytes: &mut [u8]) {
+    match view.quality {
+        _ if view.format != PixelFormat::Rgb8 => {}
         Quality { colors: ColorDepth::Exact, .. } => {}
         Quality { dither: false, .. } => image::reduce_colors(bytes),
-        Quality { dither: true, .. } => dither::reduce_colors(frame, rows, bytes),
+        Quality { dither: true, .. } => dither::reduce_colors(view, first_row, bytes),
     }
 }

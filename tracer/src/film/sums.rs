@@ -3,11 +3,7 @@
 //! The radiance of a sample is rounded to a multiple of 2^-20, so that sums are whole numbers: passes, segments, retries and threads add
 //! up to the same bits in any order.
 
-use std::ops::Range;
-
-use crate::frame::PreparedFrame;
 use crate::scene::PixelFormat;
-use crate::srgb;
 
 /// Largest radiance of a sample in a channel; brighter samples count as this.
 pub const MAX_RADIANCE: f32 = 1024.0;
@@ -83,30 +79,6 @@ impl PixelSums {
             u64::from_le_bytes(wide)
         };
         Self { rgb: [number(0), number(1), number(2)], even: number(3) }
-    }
-}
-
-/// Writes the pixels of some rows of a frame, of which `sums` has the sums of all samples, in the frame's format.
-pub(crate) fn write_sums(frame: &PreparedFrame, _rows: &Range<u32>, sums: &[PixelSums], out: &mut [u8]) {
-    let samples = frame.view().samples;
-    match frame.pixel_format() {
-        PixelFormat::Sums => {
-            for (pixel, sums) in out.chunks_exact_mut(BYTES).zip(sums) {
-                pixel.copy_from_slice(&sums.to_bytes());
-            }
-        }
-        PixelFormat::Linear => {
-            for (pixel, sums) in out.chunks_exact_mut(12).zip(sums) {
-                for (channel, value) in pixel.chunks_exact_mut(4).zip(sums.mean(samples)) {
-                    channel.copy_from_slice(&value.to_le_bytes());
-                }
-            }
-        }
-        PixelFormat::Rgb8 => {
-            for (pixel, sums) in out.chunks_exact_mut(3).zip(sums) {
-                pixel.copy_from_slice(&srgb::encode(sums.mean(samples).into()));
-            }
-        }
     }
 }
 

@@ -4,15 +4,27 @@
 use std::path::PathBuf;
 
 #[cfg(feature = "pictures")]
-use super::{HIGH_RANGE_FORMATS, KNOWN_EXTENSIONS, MAX_SIDE};
+use super::{HIGH_RANGE_FORMATS, MAX_SIDE};
 
 /// Fault of a picture or its file.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The extension of a file name is no known format.
     #[cfg(feature = "pictures")]
-    #[error("cannot write {}: its extension is none of {KNOWN_EXTENSIONS}; end the file name in one of them", path.display())]
+    #[error("cannot write {}: its extension is none of {known}; end the file name in one of them", path.display())]
     UnknownExtension {
+        /// The file.
+        path: PathBuf,
+        /// The extensions that are known.
+        known: &'static str,
+    },
+    /// The layers of a file are not those that its format or the reader can have.
+    #[cfg(feature = "pictures")]
+    #[error(
+        "{}: its layers do not fit; OpenEXR has one or more, all of one size, and other formats have one",
+        path.display()
+    )]
+    Layers {
         /// The file.
         path: PathBuf,
     },

@@ -6,6 +6,8 @@ mod compare;
 mod error;
 mod flip;
 #[cfg(feature = "pictures")]
+mod layers;
+#[cfg(feature = "pictures")]
 mod load;
 mod reduced;
 mod resize;
@@ -18,6 +20,8 @@ mod ssim;
 pub use compare::{Difference, compare};
 pub use error::ImageError;
 pub use flip::{FlipMap, PIXELS_PER_DEGREE, flip};
+#[cfg(feature = "pictures")]
+pub use layers::{Channels, LINEAR_EXTENSIONS, Layer, has_layers, is_linear, layer_names, save_layers};
 #[cfg(feature = "pictures")]
 pub use load::{ends_early, has_high_range, load, load_with_alpha, size};
 pub(crate) use reduced::reduce_colors;

@@ -25,7 +25,7 @@ impl Format {
         match extension.as_deref() {
             Some("png") => Ok(Self::Png),
             Some("ppm") => Ok(Self::Ppm),
-            _ => Err(ImageError::UnknownExtension { path: path.to_owned() }),
+            _ => Err(ImageError::UnknownExtension { path: path.to_owned(), known: KNOWN_EXTENSIONS }),
         }
     }
 }

@@ -80,7 +80,7 @@ pub fn render_rows_watched<W: Watch>(
         } else {
             dispatch!(frame.level, simd => regular::render_band(simd, frame, top..bottom, band, cancelled, &mut *watch))?
         };
-        film::finish_rows(frame, &(top..bottom), band);
+        film::finish_rows(frame.view(), top, band);
         top = bottom;
     }
     Ok(counts)

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::direct::TileContext;
 use super::stage::{Stage, Watch};
 use crate::cancel::Cancelled;
-use crate::film::{Means, PixelBytes, TilePixels, write_samples};
+use crate::film::{Means, PixelIndex, TilePixels, write_samples};
 use crate::frame::PreparedFrame;
 use crate::rays::{BLOCKS, RayCounts, SIDE, TileColors, TileRays, TileSamples, place};
 use crate::simd::{LANES, Simd, three};
@@ -92,7 +92,7 @@ fn write_means<S: Simd>(
                     sum = three!(channel => sum[channel] + color[channel].0[lane]);
                 }
             }
-            means.push(simd, sum, PixelBytes::of(frame, &pixels.rows, x, y), out);
+            means.push(simd, sum, PixelIndex::of(frame, &pixels.rows, x, y), out);
         }
     }
     means.finish(simd, out);

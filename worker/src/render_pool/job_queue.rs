@@ -41,11 +41,14 @@ struct Progress {
 /// Encoded pixels of a band.
 #[derive(Debug)]
 pub(super) struct BandPixels {
-    /// Uncompressed pixels: RGB 5-6-5 if `rgb565` is set, the segment's pixel format otherwise.
+    /// Uncompressed pixels.
     pub(super) raw: BytesMut,
-    pub(super) rgb565: bool,
+    /// Encoding of the uncompressed pixels.
+    pub(super) plain: Encoding,
     /// The same pixels as a block of LZ4, where compression is on.
     pub(super) block: Option<Vec<u8>>,
+    /// Encoding of the block.
+    pub(super) blocks: Encoding,
 }
 
 /// Division of a frame into bands.
@@ -145,17 +148,17 @@ impl<F, A> Job<F, A> {
 /// otherwise.
 fn join_bands(bands: BTreeMap<u32, BandPixels>) -> (Encoding, Bytes) {
     let raw_bytes: usize = bands.values().map(|band| band.raw.len()).sum();
-    // All bands of a frame have the same format.
-    let rgb565 = bands.values().any(|band| band.rgb565);
+    // All bands of a frame have the same encodings.
+    let encodings = bands.values().next().map(|band| (band.plain, band.blocks));
+    let (plain, encoding) = encodings.unwrap_or((Encoding::Raw, Encoding::Lz4));
     let blocks: Option<Vec<&[u8]>> = bands.values().map(|band| band.block.as_deref()).collect();
     match blocks.map(|blocks| blocks.concat()).filter(|packed| packed.len() < raw_bytes) {
-        Some(packed) if rgb565 => (Encoding::Rgb565Lz4, packed.into()),
-        Some(packed) => (Encoding::Lz4, packed.into()),
+        Some(packed) => (encoding, packed.into()),
         None => {
             let mut joined = BytesMut::new();
             // Bands are adjacent in one buffer, unless they are RGB 5-6-5, so this moves no byte.
             bands.into_values().for_each(|band| joined.unsplit(band.raw));
-            (if rgb565 { Encoding::Rgb565 } else { Encoding::Raw }, joined.freeze())
+            (plain, joined.freeze())
         }
     }
 }
@@ -227,7 +230,11 @@ mod tests {
 
     use super::*;
 
-    const ROW_BYTES: usize = PixelFormat::SEGMENT.row_bytes(4);
+    const ROW_BYTES: usize = PixelFormat::Rgb8.row_bytes(4);
+    fn band(raw: BytesMut, block: Option<Vec<u8>>) -> BandPixels {
+        BandPixels { raw, plain: Encoding::Raw, block, blocks: Encoding::Lz4 }
+    }
+
     const SHAPE: BandShape = BandShape { rows: 8, row_bytes: ROW_BYTES };
 
     fn job(segment: u32, rows: Range<u32>) -> Job<(), ()> {
@@ -277,9 +284,7 @@ mod tests {
         for (index, Band { job, rows, bytes }) in bands.into_iter().enumerate() {
             let counts = RayCounts { primary: 2, shadow: 3, secondary: 4 };
             let cost = BandCost { counts, trace: Duration::from_nanos(5), encode: Duration::from_nanos(1) };
-            let Some(rendered) =
-                job.finish_band(rows, BandPixels { raw: bytes, rgb565: false, block: None }, cost)
-            else {
+            let Some(rendered) = job.finish_band(rows, band(bytes, None), cost) else {
                 assert!(index < last);
                 continue;
             };
@@ -304,11 +309,7 @@ mod tests {
                 // Blocks of three bytes each have more bytes than the rows.
                 let part = if first_row == 0 { bytes.len() } else { 3 };
                 let block = bytes.chunks(part).flat_map(|part| packer.block(part).unwrap()).collect();
-                job.finish_band(
-                    rows,
-                    BandPixels { raw: bytes, rgb565: false, block: Some(block) },
-                    BandCost::default(),
-                )
+                job.finish_band(rows, band(bytes, Some(block)), BandCost::default())
             });
             let Rendered { encoding: chosen, bytes, .. } = rendered.unwrap();
             let expected = expected(first_row..24);
@@ -332,7 +333,7 @@ mod tests {
         assert_eq!(take(&queue).unwrap().0, 2);
         assert_eq!(queue.len(), 1);
         let single = Band { rows: 0..16, ..running };
-        let pixels = BandPixels { raw: single.bytes, rgb565: false, block: None };
+        let pixels = band(single.bytes, None);
         assert!(single.job.finish_band(single.rows, pixels, BandCost::default()).is_none());
     }
 

@@ -1,6 +1,7 @@
 //! The render threads. They are plain system threads, so that rendering and networking never wait for each other.
 
 mod buffers;
+mod gain;
 mod job_queue;
 
 use std::io;
@@ -16,6 +17,7 @@ use crate::progress::ProgressFlag;
 use crate::renderer::{Cancelled, Renderer};
 
 use buffers::BufferPool;
+pub(crate) use gain::Gain;
 use job_queue::{Band, BandCost, BandPixels, BandShape, Job, JobQueue, Rendered};
 
 /// Receiver of the results of a session's leases.
@@ -35,8 +37,12 @@ pub(crate) struct ReadyFrame<F> {
     pub(crate) frame: F,
     /// Number of pixels per row.
     pub(crate) width: u32,
+    /// Format of the pixels.
+    pub(crate) format: PixelFormat,
     /// Whether the pixels are sent as RGB 5-6-5.
     pub(crate) rgb565: bool,
+    /// What compression has gained so far.
+    pub(crate) gain: Gain,
 }
 
 /// A lease for the render pool.
@@ -128,7 +134,7 @@ impl<R: Renderer> Shared<R> {
     fn next_band(&self) -> Option<PoolBand<R>> {
         let shape = |ready: &ReadyFrame<R::Frame>| BandShape {
             rows: self.renderer.band_rows(&ready.frame).max(1),
-            row_bytes: PixelFormat::SEGMENT.row_bytes(ready.width),
+            row_bytes: ready.format.row_bytes(ready.width),
         };
         let mut state = self.state();
         loop {
@@ -167,18 +173,29 @@ impl<R: Renderer> Shared<R> {
     fn finish(&self, band: PoolBand<R>, mut cost: BandCost, packer: &mut Packer) {
         let Band { job, rows, bytes: mut raw } = band;
         let begun = Instant::now();
-        let rgb565 = job.frame.rgb565;
+        let ReadyFrame { rgb565, format, ref gain, .. } = *job.frame;
         if rgb565 {
             let Some(bytes) = pixels::to_rgb565(&mut raw) else {
                 return self.fail(&job, "a pixel has a colour outside RGB 5-6-5".to_owned());
             };
             raw.truncate(bytes);
         }
-        let block = if job.reply.compress { packer.block(&raw) } else { None };
+        let block = match format {
+            _ if !job.reply.compress || !gain.is_worthwhile() => None,
+            PixelFormat::Rgb8 => packer.block(&raw),
+            PixelFormat::Linear | PixelFormat::Sums => {
+                pixels::planes_block(packer, &raw, format.bytes_per_pixel())
+            }
+        };
+        block.iter().for_each(|block| gain.add(raw.len(), block.len()));
         if rgb565 || block.is_some() {
             cost.encode = begun.elapsed();
         }
-        if let Some(rendered) = job.finish_band(rows, BandPixels { raw, rgb565, block }, cost) {
+        let (plain, blocks) = match rgb565 {
+            true => (Encoding::Rgb565, Encoding::Rgb565Lz4),
+            false => (Encoding::Raw, format.blocks()),
+        };
+        if let Some(rendered) = job.finish_band(rows, BandPixels { raw, plain, block, blocks }, cost) {
             self.state().queue.remove(&job);
             if rendered.encoding == Encoding::Raw {
                 self.buffers.track(&rendered.bytes);

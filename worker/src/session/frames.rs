@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
-use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, PixelFormat};
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease};
 
 use crate::cancel::{CancelFlag, CancelGuard};
 
@@ -141,11 +141,11 @@ impl<F> FrameTable<F> {
             }
             return LeaseDecision::Refuse(format!("{lease}: the frame is not announced"));
         };
-        let FrameAnnounce { width, height, .. } = entry.announce;
+        let FrameAnnounce { width, height, format, .. } = entry.announce;
         let Some(rows) = lease.rows().filter(|rows| rows.end <= height) else {
             return LeaseDecision::Refuse(format!("{lease}: the rows are outside a frame of {height} rows"));
         };
-        if PixelFormat::SEGMENT.segment_bytes(width, lease.row_count).is_none() {
+        if format.segment_bytes(width, lease.row_count).is_none() {
             return LeaseDecision::Refuse(format!("{lease}: the pixels do not fit into one message"));
         }
         match &entry.state {
@@ -178,12 +178,14 @@ impl<F> Entry<F> {
 #[cfg(test)]
 mod tests {
     use bytes::Bytes;
+    use rayfarm_protocol::PixelFormat;
+    use rayfarm_protocol::limits::{MAX_FRAME_SIDE, MAX_PIXELS_BYTES};
 
     use super::*;
 
     fn announce(frame: u64) -> FrameAnnounce {
-        let scene = AssetId([7; 32]);
-        FrameAnnounce { frame: FrameId(frame), scene, width: 8, height: 8, view: Bytes::new() }
+        let (scene, format) = (AssetId([7; 32]), PixelFormat::Rgb8);
+        FrameAnnounce { frame: FrameId(frame), scene, width: 8, height: 8, format, view: Bytes::new() }
     }
 
     fn is_refused(frames: &mut FrameTable<()>, frame: u64) -> bool {
@@ -201,6 +203,20 @@ mod tests {
             frames.announce(announce(newer + 1));
             assert!(!is_refused(&mut frames, 5) && !is_refused(&mut frames, newer + 1), "frame {newer}");
             assert!(frames.frames.len() <= MAX_FRAMES);
+        }
+    }
+
+    #[test]
+    fn a_lease_whose_pixels_do_not_fit_into_a_message_is_refused() {
+        for format in PixelFormat::ALL {
+            let mut frames = FrameTable::<()>::new();
+            frames.announce(FrameAnnounce { width: 1 << 14, height: MAX_FRAME_SIDE, format, ..announce(1) });
+            let most = (MAX_PIXELS_BYTES / format.row_bytes(1 << 14)) as u32;
+            for (row_count, refused) in [(most, false), (most + 1, true)] {
+                let lease = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count };
+                let decision = frames.lease(lease, Instant::now());
+                assert_eq!(matches!(decision, LeaseDecision::Refuse(_)), refused, "{format:?}: {decision:?}");
+            }
         }
     }
 

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use rayfarm_protocol::PixelFormat;
+
 use super::state::{Work, WorkResult};
 use crate::catch_panic::catch_panic;
 use crate::progress::ProgressFlag;
-use crate::render_pool::ReadyFrame;
+use crate::render_pool::{Gain, ReadyFrame};
 use crate::renderer::Renderer;
 use crate::scenes::{BuildPool, DiskCache, SceneResult, SceneWork};
 
@@ -76,8 +78,16 @@ pub(super) fn do_work<R: Renderer>(
             if cancelled() {
                 return None;
             }
-            let ready =
-                |frame| ReadyFrame { rgb565: renderer.is_rgb565(&frame), width: announce.width, frame };
+            let ready = |frame| {
+                let rgb565 = announce.format == PixelFormat::Rgb8 && renderer.is_rgb565(&frame);
+                ReadyFrame {
+                    frame,
+                    width: announce.width,
+                    format: announce.format,
+                    rgb565,
+                    gain: Gain::default(),
+                }
+            };
             WorkResult::Prepared { frame: announce.frame, result: result.map(ready) }
         }
     };

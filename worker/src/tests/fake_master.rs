@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{self, Receiver, Sender};
-use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, ToMaster, ToWorker};
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, PixelFormat, ToMaster, ToWorker};
 use tokio::task::JoinHandle;
 
 use super::{FakeRenderer, HEIGHT, WIDTH};
@@ -69,7 +69,15 @@ impl FakeMaster {
         let view = Bytes::copy_from_slice(view);
         let scene = AssetId::of(scene);
         let (frame, width, height) = (FrameId(frame), WIDTH, HEIGHT);
-        self.send(ToWorker::Frame(FrameAnnounce { frame, scene, width, height, view })).await;
+        self.send(ToWorker::Frame(FrameAnnounce {
+            frame,
+            scene,
+            width,
+            height,
+            format: PixelFormat::Rgb8,
+            view,
+        }))
+        .await;
     }
 
     /// Receives the next message that is no request for an asset. Serves requests before it.

@@ -21,7 +21,7 @@ pub(super) const WIDTH: u32 = 5;
 pub(super) const HEIGHT: u32 = 40;
 
 /// Number of bytes of a row.
-const ROW_BYTES: usize = PixelFormat::SEGMENT.row_bytes(WIDTH);
+const ROW_BYTES: usize = PixelFormat::Rgb8.row_bytes(WIDTH);
 
 /// Salt of scenes whose compilation lasts until it is cancelled, and then until the gate is open.
 pub(super) const SLOW_SCENE: u8 = 100;

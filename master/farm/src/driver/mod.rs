@@ -29,6 +29,7 @@ use crate::accounting::{Accounts, TimelineSink};
 use crate::assets::Assets;
 use crate::error::FarmError;
 use crate::finished::FinishedFrame;
+use crate::format::wire_format;
 use crate::framebuffer::Framebuffers;
 use crate::options::FarmOptions;
 use crate::sessions::identity::Tickets;
@@ -212,9 +213,10 @@ impl Driver {
         match self.announcement(frame, &view) {
             Ok(announce) => {
                 let (FrameView { width, height, .. }, tile_rows) = (view, tile_rows(&view));
+                let row_bytes = announce.format.row_bytes(width) as u64;
                 let at = self.started.elapsed();
                 inner.requests.insert(frame, Request { request, view, announce, at });
-                self.drive(&mut inner, Event::FrameRequested { frame, width, height, tile_rows });
+                self.drive(&mut inner, Event::FrameRequested { frame, width, height, row_bytes, tile_rows });
             }
             Err(error) => self.deliver(&mut inner, Err(error)),
         }
@@ -232,8 +234,15 @@ impl Driver {
     fn announcement(&self, frame: FrameId, view: &FrameView) -> Result<FrameAnnounce, FarmError> {
         view.validate().map_err(FarmError::View)?;
         let bytes = codec::encode(view).map_err(|error| FarmError::Assets(error.into()))?;
-        let FrameView { width, height, .. } = *view;
-        Ok(FrameAnnounce { frame, scene: self.assets.scene(), width, height, view: Bytes::from(bytes) })
+        let (FrameView { width, height, .. }, format) = (*view, wire_format(view.format));
+        Ok(FrameAnnounce {
+            frame,
+            scene: self.assets.scene(),
+            width,
+            height,
+            format,
+            view: Bytes::from(bytes),
+        })
     }
 
     /// Waits for the next finished frame or error.

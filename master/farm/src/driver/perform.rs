@@ -16,8 +16,8 @@ impl Driver {
     pub(super) fn perform(&self, inner: &mut Inner, action: Action, events: &mut VecDeque<Event>) {
         match action {
             Action::BeginFrame { frame } => {
-                if let Some(Request { view, .. }) = inner.requests.get(&frame) {
-                    self.framebuffers.open(frame, view.width, view.height);
+                if let Some(Request { announce, .. }) = inner.requests.get(&frame) {
+                    self.framebuffers.open(frame, announce.width, announce.height, announce.format);
                 }
             }
             Action::FrameDone { frame, cost, elapsed } => self.frame_done(inner, frame, cost, elapsed),

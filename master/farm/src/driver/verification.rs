@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use bytes::Bytes;
-use rayfarm_protocol::{FrameId, Lease, PixelsHeader};
+use rayfarm_protocol::{FrameAnnounce, FrameId, Lease, PixelsHeader};
 use rayfarm_scheduler::{ArbiterResult, Event, Finding, Reconnect, WorkerId};
 
 use super::{Driver, Inner, Request};
@@ -43,9 +43,9 @@ impl Driver {
         let PixelsHeader { lease, encoding, cost } = header;
         let open = self.lock().open_segments.get(lease.frame, lease.segment).cloned();
         let second = match open {
-            Some(OpenSegment { view, first, .. }) => {
-                let size = view.width as usize * 3 * lease.row_count as usize;
-                let rows = self.framebuffers.decode(lease, size, encoding, bytes)?;
+            Some(OpenSegment { announce: FrameAnnounce { width, format, .. }, first, .. }) => {
+                let size = format.row_bytes(width) * lease.row_count as usize;
+                let rows = self.framebuffers.decode(lease, format, size, encoding, bytes)?;
                 let second = Rendering { worker, digest: SegmentDigest::of(rows.clone()) };
                 first.digest.compute();
                 second.digest.compute();

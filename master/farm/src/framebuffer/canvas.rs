@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use rayfarm_protocol::Lease;
+use rayfarm_protocol::{Lease, PixelFormat};
 use rayfarm_scheduler::WorkerId;
 
 use super::Misfit;
@@ -11,6 +11,8 @@ use super::Misfit;
 /// The rows of one frame, and which worker has rendered each.
 #[derive(Debug)]
 pub(super) struct Canvas {
+    /// Format of the pixels.
+    pub(super) format: PixelFormat,
     row_bytes: usize,
     pub(super) pixels: Vec<u8>,
     /// For each row the worker whose pixels it has, if it has any.
@@ -20,8 +22,8 @@ pub(super) struct Canvas {
 
 impl Canvas {
     /// A picture of `rows` rows of `row_bytes` bytes. The bytes of `pixels` count as missing.
-    pub(super) fn new(pixels: Vec<u8>, row_bytes: usize, rows: usize) -> Self {
-        Self { row_bytes, pixels, filled: vec![None; rows], missing: rows }
+    pub(super) fn new(pixels: Vec<u8>, format: PixelFormat, row_bytes: usize, rows: usize) -> Self {
+        Self { format, row_bytes, pixels, filled: vec![None; rows], missing: rows }
     }
 
     /// Whether every row has pixels.

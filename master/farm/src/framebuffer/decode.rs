@@ -1,11 +1,11 @@
-//! Decoding of pixels: from the bytes of a lease, in any encoding, to its RGB8 rows.
+//! Decoding of pixels: from the bytes of a lease, in any encoding, to its rows in the frame's format.
 
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bytes::Bytes;
-use rayfarm_protocol::pixels::{BlockError, from_rgb565, rgb565_bytes, unpack};
-use rayfarm_protocol::{Encoding, Lease};
+use rayfarm_protocol::pixels::{BlockError, from_rgb565, rgb565_bytes, unpack, unpack_planes};
+use rayfarm_protocol::{Encoding, Lease, PixelFormat};
 
 /// Buffers kept for later segments. Each decoding in progress uses one or two more.
 const SPARE_BUFFERS: usize = 8;
@@ -17,11 +17,13 @@ pub(crate) enum Misfit {
     Bytes { lease: Lease, expected: usize, got: usize },
     #[error("{lease}: {source}")]
     Blocks { lease: Lease, source: BlockError },
+    #[error("{lease}: pixels of the format {format:?} are not sent as {encoding:?}")]
+    Encoding { lease: Lease, format: PixelFormat, encoding: Encoding },
     #[error("{lease} has rows outside of the picture of {rows} rows")]
     Rows { lease: Lease, rows: usize },
 }
 
-/// The RGB8 rows of one segment, without gaps. Clones share the bytes.
+/// The decoded rows of one segment, without gaps. Clones share the bytes.
 #[derive(Clone, Debug)]
 pub(crate) struct DecodedRows(Storage);
 
@@ -53,19 +55,23 @@ pub(super) struct Decoder {
 }
 
 impl Decoder {
-    /// Decodes the pixels of a lease to `size` bytes.
+    /// Decodes the pixels of a lease to `size` bytes in a format.
     ///
     /// # Errors
-    /// The pixels decode to another number of bytes, or not at all.
+    /// The pixels decode to another number of bytes, or not at all, or their encoding is not one of the format.
     pub(super) fn decode(
         &self,
         lease: Lease,
+        format: PixelFormat,
         size: usize,
         encoding: Encoding,
         bytes: &Bytes,
     ) -> Result<DecodedRows, Misfit> {
         #[cfg(test)]
         self.hook.get().into_iter().for_each(|hook| hook());
+        if !format.allows(encoding) {
+            return Err(Misfit::Encoding { lease, format, encoding });
+        }
         let misfit = |expected| Misfit::Bytes { lease, expected, got: bytes.len() };
         let invalid = |source| Misfit::Blocks { lease, source };
         let narrow = rgb565_bytes(size);
@@ -76,6 +82,15 @@ impl Decoder {
             Encoding::Raw if bytes.len() == size => Ok(DecodedRows(Storage::Received(bytes.clone()))),
             Encoding::Raw => Err(misfit(size)),
             Encoding::Lz4 => self.fill_buffer(size, |rows| unpack(bytes, rows).map_err(invalid)),
+            Encoding::PlanesLz4 => {
+                let mut planes = self.take(size);
+                let pixel = format.bytes_per_pixel();
+                let rows = self.fill_buffer(size, |rows| {
+                    unpack_planes(bytes, rows, pixel, &mut planes).map_err(invalid)
+                });
+                self.keep(planes);
+                rows
+            }
             Encoding::Rgb565 => self.fill_buffer(size, |rows| widened(bytes, rows)),
             Encoding::Rgb565Lz4 => {
                 let unpacked = self.fill_buffer(narrow, |pixels| unpack(bytes, pixels).map_err(invalid))?;

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use rayfarm_protocol::{Encoding, FrameId, Lease};
+use rayfarm_protocol::{Encoding, FrameId, Lease, PixelFormat};
 use rayfarm_scheduler::WorkerId;
 
 mod canvas;
@@ -60,17 +60,17 @@ pub(crate) enum Written {
 }
 
 impl Framebuffers {
-    /// Opens a frame of `width * height` pixels. A spare buffer is not cleared: every row is written before the picture is
+    /// Opens a frame of `width * height` pixels in a format. A spare buffer is not cleared: every row is written before the picture is
     /// handed out.
-    pub(crate) fn open(&self, frame: FrameId, width: u32, height: u32) {
-        let (row_bytes, rows) = (width as usize * 3, height as usize);
+    pub(crate) fn open(&self, frame: FrameId, width: u32, height: u32, format: PixelFormat) {
+        let (row_bytes, rows) = (format.row_bytes(width), height as usize);
         let mut inner = self.lock();
         let mut pixels = inner.spare.pop().unwrap_or_default();
         if pixels.len() != row_bytes * rows {
             // The operating system provides zeroed pages on first access, whereas resizing would write them all.
             pixels = vec![0; row_bytes * rows];
         }
-        inner.open.insert(frame, Canvas::new(pixels, row_bytes, rows));
+        inner.open.insert(frame, Canvas::new(pixels, format, row_bytes, rows));
     }
 
     /// Decodes the pixels of a lease and copies them into its picture. Rows that have pixels keep them. Only the copying
@@ -85,12 +85,13 @@ impl Framebuffers {
         encoding: Encoding,
         bytes: &Bytes,
     ) -> Result<Written, Misfit> {
-        let Some(row_bytes) = self.lock().canvas(from, lease.frame).map(|canvas| canvas.bytes_of(lease))
+        let Some((format, size)) =
+            self.lock().canvas(from, lease.frame).map(|canvas| (canvas.format, canvas.bytes_of(lease)))
         else {
             return Ok(Written::Superseded);
         };
         let started = Instant::now();
-        let rows = self.decode(lease, row_bytes?, encoding, bytes)?;
+        let rows = self.decode(lease, format, size?, encoding, bytes)?;
         let decoding = started.elapsed();
         let mut inner = self.lock();
         // Meanwhile the frame may have been closed and the worker rejected.
@@ -104,18 +105,19 @@ impl Framebuffers {
         Ok(Written::Kept { rows, all_new, elapsed: decoding + started.elapsed() })
     }
 
-    /// Decodes the pixels of a lease: `row_bytes` bytes of RGB8 rows. Takes no lock of the pictures.
+    /// Decodes the pixels of a lease: `size` bytes of rows in a format. Takes no lock of the pictures.
     ///
     /// # Errors
-    /// The pixels do not fit the lease.
+    /// The pixels do not fit the lease, or their encoding is not one of the format.
     pub(crate) fn decode(
         &self,
         lease: Lease,
-        row_bytes: usize,
+        format: PixelFormat,
+        size: usize,
         encoding: Encoding,
         bytes: &Bytes,
     ) -> Result<DecodedRows, Misfit> {
-        self.decoder.decode(lease, row_bytes, encoding, bytes)
+        self.decoder.decode(lease, format, size, encoding, bytes)
     }
 
     /// Takes the memory of decoded rows back for later segments.

@@ -2,7 +2,7 @@
 
 use proptest::collection::vec;
 use proptest::prelude::*;
-use rayfarm_protocol::pixels::Packer;
+use rayfarm_protocol::pixels::{Packer, planes_block};
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn lease(first_row: u32, row_count: u32) -> Lease {
 
 fn opened(width: u32, height: u32) -> Arc<Framebuffers> {
     let framebuffers = Arc::new(Framebuffers::default());
-    framebuffers.open(FRAME, width, height);
+    framebuffers.open(FRAME, width, height, PixelFormat::Rgb8);
     framebuffers
 }
 
@@ -54,6 +54,29 @@ fn segments_in_any_order_make_the_picture() {
     assert_eq!(write(&framebuffers, lease(2, 1), &[7, 8, 9]), Ok(true));
     assert_eq!(write(&framebuffers, lease(0, 2), &[1, 2, 3, 4, 5, 6]), Ok(true));
     assert_eq!(framebuffers.finish(FRAME).unwrap().into_vec(), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
+}
+
+#[test]
+fn pixels_of_numbers_arrive_raw_or_in_planes() {
+    for format in [PixelFormat::Linear, PixelFormat::Sums] {
+        let row: Vec<u8> = (0..format.row_bytes(5)).map(|byte| (byte * 7 % 23) as u8).collect();
+        let framebuffers = Arc::new(Framebuffers::default());
+        framebuffers.open(FRAME, 5, 3, format);
+        let rows = [row.as_slice(), &row].concat();
+        let mut packer = Packer::new();
+        let blocks =
+            [&rows[..row.len()], &row].map(|row| planes_block(&mut packer, row, format.bytes_per_pixel()));
+        let planes = blocks.map(Option::unwrap).concat();
+        assert_eq!(write_as(&framebuffers, A, lease(1, 2), Encoding::PlanesLz4, &planes), Ok(true));
+        for encoding in [Encoding::Lz4, Encoding::Rgb565, Encoding::Rgb565Lz4] {
+            let error = Misfit::Encoding { lease: lease(0, 1), format, encoding };
+            assert_eq!(write_as(&framebuffers, A, lease(0, 1), encoding, &row), Err(error));
+        }
+        assert_eq!(write(&framebuffers, lease(0, 1), &row), Ok(true));
+        assert_eq!(*framebuffers.finish(FRAME).unwrap(), [row.as_slice(), &row, &row].concat());
+    }
+    let refused = write_as(&opened(1, 1), A, lease(0, 1), Encoding::PlanesLz4, &[0; 3]);
+    assert!(matches!(refused, Err(Misfit::Encoding { .. })), "{refused:?}");
 }
 
 #[test]
@@ -97,7 +120,7 @@ fn buffers_are_reused_and_their_number_is_bounded() {
     let framebuffers = opened(1, 1);
     let pictures: Vec<FramePixels> = (0..6)
         .map(|n| {
-            framebuffers.open(FrameId(n), 1, 1);
+            framebuffers.open(FrameId(n), 1, 1, PixelFormat::Rgb8);
             write(&framebuffers, Lease { frame: FrameId(n), ..lease(0, 1) }, &[n as u8; 3]).unwrap();
             framebuffers.finish(FrameId(n)).unwrap()
         })
@@ -106,7 +129,7 @@ fn buffers_are_reused_and_their_number_is_bounded() {
     drop(pictures);
     assert_eq!(framebuffers.lock().spare.len(), SPARE_BUFFERS);
     assert!(framebuffers.lock().spare.iter().any(|spare| spare.as_ptr() == first));
-    framebuffers.open(FRAME, 2, 2);
+    framebuffers.open(FRAME, 2, 2, PixelFormat::Rgb8);
     framebuffers.discard(FRAME);
     assert!(framebuffers.lock().spare.iter().all(|spare| spare.len() == 12));
 }
@@ -175,7 +198,8 @@ fn a_copy_has_the_pixels_of_the_picture_and_not_of_the_last_reply() {
 fn decoded_rows_share_the_received_bytes_or_a_recycled_buffer() {
     let framebuffers = opened(1, 1);
     let raw = Bytes::from(vec![1; 6]);
-    let decode = |encoding, bytes: &Bytes| framebuffers.decode(lease(0, 2), 6, encoding, bytes);
+    let decode =
+        |encoding, bytes: &Bytes| framebuffers.decode(lease(0, 2), PixelFormat::Rgb8, 6, encoding, bytes);
     assert_eq!(decode(Encoding::Raw, &raw).unwrap().as_ptr(), raw.as_ptr());
     let lz4 = Bytes::from(packed(&[1; 6], 4));
     let rows = decode(Encoding::Lz4, &lz4).unwrap();
@@ -203,7 +227,7 @@ fn narrow_pixels_are_widened_into_their_rows() {
         write(&framebuffers, lease(3, 1), &[9; 3]).unwrap();
         let expected = [&FEW_COLORS[..3], &[1; 3], &FEW_COLORS[6..], &[9; 3]].concat();
         assert_eq!(*framebuffers.finish(FRAME).unwrap(), expected[..], "{encoding:?}");
-        let decoded = framebuffers.decode(lease(0, 3), 9, encoding, &Bytes::from(bytes));
+        let decoded = framebuffers.decode(lease(0, 3), PixelFormat::Rgb8, 9, encoding, &Bytes::from(bytes));
         assert_eq!(*decoded.unwrap(), FEW_COLORS);
     }
 }

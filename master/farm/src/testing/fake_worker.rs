@@ -54,10 +54,11 @@ pub struct Outcome {
     pub drained: bool,
 }
 
-/// RGB8 test pixels of a range of rows, a function of view, x and y only.
+/// Test pixels of a range of rows in the view's format, a function of view, x and y only.
 pub fn pixels(view: &FrameView, rows: Range<u32>) -> Vec<u8> {
     let seed = view.spin as u32 + (view.camera.position.x * 1e4).abs() as u32;
-    let pixel = |x: u32, y: u32| [x as u8, y as u8, (seed + x * y) as u8];
+    let bytes = view.format.bytes_per_pixel();
+    let pixel = |x: u32, y: u32| [x as u8, y as u8, (seed + x * y) as u8].into_iter().cycle().take(bytes);
     rows.flat_map(|y| (0..view.width).flat_map(move |x| pixel(x, y))).collect()
 }
 
@@ -141,7 +142,7 @@ async fn answer(sender: &Sender<ToMaster>, script: &mut Script, lease: Lease, vi
     };
     let answers = match deviation {
         Script::Busy => {
-            tokio::time::sleep(PIXEL_TIME * (bytes.len() / 3) as u32).await;
+            tokio::time::sleep(PIXEL_TIME * view.width * lease.row_count).await;
             1
         }
         Script::Correct | Script::DisconnectAt(_) | Script::OnlyNarrowerThan(_) | Script::Garbage => 1,

@@ -27,6 +27,7 @@ use rayfarm_scheduler::{SegmentPolicy, WorkerState};
 mod asset_routing;
 mod commands;
 mod decoding;
+mod formats;
 mod identity;
 mod invalid_peers;
 mod verification;

@@ -13,7 +13,7 @@ use tokio_util::sync::CancellationToken;
 use super::SegmentDigest;
 use crate::options::FarmScene;
 
-/// Renders rows of a view: RGB8 sRGB without gaps, or the reason why it cannot.
+/// Renders rows of a view: pixels in its format without gaps, or the reason why it cannot.
 pub(crate) type RowRenderer = dyn Fn(&FrameView, Range<u32>) -> Result<Vec<u8>, String> + Send + Sync;
 
 /// A segment for the arbiter to render: two renderings differ, or no second worker can render it.
@@ -74,7 +74,7 @@ pub(crate) fn row_renderer(scene: FarmScene, stop: CancellationToken) -> Arc<Row
             compiled.map(Arc::new).map_err(|error| error.to_string())
         });
         let frame = PreparedFrame::new(scene.clone()?, view).map_err(|error| error.to_string())?;
-        let mut pixels = vec![0; rows.len() * view.width as usize * 3];
+        let mut pixels = vec![0; rows.len() * frame.row_bytes()];
         let rendered = render_rows(&frame, rows, &mut pixels, &|| stop.is_cancelled());
         rendered.map_err(|_| "the master ends".to_owned())?;
         Ok(pixels)

@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock};
 
 type Compute = Box<dyn FnOnce() -> blake3::Hash + Send>;
 
-/// A hash of the RGB8 rows of a segment: equal digests mean equal pixels.
+/// A hash of the decoded rows of a segment: equal digests mean equal pixels.
 ///
 /// It is computed at its first use, so that it can be created under a lock and computed outside of it. The rows are
 /// released then. Clones share the result.
@@ -14,7 +14,7 @@ type Compute = Box<dyn FnOnce() -> blake3::Hash + Send>;
 pub(crate) struct SegmentDigest(Arc<LazyLock<blake3::Hash, Compute>>);
 
 impl SegmentDigest {
-    /// The digest of RGB8 rows without gaps.
+    /// The digest of rows without gaps.
     pub(crate) fn of(rows: impl Deref<Target = [u8]> + Send + 'static) -> Self {
         Self(Arc::new(LazyLock::new(Box::new(move || blake3::hash(&rows)))))
     }

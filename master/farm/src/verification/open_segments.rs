@@ -70,7 +70,7 @@ impl OpenSegments {
 #[cfg(test)]
 mod tests {
     use bytes::Bytes;
-    use rayfarm_protocol::AssetId;
+    use rayfarm_protocol::{AssetId, PixelFormat};
 
     use super::*;
     use crate::testing::test_scene::view;
@@ -83,7 +83,14 @@ mod tests {
     fn the_latest_second_rendering_counts() {
         let lease = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count: 1 };
         let (frame, scene) = (lease.frame, AssetId([0; 32]));
-        let announce = FrameAnnounce { frame, scene, width: 1, height: 1, view: Bytes::new() };
+        let announce = FrameAnnounce {
+            frame,
+            scene,
+            width: 1,
+            height: 1,
+            format: PixelFormat::Rgb8,
+            view: Bytes::new(),
+        };
         let mut open = OpenSegments::default();
         open.insert(OpenSegment { lease, view: view(), announce, first: rendering(1), second: None });
         assert_eq!(open.compare(&lease, Rendering { worker: WorkerId(2), ..rendering(1) }), Finding::Same);

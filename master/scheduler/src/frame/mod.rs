@@ -45,6 +45,8 @@ pub(super) struct Frame {
     pub(super) id: FrameId,
     pub(super) width: u32,
     pub(super) height: u32,
+    /// Largest number of rows of one lease.
+    pub(super) max_rows: u32,
     pub(super) forecast: Forecast,
     /// Time of its first lease.
     pub(super) started_at: Option<Duration>,
@@ -67,6 +69,7 @@ impl Frame {
             id,
             width,
             height,
+            max_rows: u32::MAX,
             forecast,
             started_at: None,
             queue: ranges.into_iter().collect(),
@@ -75,6 +78,11 @@ impl Frame {
             rows_done: 0,
             refusals: BTreeMap::new(),
         }
+    }
+
+    /// The frame with a limit of the rows of one lease.
+    pub(super) fn with_max_rows(self, max_rows: u32) -> Self {
+        Self { max_rows, ..self }
     }
 
     /// Number of rows that are not queued.

@@ -61,7 +61,8 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
     match words[..] {
         ["frame", frame, size] => {
             let (width, height) = pair(size, 'x');
-            Event::FrameRequested { frame: FrameId(number(frame)), width: width as u32, height, tile_rows: 8 }
+            let (frame, row_bytes) = (FrameId(number(frame)), 3 * width);
+            Event::FrameRequested { frame, width: width as u32, height, row_bytes, tile_rows: 8 }
         }
         ["drop-requests", next] => Event::RequestsDropped { next: FrameId(number(next)) },
         ["join", _, threads] => {

@@ -15,6 +15,7 @@ use crate::app::control::Place;
 pub(crate) use values::Size;
 use values::{frame_count, frame_index, ray_count, size, thread_count, worker_count};
 
+mod aov;
 mod farm;
 mod knobs;
 mod models;
@@ -26,6 +27,7 @@ mod simulate;
 mod tradeoff;
 mod values;
 
+pub(crate) use aov::Aov;
 pub(crate) use farm::FarmArgs;
 pub(crate) use knobs::QualityArgs;
 pub(crate) use models::ModelArgs;
@@ -154,9 +156,13 @@ pub(crate) struct ViewArgs {
 pub(crate) struct RenderArgs {
     /// A scene (.toml), or a model (.obj or compiled).
     pub(crate) scene: PathBuf,
-    /// Picture to write: .png or .ppm; frame-%04d.png numbers a sequence from 0000; none writes no file.
+    /// Picture to write: .png or .ppm, or .exr or .hdr for linear light without exposure and tone curve; frame-%04d.png
+    /// numbers a sequence from 0000; none writes no file.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
+    /// Auxiliary pictures of each frame, separated by commas, as layers of its .exr file.
+    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
+    pub(crate) aov: Vec<Aov>,
     #[command(flatten)]
     pub(crate) models: ModelArgs,
     #[command(flatten)]

@@ -173,7 +173,8 @@ impl World {
         let frame = FrameId(self.requested);
         self.open.insert(frame, Open { requested_at: self.clock.now, idle_before: None });
         let (width, height) = self.setup.size;
-        self.handle(Event::FrameRequested { frame, width, height, tile_rows: self.setup.tile_rows });
+        let (row_bytes, tile_rows) = (3 * u64::from(width), self.setup.tile_rows);
+        self.handle(Event::FrameRequested { frame, width, height, row_bytes, tile_rows });
     }
 
     /// Reports an event to the scheduler and performs the actions that follow.

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use rayfarm_farm::{Farm, FarmError, FinishedFrame, ViewRequest};
 use rayfarm_tracer::image::MAX_SIDE;
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{FrameView, Shading};
 use tokio_util::sync::CancellationToken;
 
 use super::camera_control::CameraControl;
@@ -77,14 +77,15 @@ impl Viewer {
         (viewer, handle)
     }
 
-    /// A viewer that renders the frames `numbers` of an animation, in order. Their display reads them from the sequence.
+    /// A viewer that renders the frames `numbers` of an animation, each followed by its auxiliary pictures, in order. Their display reads them from the sequence.
     pub(crate) fn sequence(
         farm: Farm,
         request: ViewRequest,
         animation: Animation,
         numbers: &[u64],
+        auxiliary: &[Shading],
     ) -> (Self, ViewerHandle, FrameSequence) {
-        let (plan, sender, sequence) = SequencePlan::new(numbers);
+        let (plan, sender, sequence) = SequencePlan::new(numbers, auxiliary);
         let (channels, handle) = Channels::new(farm.address(), farm.status());
         let viewer = Self {
             farm,

@@ -242,6 +242,7 @@ impl Requests {
             },
         };
         let request = animation.request(&request, number);
+        let request = self.plan.as_ref().map_or(request, |plan| plan.request(self.next, request));
         if !continuous && self.is_requested(&request, wanted, mode) {
             return false;
         }

@@ -185,7 +185,7 @@ fn the_farm_receives_the_request_with_its_scale_and_knobs() {
 #[test]
 fn a_sequence_requests_each_frame_of_its_plan_once_and_waits_for_slots() {
     let numbers: Vec<u64> = (0..20).map(|index| 2 * index + 1).collect();
-    let (plan, _sender, _sequence) = SequencePlan::new(&numbers);
+    let (plan, _sender, _sequence) = SequencePlan::new(&numbers, &[]);
     let request = ViewRequest { view: test_scene::view(), scale: RenderScale::Full };
     let state = ViewState { request, hidden: false };
     let requests = Requests::of_sequence(SPINNING, plan);

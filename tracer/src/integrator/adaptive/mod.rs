@@ -20,7 +20,7 @@ use std::ops::Range;
 use super::direct::TileContext;
 use super::stage::{Stage, Watch};
 use crate::cancel::Cancelled;
-use crate::film::{Dither, Means, PixelBytes, write_corner_means};
+use crate::film::{Development, Means, PixelIndex, write_corner_means};
 use crate::frame::PreparedFrame;
 use crate::rays::{RayCounts, TILE_SIZE};
 use crate::simd::vector::Vec3x16;
@@ -131,13 +131,13 @@ impl<'a, W: Watch> Band<'a, W> {
     /// Writes the means of corners to all pixels.
     #[inline(always)]
     fn write_corner_means<S: Simd>(&self, simd: S, out: &mut [u8]) {
-        let dither = Dither::of(self.frame, &self.rows);
+        let development = Development::of(self.frame, &self.rows);
         for y in self.rows.clone() {
             for x in (0..self.frame.width()).step_by(LANES) {
                 let Vec3x16(sums) = self.corners.sums(simd, x as usize, (y - self.top) as usize);
-                let pixel = PixelBytes::of(self.frame, &self.rows, x, y);
+                let pixel = PixelIndex::of(self.frame, &self.rows, x, y);
                 let columns = (self.frame.width() - x) as usize;
-                write_corner_means(simd, Vec3x16(sums), columns, pixel, dither, out);
+                write_corner_means(simd, Vec3x16(sums), columns, pixel, development.as_ref(), out);
             }
         }
     }
@@ -187,7 +187,7 @@ impl<'a, W: Watch> Band<'a, W> {
                 }
                 let around = self.corners.sum(column, row);
                 let sum = three!(channel => around[channel] + CENTER_WEIGHT * colors[block][channel].0[lane]);
-                means.push(simd, sum, PixelBytes::of(frame, &self.rows, x, y), out);
+                means.push(simd, sum, PixelIndex::of(frame, &self.rows, x, y), out);
             }
         }
         means.finish(simd, out);
@@ -208,7 +208,7 @@ impl<'a, W: Watch> Band<'a, W> {
             context.watch.enter(Stage::Encoding);
             let colors = &context.direct.colors;
             for (pixel, &[x, y]) in some.iter().enumerate() {
-                means.push(simd, pattern.sum(colors, pixel), PixelBytes::of(frame, rows, x, y), out);
+                means.push(simd, pattern.sum(colors, pixel), PixelIndex::of(frame, rows, x, y), out);
             }
         }
         means.finish(simd, out);

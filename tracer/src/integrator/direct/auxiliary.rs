@@ -2,19 +2,22 @@
 //! [`Shading`].
 //!
 //! ```text
-//!   normals   (n + 1) / 2 of the shading normal n on the viewer's side, along the axes of the world
-//!   depth     1 / (1 + d / s) of the distance d along the ray; s is the distance from the camera to its look_at
-//!   item      a bright colour for each item, by a hash of its index
-//!   albedo    the diffuse colour
+//!             colours                                            numbers
+//!   normals   (n + 1) / 2                                        n
+//!   depth     1 / (1 + d / s)                                    d in world units; infinite without a hit
+//!   item      a bright colour for each item, by a hash           1 + the index of the item
+//!   albedo    the diffuse colour                                 the same
 //! ```
 //!
-//! These are linear, and encoded as light is. Rays without a hit are black.
+//! n is the shading normal on the viewer's side, along the axes of the world; d the distance along the ray, s the distance from the
+//! camera to its look_at. Colours are linear, and encoded as light is. Frames in [`PixelFormat::Linear`] have the numbers. Rays
+//! without a hit are black, 0.
 
 use crate::frame::PreparedFrame;
 use crate::rays::{BLOCKS, HitBlock, SurfaceSource, TileColors};
-use crate::scene::Shading;
+use crate::scene::{PixelFormat, Shading};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Lanes, Simd, SimdBase, SimdFloat, dispatch, each_bit, select, splat, three};
+use crate::simd::{Lanes, Simd, SimdBase, SimdFloat, dispatch, each_bit, f32x16, select, splat, three};
 use crate::surface::{Materials, SurfaceBlock, Surfaces};
 
 /// Colours the rays of a tile by what they hit. Dispatched again, and not inlined: few pictures use it.
@@ -39,14 +42,25 @@ fn shade_with<S: Simd, R: SurfaceSource>(
 ) {
     let frame = rays.frame();
     let shading = frame.view().quality.shading;
+    let numbers = frame.pixel_format() == PixelFormat::Linear;
+    let without_hit = if numbers && shading == Shading::Depth { f32::INFINITY } else { 0.0 };
     for block in 0..BLOCKS {
         let surface = &surfaces.blocks[block];
         let mut shown = [Lanes::ZERO; 3];
         if surface.hit != 0 {
             match shading {
                 Shading::Full | Shading::Diffuse => {}
-                Shading::Normals => normals(simd, frame, surface).store(&mut shown),
-                Shading::Depth => depth(simd, rays, surface, block).store(&mut shown),
+                Shading::Normals => {
+                    let normals = normals(simd, frame, surface);
+                    if numbers { normals } else { as_colors(simd, normals) }.store(&mut shown);
+                }
+                Shading::Depth => {
+                    let relative = relative_distance(simd, rays, surface, block);
+                    let depth =
+                        if numbers { distance(simd, frame, relative) } else { nearness(simd, relative) };
+                    Vec3x16([depth; 3]).store(&mut shown);
+                }
+                Shading::Item if numbers => shown = item_numbers(&hits[block], surface.hit),
                 Shading::Item => shown = items(&hits[block], surface.hit),
                 Shading::Albedo => {
                     Materials::gather(simd, frame.scene(), surfaces, block).diffuse.store(&mut shown);
@@ -55,35 +69,59 @@ fn shade_with<S: Simd, R: SurfaceSource>(
         }
         for channel in &mut shown {
             for lane in each_bit(0xffff & !surface.hit) {
-                channel.0[lane] = 0.0;
+                channel.0[lane] = without_hit;
             }
         }
         colors[block] = shown;
     }
 }
 
-/// (n + 1) / 2 of the normals of a block. Eye space has the axes of the world.
+/// The normals of a block. Eye space has the axes of the world.
 #[inline(always)]
 fn normals<S: Simd>(simd: S, frame: &PreparedFrame, surface: &SurfaceBlock) -> Vec3x16<S> {
     let features = &frame.features;
     let is_tilted = features.smooth || features.normal_mapped;
-    let normals = Vec3x16::load(simd, if is_tilted { &surface.ns } else { &surface.ng });
+    Vec3x16::load(simd, if is_tilted { &surface.ns } else { &surface.ng })
+}
+
+/// (n + 1) / 2 of normals.
+#[inline(always)]
+fn as_colors<S: Simd>(simd: S, normals: Vec3x16<S>) -> Vec3x16<S> {
     let (one, half) = (splat(simd, 1.0), splat(simd, 0.5));
     Vec3x16(three!(axis => (normals.0[axis] + one) * half))
 }
 
-/// 1 / (1 + d / s) of the distances d of the points of a block from the origins of their rays; 0 for points that are infinitely
-/// far away in single precision.
+/// d / s of the distances d of the points of a block from the origins of their rays. It may be infinite or NaN for points that are
+/// infinitely far away in single precision.
 #[inline(always)]
-fn depth<S: Simd, R: SurfaceSource>(simd: S, rays: &R, surface: &SurfaceBlock, block: usize) -> Vec3x16<S> {
+fn relative_distance<S: Simd, R: SurfaceSource>(
+    simd: S,
+    rays: &R,
+    surface: &SurfaceBlock,
+    block: usize,
+) -> f32x16<S> {
     let points = Vec3x16::load(simd, &surface.point);
     let along = if R::COMMON_ORIGIN { points } else { points.sub(rays.origins(simd, block)) };
+    let relative = along.scale(splat(simd, 1.0) / splat(simd, scale(rays.frame())));
+    relative.dot(relative).sqrt()
+}
+
+/// 1 / (1 + d / s); 0 for points that are infinitely far away.
+#[inline(always)]
+fn nearness<S: Simd>(simd: S, relative: f32x16<S>) -> f32x16<S> {
     let (zero, one) = (splat(simd, 0.0), splat(simd, 1.0));
-    let relative = along.scale(one / splat(simd, scale(rays.frame())));
-    let nearness = one / (one + relative.dot(relative).sqrt());
+    let nearness = one / (one + relative);
     // Comparisons with NaN are false.
-    let grey = select(nearness.simd_ge(zero), nearness, zero);
-    Vec3x16([grey; 3])
+    select(nearness.simd_ge(zero), nearness, zero)
+}
+
+/// d in world units; infinite for points that are infinitely far away.
+#[inline(always)]
+fn distance<S: Simd>(simd: S, frame: &PreparedFrame, relative: f32x16<S>) -> f32x16<S> {
+    let world = f64::from(scale(frame)) / frame.per_unit;
+    let distance = relative * splat(simd, (world as f32).clamp(f32::MIN_POSITIVE, f32::MAX));
+    // Comparisons with NaN are false.
+    select(distance.simd_ge(splat(simd, 0.0)), distance, splat(simd, f32::INFINITY))
 }
 
 /// Distance from the camera to the point that it looks at, in eye units.
@@ -91,6 +129,15 @@ fn scale(frame: &PreparedFrame) -> f32 {
     let camera = &frame.view().camera;
     let distance = (camera.look_at - camera.position).length() * frame.per_unit;
     (distance as f32).clamp(f32::MIN_POSITIVE, f32::MAX)
+}
+
+/// 1 + the indices of the items of some lanes, exact up to 2^24.
+fn item_numbers(hits: &HitBlock, lanes: u32) -> [Lanes; 3] {
+    let mut numbers = Lanes::ZERO;
+    for lane in each_bit(lanes) {
+        numbers.0[lane] = hits.item.0[lane] as f32 + 1.0;
+    }
+    [numbers; 3]
 }
 
 /// Colours of the items of some lanes.
@@ -242,6 +289,37 @@ mod tests {
             assert!(off <= Some(1), "{shading:?}, pixel {pixel}: {found:?}, expected {expected:?}");
         }
         assert_eq!(seen_kinds.len(), 3, "ball, mirror and background are visible");
+    }
+
+    /// Asserts the numbers of a kind at each pixel of a linear picture.
+    fn expect_numbers(shading: Shading, number: impl Fn(usize, f64, DVec3) -> DVec3, without_hit: f32) {
+        let scene = scene(1.0);
+        let quality = Quality { shading, ..Quality::default() };
+        let view = FrameView { quality, format: PixelFormat::Linear, ..FrameView::of(&scene) };
+        let compiled = Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap());
+        let frame = PreparedFrame::new(compiled, &view).unwrap();
+        let mut bytes = vec![0; frame.row_bytes() * SIDE as usize];
+        render_rows(&frame, 0..SIDE, &mut bytes, &|| false).unwrap();
+        let numbers = bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        for (index, found) in numbers.enumerate() {
+            let (pixel, channel) = (index / 3, index % 3);
+            match seen(&scene, pixel) {
+                None => assert_eq!(found, without_hit, "{shading:?}, pixel {pixel}"),
+                Some((index, t, n)) => {
+                    let expected = number(index, t, n)[channel];
+                    let off = (f64::from(found) - expected).abs();
+                    assert!(off < 1e-4 * t, "{shading:?}, pixel {pixel}: {found}, expected {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn linear_pictures_have_numbers() {
+        expect_numbers(Shading::Normals, |_, _, normal| normal, 0.0);
+        expect_numbers(Shading::Depth, |_, distance, _| DVec3::splat(distance), f32::INFINITY);
+        expect_numbers(Shading::Albedo, |index, _, _| COLORS[index].as_dvec3(), 0.0);
+        expect_numbers(Shading::Item, |index, _, _| DVec3::splat(index as f64 + 1.0), 0.0);
     }
 
     #[test]

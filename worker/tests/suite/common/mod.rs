@@ -106,6 +106,7 @@ impl Stage {
             scene: AssetId::of(&self.body),
             width: self.view.width,
             height: self.view.height,
+            format: PixelFormat::Rgb8,
             view: codec::encode(&self.view(spin)).unwrap().into(),
         })
     }
@@ -113,7 +114,7 @@ impl Stage {
     /// Renders these rows in this process.
     pub(crate) fn expected(&self, spin: f64, rows: Range<u32>) -> Vec<u8> {
         let frame = PreparedFrame::new(Arc::clone(&self.compiled), &self.view(spin)).unwrap();
-        let mut out = vec![0; rows.len() * PixelFormat::SEGMENT.row_bytes(self.view.width)];
+        let mut out = vec![0; rows.len() * PixelFormat::Rgb8.row_bytes(self.view.width)];
         render_rows(&frame, rows, &mut out, &|| false).unwrap();
         out
     }

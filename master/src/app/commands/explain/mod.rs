@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 
 use bytes::Bytes;
-use rayfarm_farm::{Assets, ViewRequest};
+use rayfarm_farm::{Assets, ViewRequest, wire_format};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
 use rayfarm_tracer::scene::knobs::KNOBS;
@@ -250,6 +250,7 @@ fn travel(source: &Source, view: &FrameView) -> Result<Travel, CommandError> {
         scene: assets.scene(),
         width: view.width,
         height: view.height,
+        format: wire_format(view.format),
         view: Bytes::from(bytes),
     });
     let envelope = announcement.to_envelope().map_err(CommandError::failed)?;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use rayfarm_tracer::scene::FrameView;
+use rayfarm_tracer::scene::{FrameView, PixelFormat, RenderScale};
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
@@ -17,6 +17,7 @@ use super::quality::within_error;
 use super::source::{Source, animation};
 use crate::app::cli::RenderArgs;
 use crate::app::output::{FrameWriter, OutputPattern, check_writable};
+use crate::app::picture::BEAUTY;
 use crate::app::plan::{Existing, Plan};
 use crate::app::progress::Progress;
 use crate::app::reports::{RenderReport, print_json};
@@ -45,6 +46,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     pattern.path(args.first_frame.into()).as_deref().map(check_writable).transpose()?;
     let source = Source::load(&args.scene, args.models, args.picture.size)?;
     let request = within_error(&args.error, &source, source.request(&args.picture)?)?;
+    let request = in_format_of(&args, &pattern, request)?;
     let plan = plan(&args, &pattern, &request)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
@@ -53,7 +55,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let run = Run {
         animation: animation(&args.picture, args.frames),
         wait_for_workers: args.wait_for_workers,
-        files: FrameFiles::new(request, plan, FrameWriter::new(pattern), totals),
+        files: FrameFiles::new(request, args.aov, plan, FrameWriter::new(pattern), totals),
         observability,
     };
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
@@ -74,15 +76,45 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     }
 }
 
+/// The request in the pixel format of the files.
+///
+/// # Errors
+/// Auxiliary pictures for files without layers, or named twice; a scale below 1 for linear light, which is not resized.
+fn in_format_of(
+    args: &RenderArgs,
+    pattern: &OutputPattern,
+    request: ViewRequest,
+) -> Result<ViewRequest, CommandError> {
+    let refuse = |problem: &str| Err(CommandError::WrongInput(problem.to_owned()));
+    if !args.aov.is_empty() && !pattern.has_layers() {
+        return refuse("--aov writes layers, which only .exr files have: end the name of the output in .exr");
+    }
+    if let Some(aov) = args.aov.iter().enumerate().find(|(at, aov)| args.aov[..*at].contains(aov)) {
+        return refuse(&format!("--aov names {} twice", aov.1.name()));
+    }
+    if !pattern.is_linear() {
+        return Ok(request);
+    }
+    if request.scale != RenderScale::Full {
+        return refuse("pictures of linear light are not resized: render .exr and .hdr files with --scale 1");
+    }
+    Ok(ViewRequest { view: FrameView { format: PixelFormat::Linear, ..request.view }, ..request })
+}
+
 /// The frames to render.
 fn plan(args: &RenderArgs, pattern: &OutputPattern, request: &ViewRequest) -> Result<Plan, CommandError> {
     let FrameView { width, height, .. } = request.view;
     let existing = match (args.resume, args.skip_existing) {
-        (true, _) => Existing::Resume { width, height },
+        (true, _) => Existing::Resume { width, height, layers: layers(args) },
         (_, true) => Existing::Skip,
         _ => Existing::Replace,
     };
     Plan::new(args.first_frame.into(), args.frames.into(), existing, pattern)
+}
+
+/// Names of the layers of each file that has layers.
+fn layers(args: &RenderArgs) -> Vec<&'static str> {
+    std::iter::once(BEAUTY).chain(args.aov.iter().map(|aov| aov.name())).collect()
 }
 
 /// One run of `render`.
@@ -122,7 +154,7 @@ impl Run {
             farm.shut_down().await;
             return Err(error);
         }
-        farm.expect_frames(self.files.count());
+        farm.expect_frames(self.files.pictures());
         Ok(farm)
     }
 
@@ -165,7 +197,7 @@ impl Run {
     ) -> Result<(Farm, Result<(), CommandError>), CommandError> {
         let files = &mut self.files;
         let (viewer, handle, sequence) =
-            Viewer::sequence(farm, files.request, self.animation, &files.plan.frames);
+            Viewer::sequence(farm, files.request, self.animation, &files.plan.frames, &files.auxiliary());
         files.totals.begin();
         let stop = interrupted.clone();
         let rendering = runtime.spawn(async move { viewer.run(&stop).await });

@@ -20,20 +20,26 @@ const POLL_EVERY: Duration = Duration::from_millis(50);
 /// Frames of a run by the numbers of their files, and as the farm numbers them.
 #[derive(Debug, Default)]
 pub(super) struct Delivered {
-    frames: BTreeMap<u64, FrameId>,
+    frames: BTreeMap<u64, Vec<FrameId>>,
     again: BTreeSet<u64>,
 }
 
 impl Delivered {
-    /// Records the rendering that goes to a file; a later one replaces it.
+    /// Records the rendering that goes to a file; a later one replaces it and its auxiliary pictures.
     pub(super) fn add(&mut self, number: u64, frame: FrameId) {
-        self.frames.insert(number, frame);
+        self.frames.insert(number, vec![frame]);
+    }
+
+    /// Records an auxiliary picture that goes to a file with the rendering.
+    pub(super) fn add_auxiliary(&mut self, number: u64, frame: FrameId) {
+        self.frames.entry(number).or_default().push(frame);
     }
 
     /// Files whose frames may be wrong.
     fn wrong(&self, farm: &Farm) -> Vec<u64> {
         let wrong = farm.wrong_frames();
-        self.frames.iter().filter(|(_, frame)| wrong.contains(**frame)).map(|(&number, _)| number).collect()
+        let is_wrong = |frames: &[FrameId]| frames.iter().any(|frame| wrong.contains(*frame));
+        self.frames.iter().filter(|(_, frames)| is_wrong(frames)).map(|(&number, _)| number).collect()
     }
 }
 
@@ -63,13 +69,18 @@ impl Run {
     }
 
     async fn render_again(&mut self, farm: &mut Farm, wrong: Vec<u64>) -> Result<(), String> {
-        let mut waiting = VecDeque::from(wrong);
+        let requests = wrong.into_iter().flat_map(|number| {
+            let frame = self.animation.request(&self.files.request, number);
+            let auxiliary = self.files.aov.iter().map(move |aov| frame.auxiliary(aov.shading()));
+            std::iter::once(frame).chain(auxiliary).map(move |request| (number, request))
+        });
+        let mut waiting: VecDeque<_> = requests.collect();
         let mut open = VecDeque::new();
         while !(waiting.is_empty() && open.is_empty()) {
             while open.len() < OPEN_REQUESTS
-                && let Some(number) = waiting.pop_front()
+                && let Some((number, request)) = waiting.pop_front()
             {
-                farm.request(self.animation.request(&self.files.request, number));
+                farm.request(request);
                 open.push_back(number);
             }
             let frame = next(farm).await.map_err(|error| error.to_string())?;
@@ -81,10 +92,12 @@ impl Run {
 
     async fn replace(&mut self, number: u64, frame: FinishedFrame) -> Result<(), String> {
         let files = &mut self.files;
-        files.writer.ready().await.map_err(|error| error.to_string())?;
         files.delivered.again.insert(number);
-        files.hand_over(number, frame, None).map_err(|error| error.to_string())?;
-        files.write_next();
+        files.collect(number, frame, None).map_err(|error| error.to_string())?;
+        if files.has_complete() {
+            files.writer.ready().await.map_err(|error| error.to_string())?;
+            files.write_next();
+        }
         Ok(())
     }
 

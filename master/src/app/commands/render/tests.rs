@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rayfarm_farm::testing::fake_worker::{self, Script};
+use rayfarm_tracer::image::{self, LinearImage, SkyPixels};
+use rayfarm_tracer::srgb;
 use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 use tokio::task::JoinHandle;
 
@@ -56,12 +58,16 @@ impl Renders {
 
     /// Renders frames to `NAME-0.ppm` and so on, one segment each, all verified.
     fn start(&self, name: &str, frames: u32) -> JoinHandle<Result<(), CommandError>> {
+        self.start_as(&format!("{name}-%d.ppm"), &format!("--frames {frames} --segment static:64 --verify 100"))
+    }
+
+    /// Renders to files of this name with these options.
+    fn start_as(&self, output: &str, options: &str) -> JoinHandle<Result<(), CommandError>> {
         let path = |file: &str| self.folder.path().join(file).display().to_string();
         let words = format!(
-            "rayfarm-master render {} -o {} --frames {frames} --segment static:64 --verify 100 --wait-for-workers 1 \
-             --no-local-workers --listen {}",
+            "rayfarm-master render {} -o {} {options} --wait-for-workers 1 --no-local-workers --listen {}",
             path("scene.toml"),
-            path(&format!("{name}-%d.ppm")),
+            path(output),
             self.address
         );
         let parsed = Invocation::parse(words.split(' ').map(Into::into)).unwrap();
@@ -90,6 +96,70 @@ impl Renders {
             share: Share::Off,
         };
         tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) })
+    }
+}
+
+/// The pixels of a picture of linear light.
+fn linear(path: &Path) -> LinearImage {
+    match image::load_sky(path).unwrap().pixels {
+        SkyPixels::Linear(picture) => picture,
+        SkyPixels::Srgb(_) => panic!("{} is not linear", path.display()),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn linear_files_show_the_same_light_and_have_the_requested_layers() {
+    let renders = Renders::new();
+    let outputs = [
+        ("shown-%d.ppm", ""),
+        ("one-%d.hdr", ""),
+        ("layers-%d.exr", "--aov albedo,normal,depth,item"),
+        // A file has its layers already, the other one is missing.
+        ("layers-%d.exr", "--aov albedo,normal,depth,item --resume"),
+    ];
+    for (output, options) in outputs {
+        if options.contains("--resume") {
+            std::fs::remove_file(renders.folder.path().join("layers-1.exr")).unwrap();
+        }
+        let run = renders.start_as(output, &format!("--frames 2 --orbit 90 {options}"));
+        renders.ready().await;
+        renders.real_worker();
+        in_time(run).await.unwrap().unwrap();
+    }
+    for index in 0..2 {
+        let path = |name: &str| renders.folder.path().join(name.replace("%d", &index.to_string()));
+        let names = image::layer_names(&path("layers-%d.exr"), 32, 64).unwrap();
+        assert_eq!(names, ["beauty", "albedo", "normal", "depth", "item"]);
+        let shown = image::load(&path("shown-%d.ppm")).unwrap();
+        for (name, tolerance) in [("layers-%d.exr", 1), ("one-%d.hdr", 3)] {
+            let light = linear(&path(name));
+            assert!(light.pixels.iter().any(|value| *value > 0.1), "{name} is not black");
+            let encoded = light.pixels.as_chunks::<3>().0.iter().map(|light| srgb::encode((*light).into()));
+            let off = encoded.flatten().zip(&shown.pixels).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(off <= Some(tolerance), "{name}: off by {off:?}");
+        }
+    }
+}
+
+#[test]
+fn files_that_cannot_have_what_is_requested_are_refused_before_anything_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.toml");
+    std::fs::write(&scene, SCENE).unwrap();
+    for (output, options, hint) in [
+        ("a.png", "--aov depth", ".exr"),
+        ("a.hdr", "--aov depth", ".exr"),
+        ("a.exr", "--aov depth,item,depth", "depth twice"),
+        ("a.exr", "--scale 1/2", "--scale 1"),
+    ] {
+        let output = folder.path().join(output);
+        let words = format!("rayfarm-master render {} -o {} {options}", scene.display(), output.display());
+        let Invocation::Command(command, _) = Invocation::parse(words.split(' ').map(Into::into)).unwrap() else {
+            panic!("no command")
+        };
+        let error = crate::app::commands::run(*command).unwrap_err().to_string();
+        assert!(error.contains(hint), "{options}: {error}");
+        assert!(!output.exists());
     }
 }
 

@@ -1,0 +1,48 @@
+//! Pictures of a run as they are written.
+
+use std::path::Path;
+
+use rayfarm_tracer::image::{self, Channels, ImageError, Layer, LinearImage, RgbImage};
+
+use super::cli::Aov;
+
+/// Name of the layer of the frame itself.
+pub(crate) const BEAUTY: &str = "beauty";
+
+/// A picture for a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Picture {
+    /// Colours of a display, for PNG and PPM.
+    Srgb(RgbImage),
+    /// Layers of linear light, for OpenEXR and Radiance HDR.
+    Linear(Vec<Layer>),
+}
+
+impl Picture {
+    /// Layers of a frame in linear light and its auxiliary pictures.
+    pub(crate) fn of_layers(
+        beauty: LinearImage,
+        auxiliary: impl IntoIterator<Item = (Aov, LinearImage)>,
+    ) -> Self {
+        let beauty = Layer { name: BEAUTY, channels: Channels::Color, picture: beauty };
+        let layer = |(aov, picture): (Aov, _)| Layer { name: aov.name(), channels: aov.channels(), picture };
+        Self::Linear(std::iter::once(beauty).chain(auxiliary.into_iter().map(layer)).collect())
+    }
+
+    /// Writes the picture in the format of the file's extension.
+    ///
+    /// # Errors
+    /// As [`image::save`] and [`image::save_layers`].
+    pub(crate) fn save(&self, path: &Path) -> Result<(), ImageError> {
+        match self {
+            Self::Srgb(picture) => image::save(path, picture),
+            Self::Linear(layers) => image::save_layers(path, layers),
+        }
+    }
+}
+
+impl From<RgbImage> for Picture {
+    fn from(picture: RgbImage) -> Self {
+        Self::Srgb(picture)
+    }
+}
