@@ -318,7 +318,7 @@ mod tests {
             match chosen {
                 Encoding::Lz4 => unpack(&bytes, &mut rows).unwrap(),
                 Encoding::Raw => rows.copy_from_slice(&bytes),
-                Encoding::Rgb565 | Encoding::Rgb565Lz4 => panic!("these bands are not RGB 5-6-5"),
+                Encoding::Rgb565 | Encoding::Rgb565Lz4 | Encoding::PlanesLz4 => panic!("{chosen:?} of RGB8"),
             }
             assert_eq!(rows, expected);
         }

@@ -196,6 +196,7 @@ impl Link {
                     let expected = stage.expected(spin, header.lease.rows().unwrap());
                     match header.encoding {
                         Encoding::Raw => assert_eq!(bytes, expected),
+                        Encoding::PlanesLz4 => panic!("planes of RGB8"),
                         Encoding::Rgb565 | Encoding::Rgb565Lz4 => panic!("fewer colours were not requested"),
                         Encoding::Lz4 => {
                             let mut rows = vec![0; expected.len()];

@@ -58,7 +58,10 @@ impl Renders {
 
     /// Renders frames to `NAME-0.ppm` and so on, one segment each, all verified.
     fn start(&self, name: &str, frames: u32) -> JoinHandle<Result<(), CommandError>> {
-        self.start_as(&format!("{name}-%d.ppm"), &format!("--frames {frames} --segment static:64 --verify 100"))
+        self.start_as(
+            &format!("{name}-%d.ppm"),
+            &format!("--frames {frames} --segment static:64 --verify 100"),
+        )
     }
 
     /// Renders to files of this name with these options.
@@ -154,7 +157,8 @@ fn files_that_cannot_have_what_is_requested_are_refused_before_anything_is_rende
     ] {
         let output = folder.path().join(output);
         let words = format!("rayfarm-master render {} -o {} {options}", scene.display(), output.display());
-        let Invocation::Command(command, _) = Invocation::parse(words.split(' ').map(Into::into)).unwrap() else {
+        let Invocation::Command(command, _) = Invocation::parse(words.split(' ').map(Into::into)).unwrap()
+        else {
             panic!("no command")
         };
         let error = crate::app::commands::run(*command).unwrap_err().to_string();
