@@ -110,7 +110,7 @@ impl SequencePlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scene;
+    use rayfarm_farm::testing::test_scene;
 
     #[test]
     fn frames_are_numbered_by_the_plan() {
