@@ -72,12 +72,17 @@ mod tests {
     #[test]
     fn the_estimate_is_the_standard_deviation_of_the_means() {
         // A uniform distribution from -a to a has the variance a^2 / 3.
-        for (samples, level, spread) in [(2, 0.5, 0.3), (3, 0.5, 0.3), (16, 2.0, 1.5), (17, 0.25, 0.25), (64, 8.0, 0.5)] {
+        for (samples, level, spread) in
+            [(2, 0.5, 0.3), (3, 0.5, 0.3), (16, 2.0, 1.5), (17, 0.25, 0.25), (64, 8.0, 0.5)]
+        {
             let expected = f64::from(spread) / (3.0 * f64::from(samples)).sqrt() / f64::from(level);
             let estimate = relative_error(&noisy(20_000, samples, level, spread), samples).unwrap();
             // 20,000 squares of about Gaussian numbers: their root mean square is within 0.5 %, six of which are allowed, and the mean
             // brightness is closer.
-            assert!((estimate / expected - 1.0).abs() < 0.03, "{samples} samples: {estimate}, expected {expected}");
+            assert!(
+                (estimate / expected - 1.0).abs() < 0.03,
+                "{samples} samples: {estimate}, expected {expected}"
+            );
         }
     }
 

@@ -39,6 +39,11 @@ pub(crate) fn pass(view: &FrameView, samples: Range<u32>) -> FrameView {
     }
 }
 
+/// The view whose picture is that of a film after a number of samples.
+pub(crate) fn whole(view: &FrameView, samples: u32) -> FrameView {
+    FrameView { first_sample: 0, samples, integrator: without_target(view.integrator), ..*view }
+}
+
 /// The view of a moving camera: one sample in the bytes of a display.
 pub(crate) fn moving(view: &FrameView) -> FrameView {
     FrameView {
@@ -79,7 +84,8 @@ mod tests {
 
     #[test]
     fn a_view_that_moves_and_a_pass_have_no_error_at_which_they_end() {
-        let integrator = Integrator::Path(PathSettings { max_noise: 0.02, seed: 7, ..PathSettings::default() });
+        let integrator =
+            Integrator::Path(PathSettings { max_noise: 0.02, seed: 7, ..PathSettings::default() });
         let view = FrameView { integrator, samples: 64, ..test_scene::view() };
         assert!(error_target(&view).is_some_and(|error| (error - 0.02).abs() < 1e-6));
         for one in [pass(&view, 4..8), moving(&view)] {

@@ -33,9 +33,11 @@ impl FilmTarget {
 
     /// Samples that the target needs, from those so far and their estimated error, which falls with the square root of the samples.
     fn needed(&self, samples: u32, error: Option<f64>) -> u32 {
-        let by_error = self.error.zip(error).map(|(target, error)| f64::from(samples) * (error / target).powi(2));
+        let by_error =
+            self.error.zip(error).map(|(target, error)| f64::from(samples) * (error / target).powi(2));
         // Conversion saturates.
-        by_error.map_or(self.samples, |needed| (needed.ceil() as u32).clamp(samples, self.samples.max(samples)))
+        by_error
+            .map_or(self.samples, |needed| (needed.ceil() as u32).clamp(samples, self.samples.max(samples)))
     }
 }
 

@@ -16,8 +16,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::camera_control::CameraControl;
 use super::error::ViewerError;
-use super::film::still::{Pass, StillFilm, alone};
 use super::film::FilmProgress;
+use super::film::still::{Pass, StillFilm, alone};
 use super::frame_log::FrameLogFile;
 use super::handle::{Channels, PresentedFrame, ViewerHandle};
 use super::input_action::InputAction;
@@ -156,7 +156,10 @@ impl Viewer {
     }
 
     /// Delivers a finished frame and requests the next one. Breaks after the last frame.
-    async fn finish(&mut self, frame: Result<FinishedFrame, FarmError>) -> Result<ControlFlow<()>, ViewerError> {
+    async fn finish(
+        &mut self,
+        frame: Result<FinishedFrame, FarmError>,
+    ) -> Result<ControlFlow<()>, ViewerError> {
         let frame = match frame {
             Ok(frame) => frame,
             // A worker may connect later; until then the displays show the reason.

@@ -186,7 +186,13 @@ impl Requests {
         }
         let Some(Open { mut answered, requested_at, mode, .. }) = answer else {
             self.moved_at = self.moved_at.filter(|&moved_at| moved_at > now);
-            return Answered { input_at: now, number: self.next, slot: None, quality: Vec::new(), pass: None };
+            return Answered {
+                input_at: now,
+                number: self.next,
+                slot: None,
+                quality: Vec::new(),
+                pass: None,
+            };
         };
         self.moved_at = self.moved_at.filter(|&moved_at| moved_at > answered.input_at);
         let (now, requested_at) = (self.since_start(now), self.since_start(requested_at));
@@ -329,10 +335,9 @@ impl Requests {
         if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
             self.drop_all(farm);
         }
-        self.passes = passes.zip(pass).map(|(passes, pass)| Passes {
-            next: pass.first.saturating_add(pass.samples),
-            ..passes
-        });
+        self.passes = passes
+            .zip(pass)
+            .map(|(passes, pass)| Passes { next: pass.first.saturating_add(pass.samples), ..passes });
         self.films = self.passes.map_or(self.films, |passes| passes.film);
         // A request that replaces another one is as old as the camera that it shows.
         let input_at = self.moved_at.unwrap_or(now);
