@@ -120,4 +120,4 @@ pub(crate) fn pixel_count(view: &FrameView) -> usize {
 }
 
 #[cfg(test)]
-mod tests;
+pub(in crate::viewer) mod tests;

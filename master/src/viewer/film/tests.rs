@@ -15,7 +15,7 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
 use super::*;
 
 /// A sphere in a white sky, which bounces light between itself and the sky.
-fn scene() -> Scene {
+pub(in crate::viewer) fn scene() -> Scene {
     let sphere = Sphere {
         center: DVec3::new(0.1, 0.0, -2.0),
         radius: 0.6,
@@ -26,13 +26,13 @@ fn scene() -> Scene {
     Scene { spheres: vec![sphere], ..test_scene::scene() }
 }
 
-fn view(samples: u32) -> FrameView {
+pub(in crate::viewer) fn view(samples: u32) -> FrameView {
     let integrator = Integrator::Path(PathSettings { seed: 3, ..PathSettings::default() });
     FrameView { integrator, samples, ..FrameView::of(&scene()) }
 }
 
-/// Pixels of a view, in its format.
-fn rendered(view: &FrameView) -> Vec<u8> {
+/// Pixels of a view of [`scene`], in its format.
+pub(in crate::viewer) fn rendered(view: &FrameView) -> Vec<u8> {
     let scene = CompiledScene::new(scene(), Vec::new(), Vec::new()).unwrap();
     let frame = PreparedFrame::new(Arc::new(scene), view).unwrap();
     let mut pixels = vec![0; view.format.bytes_of(view.width, view.height)];

@@ -301,4 +301,6 @@ async fn until(at: Option<Instant>) {
 }
 
 #[cfg(test)]
+mod film_tests;
+#[cfg(test)]
 mod tests;

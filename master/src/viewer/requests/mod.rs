@@ -352,8 +352,10 @@ impl Requests {
     fn passes_of(&self, whole: &ViewRequest) -> Passes {
         let first = Passes { whole: *whole, film: self.films + 1, next: 0, is_complete: false };
         match self.passes.filter(|passes| passes.whole == *whole) {
-            // A measurement renders the picture again and again.
-            Some(passes) if self.policy.continuous && passes.pass().is_none() => first,
+            // A measurement renders the picture again and again, each time to its end.
+            Some(passes) if self.policy.continuous && passes.pass().is_none() && self.open.is_empty() => {
+                first
+            }
             Some(passes) => passes,
             None => first,
         }

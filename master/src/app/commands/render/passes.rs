@@ -122,7 +122,7 @@ impl Picture {
             passes: 0,
             deadline: time.and_then(|time| now.checked_add(time)),
             saved_at: now,
-            saved: samples,
+            saved: 0,
         }
     }
 
@@ -161,7 +161,7 @@ impl Picture {
     fn restart(&mut self, farm: &Farm) {
         tracing::warn!("the picture starts again, because a worker sent wrong pixels");
         (self.film, self.error, self.continued) = (Film::new(&self.view), None, 0);
-        self.pace = Pace::default();
+        (self.pace, self.saved) = (Pace::default(), 0);
         self.drop_requests(farm);
     }
 
