@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::PixelFormat;
 use rayfarm_tracer::scene::{FrameView, Integrator, PathSettings};
 
-/// Samples of the longest passes. A long pass costs least beside its samples, and a short one shows its picture sooner.
+/// Samples of the longest passes. A long pass costs less per sample, and a short one shows its picture sooner.
 const LONGEST: u32 = 16;
 
 /// The pass that begins at a sample, of a picture of `samples` samples; `None` at its end. Passes end at 1, 2, 4, 8, 16, 32, 48 and so on
@@ -44,8 +45,17 @@ pub(crate) fn whole(view: &FrameView, samples: u32) -> FrameView {
     FrameView { first_sample: 0, samples, integrator: without_target(view.integrator), ..*view }
 }
 
+/// The request for a picture while its camera moves. Of paths it has one sample whatever the picture at rest has, so that the samples are
+/// no rung of a quality controller.
+pub(crate) fn while_moving(request: &ViewRequest) -> ViewRequest {
+    match has_passes(&request.view) {
+        true => ViewRequest { view: moving(&request.view), ..*request },
+        false => *request,
+    }
+}
+
 /// The view of a moving camera: one sample in the bytes of a display.
-pub(crate) fn moving(view: &FrameView) -> FrameView {
+fn moving(view: &FrameView) -> FrameView {
     FrameView {
         first_sample: 0,
         samples: 1,

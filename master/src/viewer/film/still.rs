@@ -44,7 +44,7 @@ impl StillFilm {
     }
 
     /// Adds a pass of a film to it; the first pass of another film replaces the film. Returns the frame with the picture that the film
-    /// shows, and its progress. Runs on a blocking thread, because a large picture takes some time.
+    /// shows, and its progress. Runs on a blocking thread, because a large picture takes tens of milliseconds.
     ///
     /// # Errors
     /// A frame that is not the next pass of its film, which is dropped then.

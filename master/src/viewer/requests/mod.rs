@@ -316,7 +316,7 @@ impl Requests {
         let is_moving = animation.is_moving() || is_moving(mode);
         let (request, passes) = match self.plan.is_none() && passes::has_passes(&request.view) {
             false => (request, None),
-            true if is_moving => (ViewRequest { view: passes::moving(&request.view), ..request }, None),
+            true if is_moving => (passes::while_moving(&request), None),
             true => (request, Some(self.passes_of(&request))),
         };
         let pass = match passes.map(|passes| passes.pass()) {
