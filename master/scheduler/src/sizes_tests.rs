@@ -83,7 +83,7 @@ fn the_first_leases_have_one_band_per_thread_at_most() {
         let join = Event::WorkerJoined { worker: WorkerId(1), threads, host: HostId(1) };
         scheduler.handle(Duration::ZERO, join);
         let request =
-            Event::FrameRequested { frame: FrameId(1), width: 1920, height, tile_rows, row_bytes: 5760 };
+            Event::FrameRequested { frame: FrameId(1), width: 1920, height, tile_rows, row_bytes: 1920 * 3 };
         scheduler.handle(Duration::ZERO, request);
         let rows: Vec<u32> = std::iter::from_fn(|| scheduler.poll_action())
             .filter_map(|action| match action {

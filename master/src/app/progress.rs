@@ -10,6 +10,7 @@ use rayfarm_farm::Reachable;
 use rayfarm_farm::accounting::duration_text;
 
 use crate::log_bar::{show_below_log, show_nothing_below_log};
+use crate::viewer::film::FilmProgress;
 
 /// Interval of the lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -24,6 +25,8 @@ pub(crate) struct Progress {
     done: u64,
     fps: f64,
     left: Option<Duration>,
+    /// Progress of the picture, if it is rendered in passes.
+    film: Option<FilmProgress>,
     address: SocketAddr,
     local_workers: u32,
     alone_since: Option<Instant>,
@@ -40,7 +43,7 @@ impl Progress {
             true => ProgressDrawTarget::stderr(),
             false => ProgressDrawTarget::hidden(),
         };
-        let bar = ProgressBar::with_draw_target(Some(frames), target).with_style(style());
+        let bar = ProgressBar::with_draw_target(Some(frames), target).with_style(style("frames"));
         show_below_log(&bar);
         let now = Instant::now();
         Self {
@@ -49,6 +52,7 @@ impl Progress {
             done: 0,
             fps: 0.0,
             left: None,
+            film: None,
             address,
             local_workers,
             alone_since: None,
@@ -64,11 +68,23 @@ impl Progress {
         self.bar.set_position(done);
     }
 
+    /// Records the progress of a picture that is rendered in passes: the bar shows its samples.
+    pub(crate) fn set_film(&mut self, film: FilmProgress) {
+        if self.film.replace(film).is_none() {
+            self.bar.set_style(style("samples"));
+        }
+        self.bar.set_length(film.of.into());
+        self.bar.set_position(film.samples.into());
+    }
+
     /// Shows the state of the farm. To be called several times a second.
     pub(crate) fn update(&mut self, status: &FarmStatus) {
-        self.left = status.totals.left;
+        self.left = match &self.film {
+            None => status.totals.left,
+            Some(film) => film.left.filter(|_| !film.is_complete()),
+        };
         let left = self.left.map_or(String::new(), |left| format!("{} left, ", duration_text(left)));
-        self.bar.set_message(format!("{left}{}", message(status, self.fps)));
+        self.bar.set_message(format!("{left}{}", self.state(status)));
         self.remind_of_workers(status.workers.is_empty());
         if self.bar.is_hidden() && !self.quiet && self.last_line.elapsed() >= LINE_EVERY {
             self.last_line = Instant::now();
@@ -99,7 +115,18 @@ impl Progress {
 
     fn line(&self, status: &FarmStatus) -> String {
         let left = self.left.map_or(String::new(), |left| format!(", {} left", duration_text(left)));
-        format!("{} of {} frames{left}; {}", self.done, self.frames, message(status, self.fps))
+        match &self.film {
+            None => format!("{} of {} frames{left}; {}", self.done, self.frames, self.state(status)),
+            Some(film) => format!("{}{left}; {}", film.text(), workers(status)),
+        }
+    }
+
+    /// State of the farm, and of the picture if it is rendered in passes.
+    fn state(&self, status: &FarmStatus) -> String {
+        match self.film {
+            None => message(status, self.fps),
+            Some(film) => format!("{}, {}", film.text(), workers(status)),
+        }
     }
 }
 
@@ -107,21 +134,26 @@ fn startup_time(local_workers: u32) -> Duration {
     if local_workers == 0 { Duration::ZERO } else { STARTUP_TIME }
 }
 
-fn style() -> ProgressStyle {
-    ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {msg}")
+fn style(what: &str) -> ProgressStyle {
+    ProgressStyle::with_template(&format!("{{wide_bar}} {{pos}}/{{len}} {what}, {{msg}}"))
         .unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-fn message(status: &FarmStatus, fps: f64) -> String {
+/// Connected workers, and assets on the way to them.
+fn workers(status: &FarmStatus) -> String {
     let workers = match status.workers.len() {
         0 => "waiting for a worker".to_owned(),
         1 => "1 worker".to_owned(),
         n => format!("{n} workers"),
     };
-    let workers = match status.transfers.to_text() {
+    match status.transfers.to_text() {
         Some(transfers) => format!("{workers}, {transfers}"),
         None => workers,
-    };
+    }
+}
+
+fn message(status: &FarmStatus, fps: f64) -> String {
+    let workers = workers(status);
     if fps >= 1.0 {
         return format!("{fps:.1} FPS, {workers}");
     }

@@ -277,6 +277,7 @@ impl WindowDisplay {
             latency: statistics.latency,
             size: self.size(),
             samples: picture.frame.request.view.samples,
+            film: picture.film,
             quality: quality.clone(),
             reductions: picture.frame.request.setting().reductions(),
             workers: status.workers.len(),

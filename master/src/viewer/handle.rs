@@ -7,6 +7,7 @@ use std::time::Instant;
 use rayfarm_farm::{FarmStatus, FinishedFrame};
 use tokio::sync::{mpsc, watch};
 
+use super::film::FilmProgress;
 use super::input_action::InputAction;
 use super::knob_change::KnobChange;
 use super::statistics::Statistics;
@@ -19,6 +20,8 @@ const MAX_WAITING_ACTIONS: usize = 256;
 pub(crate) struct PresentedFrame {
     /// Pixels, costs, accounts, and the request that the frame answers, after the quality controller.
     pub(crate) frame: FinishedFrame,
+    /// Progress of the picture, if it is rendered in passes.
+    pub(crate) film: Option<FilmProgress>,
     /// Time of the input that the frame answers.
     pub(crate) input_at: Instant,
     /// Time at which the last row arrived at the viewer.

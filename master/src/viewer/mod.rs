@@ -5,6 +5,7 @@
 
 mod camera_control;
 mod error;
+pub(crate) mod film;
 pub(crate) mod frame_counts;
 mod frame_log;
 mod frame_loop;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::scene::Shading;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::handle::PresentedFrame;
 use super::requests::OPEN_REQUESTS;
-use rayfarm_farm::ViewRequest;
 
 /// Complete frames that may wait for the display, for instance for a disk.
 const MAX_UNTAKEN: usize = 2;

@@ -7,6 +7,7 @@ use rayfarm_farm::FinishedFrame;
 use rayfarm_farm::accounting::Fading;
 use serde::Serialize;
 
+use super::film::FilmProgress;
 use super::frame_log::FrameLine;
 use super::frame_rate::FrameRate;
 use super::latency::Latency;
@@ -32,6 +33,8 @@ pub(crate) struct Statistics {
     pub(crate) resting: bool,
     /// Lines of the quality controller about the picture at rest; empty while the picture moves or without a controller.
     pub(crate) quality: Vec<String>,
+    /// Progress of the newest picture, if it is rendered in passes.
+    pub(crate) film: Option<FilmProgress>,
     /// Reason for which no frame can be rendered, where known.
     pub(crate) problem: Option<String>,
     /// Recent use of the workers' time.
@@ -42,7 +45,7 @@ pub(crate) struct Statistics {
 impl Statistics {
     /// Whether a display could show anything else than with `older`. Times go on at rest without being shown.
     pub(super) fn differs_from(&self, older: &Self) -> bool {
-        let figures = |it: &Self| (it.completed, it.latency, it.resting);
+        let figures = |it: &Self| (it.completed, it.latency, it.resting, it.film);
         !self.resting
             || figures(self) != figures(older)
             || (&self.quality, &self.problem) != (&older.quality, &older.problem)
@@ -73,6 +76,7 @@ pub(super) struct ViewerState {
     quiet: Option<Quiet>,
     /// Length of the rest before the frame in flight.
     rest: Duration,
+    film: Option<FilmProgress>,
     problem: Option<String>,
 }
 
@@ -89,6 +93,7 @@ impl ViewerState {
             last_completed: Duration::ZERO,
             quiet: None,
             rest: Duration::ZERO,
+            film: None,
             problem: None,
         }
     }
@@ -101,6 +106,11 @@ impl ViewerState {
     /// Records that a frame was presented.
     pub(super) fn presented(&mut self, latency: Duration) {
         self.latency.add(latency);
+    }
+
+    /// Sets the progress of the newest picture; `None` for one that is not rendered in passes.
+    pub(super) fn set_film(&mut self, film: Option<FilmProgress>) {
+        self.film = film;
     }
 
     /// Sets or clears the reason for which no frame can be rendered.
@@ -161,6 +171,7 @@ impl ViewerState {
             since_last_frame: now.saturating_sub(self.last_completed),
             resting: quiet.is_some(),
             quality: quiet.map_or_else(Vec::new, |quiet| quiet.quality.clone()),
+            film: self.film,
             problem: self.problem.clone(),
             accounts: self.published_accounts.1.clone(),
         }

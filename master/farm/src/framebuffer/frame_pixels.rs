@@ -19,6 +19,13 @@ impl FramePixels {
     }
 }
 
+impl From<Vec<u8>> for FramePixels {
+    /// Pixels that were made elsewhere, such as those of a picture from several frames.
+    fn from(bytes: Vec<u8>) -> Self {
+        Self { bytes, home: Weak::new() }
+    }
+}
+
 impl Deref for FramePixels {
     type Target = [u8];
 

@@ -20,6 +20,7 @@ mod farm;
 mod knobs;
 mod light;
 mod models;
+mod passes;
 mod picture;
 mod plot;
 mod quality_control;
@@ -33,6 +34,7 @@ pub(crate) use farm::FarmArgs;
 pub(crate) use knobs::QualityArgs;
 pub(crate) use light::LightArgs;
 pub(crate) use models::ModelArgs;
+pub(crate) use passes::PassesArgs;
 pub(crate) use picture::PictureArgs;
 pub(crate) use plot::PlotArgs;
 pub(crate) use quality_control::{ErrorArgs, QualityControlArgs};
@@ -173,6 +175,8 @@ pub(crate) struct RenderArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) error: ErrorArgs,
+    #[command(flatten)]
+    pub(crate) passes: PassesArgs,
     /// Number of frames of the whole camera path.
     #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
     pub(crate) frames: u32,

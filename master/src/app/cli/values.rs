@@ -1,6 +1,7 @@
 //! Values of options. Each parser returns the expected syntax, so clap's message has option, value and remedy.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayfarm_protocol::address;
@@ -12,6 +13,7 @@ const MAX_LOCAL_WORKERS: u32 = 64;
 const MAX_THREADS: usize = 1_024;
 const MAX_REPEATS: u32 = 1_000;
 const MAX_RAYS: u64 = 1_000_000_000_000;
+const MAX_SECONDS: f64 = 1e9;
 const MIN_RATE: f64 = 0.1;
 const MAX_RATE: f64 = 1000.0;
 
@@ -69,6 +71,13 @@ pub(super) fn ray_count(text: &str) -> Result<u64, String> {
 pub(super) fn frame_rate(text: &str) -> Result<f64, String> {
     let in_range = text.parse().ok().filter(|rate| (MIN_RATE..=MAX_RATE).contains(rate));
     in_range.ok_or_else(|| format!("expected frames per second from {MIN_RATE} to {MAX_RATE}, such as 60"))
+}
+
+/// A time above zero, in seconds.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let in_range = text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= MAX_SECONDS);
+    let time = in_range.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.ok_or_else(|| "expected seconds above 0, at most 1000000000, such as 60 or 0.5".to_owned())
 }
 
 /// A mean FLIP error.

@@ -10,6 +10,7 @@ use crate::app::cli::{ErrorArgs, QualityControlArgs};
 use crate::error::CommandError;
 use crate::measure::tradeoff::ladder::ladder as measured_ladder;
 use crate::measure::tradeoff::table::Table;
+use crate::viewer::film::passes::while_moving;
 use crate::viewer::quality_controller::{Ladder, QualityController, prior_ladder};
 
 /// Request of a view at rest, and the quality controller for its motion. With a rate to hold, the largest error applies to
@@ -25,7 +26,8 @@ pub(super) fn view_quality(
 ) -> Result<(ViewRequest, Option<QualityController>), CommandError> {
     Ok(match args.target_fps {
         Some(rate) => {
-            (wanted, Some(QualityController::new(ladder(&args.error, source, &wanted)?, rate, animated)))
+            let ladder = ladder(&args.error, source, &while_moving(&wanted))?;
+            (wanted, Some(QualityController::new(ladder, rate, animated)))
         }
         None => (within_error(&args.error, source, wanted)?, None),
     })

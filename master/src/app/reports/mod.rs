@@ -52,8 +52,24 @@ pub(crate) struct RenderReport {
     /// Result of verification, where segments are verified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) verification: Option<VerificationReport>,
+    /// The last picture, where pictures are rendered in passes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) film: Option<FilmReport>,
     /// Hash of the last frame's pixels: RGB8 rows, top to bottom.
     pub(crate) blake3: String,
+}
+
+/// A picture that was rendered in passes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct FilmReport {
+    /// Passes that this run rendered.
+    pub(crate) passes: u32,
+    /// Samples of each pixel, those of earlier runs included.
+    pub(crate) samples: u32,
+    /// Samples of each pixel that earlier runs rendered.
+    pub(crate) continued: u32,
+    /// Estimated relative error; `null` for a single sample.
+    pub(crate) error: Option<f64>,
 }
 
 /// Result of verification: segments that were rendered twice.

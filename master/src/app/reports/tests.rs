@@ -37,6 +37,7 @@ fn the_json_line_has_the_documented_shape() {
         scene_bytes: 4_096,
         accounting: AccountReport::default(),
         verification: None,
+        film: None,
         blake3: "00ff".to_owned(),
     };
     assert_eq!(

@@ -8,9 +8,11 @@ use accounts::AccountPanel;
 use legend::Entry;
 use rayfarm_farm::BannedWorker;
 use rayfarm_farm::Reachable;
+use rayfarm_farm::accounting::duration_text;
 
 use super::canvas::{Canvas, GLYPH, Rect};
 use super::numbers::{counted, three_digits};
+use crate::viewer::film::FilmProgress;
 
 pub(super) mod accounts;
 mod kicked;
@@ -94,6 +96,8 @@ pub(super) struct Figures {
     pub(super) size: (u32, u32),
     /// Rays per pixel.
     pub(super) samples: u32,
+    /// Progress of the picture, if it is rendered in passes.
+    pub(super) film: Option<FilmProgress>,
     /// Lines of the quality controller.
     pub(super) quality: Vec<String>,
     /// Labels of all knobs that are not at full quality.
@@ -112,8 +116,16 @@ impl Figures {
     /// Lines of the overlay.
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![self.speed()];
-        let samples = if self.samples > 1 { format!(", {} samples", self.samples) } else { String::new() };
+        let samples = match self.film {
+            None if self.samples > 1 => format!(", {} samples", self.samples),
+            _ => String::new(),
+        };
         lines.push(format!("{} x {}{samples}", self.size.0, self.size.1));
+        if let Some(film) = &self.film {
+            lines.push(film.text());
+            let left = film.left.filter(|_| !film.is_complete());
+            lines.extend(left.map(|left| format!("{} left", duration_text(left))));
+        }
         lines.extend(self.quality.iter().cloned());
         lines.extend(self.reductions.iter().map(ToString::to_string));
         lines.push(format!(

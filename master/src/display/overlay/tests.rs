@@ -14,6 +14,7 @@ fn figures() -> Figures {
         latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
         samples: 4,
+        film: None,
         quality: Vec::new(),
         reductions: Vec::new(),
         workers: 2,
@@ -67,6 +68,22 @@ fn the_quality_controller_and_every_reduced_knob_have_a_line() {
     let expected =
         [&figures().lines()[..2], &quality, &reductions.map(str::to_owned), &figures().lines()[2..]].concat();
     assert_eq!(lines, expected);
+}
+
+#[test]
+fn a_picture_in_passes_has_its_samples_its_error_and_the_time_left() {
+    let film = FilmProgress {
+        samples: 16,
+        of: 64,
+        error: Some(0.042),
+        target_error: None,
+        left: Some(Duration::from_secs(12)),
+    };
+    let lines = Figures { film: Some(film), ..figures() }.lines();
+    assert_eq!(lines[1..4], ["1024 x 768", "16 of 64 samples, error 4.2 %", "12 s left"]);
+    let complete = FilmProgress { samples: 64, left: Some(Duration::ZERO), ..film };
+    let lines = Figures { film: Some(complete), ..figures() }.lines();
+    assert_eq!(lines[2..4], ["64 of 64 samples, error 4.2 %", "2 workers, 4 threads"]);
 }
 
 #[test]

@@ -3,7 +3,8 @@
 //! Input of all displays arrives as actions. Snapshots of frames, farm and statistics go out, and no display is waited for.
 //! While something moves, [`OPEN_REQUESTS`](super::requests::OPEN_REQUESTS) frames are in flight, and a moved camera
 //! replaces the last one as long as it has not begun. At rest the picture is requested once; from then on the loop only
-//! looks at the farm ten times a second.
+//! looks at the farm ten times a second. A picture of the path integrator at rest is requested in passes instead, and what its
+//! [`film`](super::film) shows is published after each.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -15,6 +16,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::camera_control::CameraControl;
 use super::error::ViewerError;
+use super::film::FilmProgress;
+use super::film::still::{Pass, StillFilm, alone};
 use super::frame_log::FrameLogFile;
 use super::handle::{Channels, PresentedFrame, ViewerHandle};
 use super::input_action::InputAction;
@@ -53,6 +56,7 @@ pub(crate) struct Viewer {
     state: ViewState,
     camera: CameraControl,
     requests: Requests,
+    film: StillFilm,
     figures: ViewerState,
     log: Option<FrameLogFile>,
     channels: Channels,
@@ -69,6 +73,7 @@ impl Viewer {
             state: ViewState { request, hidden: false },
             camera,
             requests: Requests::new(policy, controller),
+            film: StillFilm::new(),
             figures: ViewerState::new(),
             log,
             channels,
@@ -92,6 +97,7 @@ impl Viewer {
             state: ViewState { request, hidden: false },
             camera: CameraControl::new(request.view.camera, None),
             requests: Requests::of_sequence(animation, plan),
+            film: StillFilm::new(),
             figures: ViewerState::new(),
             log: None,
             channels,
@@ -126,7 +132,7 @@ impl Viewer {
                 biased;
                 () = stop.cancelled() => return Ok(()),
                 frame = self.farm.finished() => {
-                    if self.finish(frame)?.is_break() {
+                    if self.finish(frame).await?.is_break() {
                         return Ok(());
                     }
                 }
@@ -143,13 +149,17 @@ impl Viewer {
     }
 
     fn publish(&mut self) {
+        self.check_film();
         self.figures.refresh_accounts();
         self.channels.publish_status(self.farm.status());
         self.channels.publish_statistics(self.figures.snapshot());
     }
 
     /// Delivers a finished frame and requests the next one. Breaks after the last frame.
-    fn finish(&mut self, frame: Result<FinishedFrame, FarmError>) -> Result<ControlFlow<()>, ViewerError> {
+    async fn finish(
+        &mut self,
+        frame: Result<FinishedFrame, FarmError>,
+    ) -> Result<ControlFlow<()>, ViewerError> {
         let frame = match frame {
             Ok(frame) => frame,
             // A worker may connect later; until then the displays show the reason.
@@ -161,7 +171,10 @@ impl Viewer {
         };
         let answered = self.requests.finished(frame.frame, frame.elapsed, &frame.account);
         let line = self.figures.add(&frame);
-        self.deliver(frame, answered);
+        match answered.pass {
+            None => self.deliver(frame, None, answered),
+            Some(pass) => self.develop(pass, frame, answered).await,
+        }
         if let Some(log) = &mut self.log {
             log.add(&line)?;
         }
@@ -172,9 +185,52 @@ impl Viewer {
         Ok(ControlFlow::Continue(()))
     }
 
-    fn deliver(&self, frame: FinishedFrame, answered: Answered) {
-        let Answered { input_at, number, slot, quality } = answered;
-        let presented = PresentedFrame { frame, input_at, completed_at: Instant::now(), quality };
+    /// Adds a pass to its film, and delivers the picture that the film shows. Of a former view only the first pass is shown, alone: a
+    /// camera that moves has no other pictures, and later passes would show less than the film did.
+    async fn develop(&mut self, pass: Pass, frame: FinishedFrame, answered: Answered) {
+        if !self.requests.is_current(Some(pass)) {
+            if let Ok(frame) = alone(&pass, frame) {
+                self.deliver(frame, None, answered);
+            }
+            return;
+        }
+        match self.film.add(pass, frame).await {
+            Ok((frame, progress)) => {
+                if progress.is_complete() {
+                    self.requests.complete_picture(&self.farm);
+                }
+                self.deliver(frame, Some(progress), answered);
+                self.check_film();
+            }
+            Err(error) => {
+                tracing::error!("the picture starts again: {error}");
+                self.restart_film();
+            }
+        }
+    }
+
+    /// Starts the picture again if it has pixels of a worker that sent wrong ones.
+    fn check_film(&mut self) {
+        if self.film.frames().is_empty() {
+            return;
+        }
+        let wrong = self.farm.wrong_frames();
+        if self.film.frames().iter().any(|frame| wrong.contains(*frame)) {
+            tracing::warn!("the picture starts again, because a worker sent wrong pixels");
+            self.restart_film();
+        }
+    }
+
+    fn restart_film(&mut self) {
+        self.film.clear();
+        self.figures.set_film(None);
+        self.requests.restart_picture(&self.farm, &self.state);
+    }
+
+    fn deliver(&mut self, frame: FinishedFrame, film: Option<FilmProgress>, answered: Answered) {
+        let Answered { input_at, number, slot, quality, .. } = answered;
+        self.figures.set_film(film);
+        let presented = PresentedFrame { frame, film, input_at, completed_at: Instant::now(), quality };
         // Statistics come first, so that a display which draws the frame has those that include it.
         self.channels.publish_statistics(self.figures.snapshot());
         match &self.sequence {
@@ -244,5 +300,7 @@ async fn until(at: Option<Instant>) {
     }
 }
 
+#[cfg(test)]
+mod film_tests;
 #[cfg(test)]
 mod tests;

@@ -19,11 +19,11 @@ use crate::viewer::quality_controller::{QualityMode, prior_ladder};
 const PATIENCE: Duration = Duration::from_secs(60);
 /// A rate that no setting reaches, so that the cheapest one is chosen.
 const TOO_FAST: f64 = 1e7;
-const STILL: Animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };
+pub(super) const STILL: Animation = Animation { orbit: 0.0, spin: 0.0, frames: 1 };
 
 /// A running viewer and a display of it.
-struct Running {
-    handle: ViewerHandle,
+pub(super) struct Running {
+    pub(super) handle: ViewerHandle,
     stop: CancellationToken,
     task: JoinHandle<Result<(), ViewerError>>,
 }
@@ -46,17 +46,21 @@ impl Running {
             log: None,
             controller,
         };
-        let (viewer, handle) = Viewer::interactive(farm(script).await, config);
+        Self::of(farm(script).await, config)
+    }
+
+    pub(super) fn of(farm: Farm, config: ViewerConfig) -> Self {
+        let (viewer, handle) = Viewer::interactive(farm, config);
         let stop = CancellationToken::new();
         Self { handle, stop: stop.clone(), task: spawn(viewer, stop) }
     }
 
-    fn send(&self, action: InputAction) {
+    pub(super) fn send(&self, action: InputAction) {
         assert!(self.handle.send(vec![action]));
     }
 
     /// The next frame that meets a condition; `meanwhile` runs again and again until it is there.
-    async fn frame(
+    pub(super) async fn frame(
         &mut self,
         mut meanwhile: impl FnMut(&ViewerHandle),
         condition: impl Fn(&PresentedFrame) -> bool,
@@ -74,7 +78,7 @@ impl Running {
     }
 
     /// Waits until the farm has a certain status, or the view certain figures.
-    async fn until(&self, condition: impl Fn(&FarmStatus, &crate::viewer::Statistics) -> bool) {
+    pub(super) async fn until(&self, condition: impl Fn(&FarmStatus, &crate::viewer::Statistics) -> bool) {
         let wait = async {
             while !condition(&self.handle.status(), &self.handle.statistics()) {
                 tokio::time::sleep(Duration::from_millis(1)).await;
@@ -83,11 +87,11 @@ impl Running {
         tokio::time::timeout(PATIENCE, wait).await.expect("it never comes to that");
     }
 
-    fn completed(&self) -> u64 {
+    pub(super) fn completed(&self) -> u64 {
         self.handle.statistics().completed
     }
 
-    async fn end(self) {
+    pub(super) async fn end(self) {
         self.stop.cancel();
         self.task.await.unwrap().unwrap();
     }
@@ -106,13 +110,18 @@ fn request() -> ViewRequest {
 }
 
 /// One step of a camera that turns about its look-at point.
-const TURN: InputAction = InputAction::Orbit { right: 0.01, down: 0.0 };
+pub(super) const TURN: InputAction = InputAction::Orbit { right: 0.01, down: 0.0 };
 
-/// The camera after a number of steps.
-fn turned(steps: u32) -> Camera {
-    let mut control = CameraControl::new(view().camera, None);
+/// The camera of a view after a number of steps.
+pub(super) fn turned_from(view: &FrameView, steps: u32) -> Camera {
+    let mut control = CameraControl::new(view.camera, None);
     (0..steps).for_each(|_| control.orbit(0.01, 0.0));
     control.camera()
+}
+
+/// The camera of the scene after a number of steps.
+fn turned(steps: u32) -> Camera {
+    turned_from(&view(), steps)
 }
 
 /// The full view of a camera.
@@ -121,7 +130,7 @@ fn seen_by(camera: Camera) -> FrameView {
 }
 
 /// A controller that has measured full pictures.
-fn controller(animated: bool) -> QualityController {
+pub(super) fn controller(animated: bool) -> QualityController {
     let mut controller = QualityController::new(prior_ladder(&scene(), &request()), TOO_FAST, animated);
     let (ms, account) = (|ms| Duration::from_millis(ms), FrameAccount::default());
     for frame in 1..20 {
@@ -134,7 +143,7 @@ fn is_at_rest(presented: &PresentedFrame) -> bool {
     presented.quality.first().is_some_and(|line| line.starts_with("at rest"))
 }
 
-fn is_reduced(presented: &PresentedFrame) -> bool {
+pub(super) fn is_reduced(presented: &PresentedFrame) -> bool {
     presented.frame.view.width < view().width
 }
 

@@ -161,6 +161,16 @@ impl QualityController {
         self.stillness.shown(requested_at);
     }
 
+    /// Records a finished pass of a picture at rest, requested at `requested_at`, that took `per_sample` for each of its samples: about the
+    /// time of a moving picture of full quality, which has one sample. Its pixels are sums, whose bytes say nothing about those of moving
+    /// pictures.
+    pub(crate) fn finished_pass(&mut self, now: Duration, per_sample: Duration, requested_at: Duration) {
+        self.governor.observe(0, per_sample.min(now.saturating_sub(self.last_finished)));
+        self.last_finished = now;
+        self.last_mode = Some(QualityMode::Resting);
+        self.stillness.shown(requested_at);
+    }
+
     /// Replaces the ladder after a change of the bottleneck, because other knobs help now. `took` is the time of the last
     /// frame, at `rung`.
     fn change_ladder(&mut self, ratio: f64, rung: &Rung, took: Duration) {

@@ -1,5 +1,8 @@
 //! Frames to request from the farm: the newest view while something moves, each view once at rest, and every frame of a
 //! sequence.
+//!
+//! A view of the path integrator at rest is requested in passes of samples, which the film of the view adds. Passes of a view are requested
+//! in their order, and never replace each other. If one is lost all the same, the picture starts again.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -7,6 +10,8 @@ use std::time::{Duration, Instant};
 use rayfarm_farm::accounting::FrameAccount;
 use rayfarm_farm::{Farm, FrameId, ViewRequest};
 
+use super::film::passes;
+use super::film::still::Pass;
 use super::orbit::Animation;
 use super::quality_controller::{QualityController, QualityMode};
 use super::sequence::{SequencePlan, Slot};
@@ -64,6 +69,10 @@ pub(super) struct Requests {
     wanted: Option<ViewRequest>,
     /// Last request, unless it was dropped.
     requested: Option<Requested>,
+    /// Passes of the view at rest, if it is rendered in passes.
+    passes: Option<Passes>,
+    /// Number of films so far.
+    films: u64,
     /// Time of the last camera movement, until a frame that shows it is finished.
     moved_at: Option<Instant>,
     controller: Option<QualityController>,
@@ -76,6 +85,28 @@ struct Requested {
     /// Request before the quality controller.
     wanted: ViewRequest,
     mode: Option<QualityMode>,
+}
+
+/// Passes of a view at rest.
+#[derive(Clone, Copy, Debug)]
+struct Passes {
+    /// The request for the whole picture.
+    whole: ViewRequest,
+    /// Number of their film.
+    film: u64,
+    /// First sample of the next pass.
+    next: u32,
+    /// Whether the picture needs no more passes, although it could have some.
+    is_complete: bool,
+}
+
+impl Passes {
+    /// The next pass, if there is one.
+    fn pass(&self) -> Option<Pass> {
+        let Self { whole, film, next, is_complete } = *self;
+        let range = passes::next(next, whole.view.samples).filter(|_| !is_complete)?;
+        Some(Pass { film, whole, first: range.start, samples: range.end - range.start })
+    }
 }
 
 /// A request in flight.
@@ -104,6 +135,8 @@ pub(super) struct Answered {
     pub(super) slot: Option<Slot>,
     /// Lines of the quality controller about the frame; empty without a controller.
     pub(super) quality: Vec<String>,
+    /// The pass that the frame is, if it is one.
+    pub(super) pass: Option<Pass>,
 }
 
 impl Requests {
@@ -116,6 +149,8 @@ impl Requests {
             open: VecDeque::new(),
             wanted: None,
             requested: None,
+            passes: None,
+            films: 0,
             moved_at: None,
             controller,
             started: Instant::now(),
@@ -142,19 +177,32 @@ impl Requests {
     pub(super) fn finished(&mut self, frame: FrameId, elapsed: Duration, account: &FrameAccount) -> Answered {
         let now = Instant::now();
         let mut answer = None;
-        while self.open.front().is_some_and(|open| open.frame <= frame) {
-            answer = self.open.pop_front().filter(|open| open.frame == frame);
+        while let Some(open) = self.open.pop_front_if(|open| open.frame <= frame) {
+            if open.frame != frame && self.is_current(open.answered.pass) {
+                tracing::debug!("a pass of the picture was replaced: the picture starts again");
+                self.passes = None;
+            }
+            answer = Some(open).filter(|open| open.frame == frame);
         }
         let Some(Open { mut answered, requested_at, mode, .. }) = answer else {
             self.moved_at = self.moved_at.filter(|&moved_at| moved_at > now);
-            return Answered { input_at: now, number: self.next, slot: None, quality: Vec::new() };
+            return Answered {
+                input_at: now,
+                number: self.next,
+                slot: None,
+                quality: Vec::new(),
+                pass: None,
+            };
         };
         self.moved_at = self.moved_at.filter(|&moved_at| moved_at > answered.input_at);
         let (now, requested_at) = (self.since_start(now), self.since_start(requested_at));
         if let Some((controller, mode)) = self.controller.as_mut().zip(mode) {
             // The lines come first: afterwards the ladder may no longer have the frame's rung.
             answered.quality = controller.lines(mode);
-            controller.finished(now, elapsed, mode, requested_at, account);
+            match answered.pass {
+                None => controller.finished(now, elapsed, mode, requested_at, account),
+                Some(pass) => controller.finished_pass(now, elapsed / pass.samples.max(1), requested_at),
+            }
         }
         answered
     }
@@ -179,6 +227,28 @@ impl Requests {
     /// Replaces the last request by one for the full picture, when the camera has come to rest.
     pub(super) fn rest(&mut self, farm: &impl Renderer, state: &ViewState) {
         self.request_instead(farm, state);
+    }
+
+    /// Whether a pass is of the picture that is being rendered.
+    pub(super) fn is_current(&self, pass: Option<Pass>) -> bool {
+        self.passes.zip(pass).is_some_and(|(passes, pass)| passes.film == pass.film)
+    }
+
+    /// Requests no further pass of the picture, and drops those in flight.
+    pub(super) fn complete_picture(&mut self, farm: &impl Renderer) {
+        let Some(passes) = &mut self.passes else { return };
+        passes.is_complete = true;
+        if !self.open.is_empty() {
+            let (passes, requested) = (self.passes, self.requested.take());
+            self.drop_all(farm);
+            (self.passes, self.requested) = (passes, requested);
+        }
+    }
+
+    /// Starts the picture at rest again from its first pass.
+    pub(super) fn restart_picture(&mut self, farm: &impl Renderer, state: &ViewState) {
+        self.drop_all(farm);
+        self.fill(farm, state);
     }
 
     /// Time at which the camera comes to rest if it does not move any more.
@@ -243,25 +313,57 @@ impl Requests {
         };
         let request = animation.request(&request, number);
         let request = self.plan.as_ref().map_or(request, |plan| plan.request(self.next, request));
-        if !continuous && self.is_requested(&request, wanted, mode) {
-            return false;
-        }
+        let is_moving = animation.is_moving() || is_moving(mode);
+        let (request, passes) = match self.plan.is_none() && passes::has_passes(&request.view) {
+            false => (request, None),
+            true if is_moving => (passes::while_moving(&request), None),
+            true => (request, Some(self.passes_of(&request))),
+        };
+        let pass = match passes.map(|passes| passes.pass()) {
+            None if !continuous && self.is_requested(&request, wanted, mode) => return false,
+            None => None,
+            // All passes have been requested.
+            Some(None) => return false,
+            // A third request may replace the second one, which is a pass of the same picture.
+            Some(Some(pass)) if pass.first > 0 && self.open.len() >= OPEN_REQUESTS => return false,
+            Some(pass) => pass,
+        };
+        let request = pass.map_or(request, |Pass { first, samples, .. }| ViewRequest {
+            view: passes::pass(&request.view, first..first.saturating_add(samples)),
+            ..request
+        });
         if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
             self.drop_all(farm);
         }
+        self.passes = passes
+            .zip(pass)
+            .map(|(passes, pass)| Passes { next: pass.first.saturating_add(pass.samples), ..passes });
+        self.films = self.passes.map_or(self.films, |passes| passes.film);
         // A request that replaces another one is as old as the camera that it shows.
         let input_at = self.moved_at.unwrap_or(now);
-        let answered = Answered { input_at, number, slot, quality: Vec::new() };
+        let answered = Answered { input_at, number, slot, quality: Vec::new(), pass };
         self.open.push_back(Open { frame: farm.request(request), answered, requested_at: now, mode });
         self.requested = Some(Requested { request, wanted: *wanted, mode });
         self.next += 1;
         true
     }
 
+    /// Passes of a picture: those that are being rendered, or those of a new film.
+    fn passes_of(&self, whole: &ViewRequest) -> Passes {
+        let first = Passes { whole: *whole, film: self.films + 1, next: 0, is_complete: false };
+        match self.passes.filter(|passes| passes.whole == *whole) {
+            // A measurement renders the picture again and again, each time to its end.
+            Some(passes) if self.policy.continuous && passes.pass().is_none() && self.open.is_empty() => {
+                first
+            }
+            Some(passes) => passes,
+            None => first,
+        }
+    }
+
     /// Whether the last request serves for this one: it is the same, or only the quality controller's rung has changed
     /// since then and nothing moves any more.
     fn is_requested(&self, request: &ViewRequest, wanted: &ViewRequest, mode: Option<QualityMode>) -> bool {
-        let is_moving = |mode: Option<QualityMode>| mode.is_some_and(|mode| mode != QualityMode::Resting);
         self.requested.as_ref().is_some_and(|last| {
             let is_still = !self.policy.animation.is_moving() && last.wanted == *wanted;
             last.request == *request || is_still && is_moving(last.mode) && is_moving(mode)
@@ -278,6 +380,9 @@ impl Requests {
         if size(&before) != size(wanted) {
             // Frames in flight are of the display's former size.
             self.drop_all(farm);
+        } else if self.open.iter().any(|open| open.answered.pass.is_some_and(|pass| pass.first > 0)) {
+            // Nothing shows a later pass of a former view.
+            self.drop_all(farm);
         }
     }
 
@@ -285,11 +390,17 @@ impl Requests {
         farm.drop_requests();
         self.open.clear();
         self.requested = None;
+        self.passes = None;
     }
 
     fn since_start(&self, at: Instant) -> Duration {
         at.saturating_duration_since(self.started)
     }
+}
+
+/// Whether a mode is of a moving picture; without a quality controller there is none.
+fn is_moving(mode: Option<QualityMode>) -> bool {
+    mode.is_some_and(|mode| mode != QualityMode::Resting)
 }
 
 #[cfg(test)]

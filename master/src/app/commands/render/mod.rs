@@ -7,6 +7,7 @@ use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
 use files::{FileDisplay, FrameFiles};
+use passes::PassRules;
 use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
 use repair::named;
 use totals::Totals;
@@ -27,6 +28,8 @@ use crate::viewer::orbit::Animation;
 use crate::viewer::{FrameLogFile, Viewer};
 
 mod files;
+mod film_file;
+mod passes;
 mod repair;
 #[cfg(test)]
 mod tests;
@@ -47,6 +50,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let source = Source::load(&args.scene, args.models, args.picture.size)?;
     let request = within_error(&args.error, &source, source.request(&args.picture)?)?;
     let request = in_format_of(&args, &pattern, request)?;
+    let passes = PassRules::of(&args, &source, &request)?;
     let plan = plan(&args, &pattern, &request)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
@@ -57,6 +61,8 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
         wait_for_workers: args.wait_for_workers,
         files: FrameFiles::new(request, args.aov, plan, FrameWriter::new(pattern), totals),
         observability,
+        passes,
+        samples_so_far: None,
     };
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let report = match run.files.plan.frames.is_empty() {
@@ -124,6 +130,10 @@ struct Run {
     wait_for_workers: Option<u32>,
     files: FrameFiles,
     observability: Observability,
+    /// Rules of pictures that are rendered in passes.
+    passes: Option<PassRules>,
+    /// Progress of a picture that is rendered in passes, as text.
+    samples_so_far: Option<String>,
 }
 
 impl Run {
@@ -136,10 +146,17 @@ impl Run {
     ) -> Result<RenderReport, CommandError> {
         let interrupted = runtime.block_on(async { cancelled_by_signals() });
         let local_workers = options.local_workers;
-        let farm = runtime.block_on(self.start(options, scene, &interrupted))?;
+        let mut farm = runtime.block_on(self.start(options, scene, &interrupted))?;
         let mut progress = Progress::new(self.files.count(), farm.address(), local_workers);
         runtime.block_on(self.await_workers(&farm, local_workers, &mut progress, &interrupted));
-        let (farm, rendered) = self.render(runtime, farm, &mut progress, &interrupted)?;
+        let (farm, rendered) = match self.passes.take() {
+            None => self.render(runtime, farm, &mut progress, &interrupted)?,
+            Some(rules) => {
+                let rendering = self.render_in_passes(&mut farm, rules, &mut progress, &interrupted);
+                let rendered = runtime.block_on(rendering);
+                (farm, rendered)
+            }
+        };
         runtime.block_on(self.conclude(farm, rendered, &mut progress, &interrupted))
     }
 
@@ -236,6 +253,9 @@ impl Run {
     fn so_far(&self) -> String {
         let FrameFiles { writer, totals, plan, .. } = &self.files;
         let frames = self.files.count();
+        if let Some(samples) = self.samples_so_far.clone().filter(|_| frames == 1) {
+            return samples;
+        }
         if !writer.has_files() {
             return format!("{} of {frames} frames are rendered", totals.frames());
         }

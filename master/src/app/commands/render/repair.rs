@@ -12,7 +12,7 @@ use crate::app::reports::VerificationReport;
 use crate::viewer::OPEN_REQUESTS;
 
 /// Time for the remaining verification after the last frame is complete.
-const VERIFICATION_TIMEOUT: Duration = Duration::from_secs(30);
+pub(super) const VERIFICATION_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time without any worker after which frames are not rendered again but named.
 const WORKER_TIMEOUT: Duration = Duration::from_secs(if cfg!(test) { 1 } else { 10 });
 const POLL_EVERY: Duration = Duration::from_millis(50);
@@ -115,7 +115,7 @@ impl Run {
 ///
 /// # Errors
 /// No worker for [`WORKER_TIMEOUT`], or a frame that cannot be rendered.
-async fn next(farm: &mut Farm) -> Result<FinishedFrame, FarmError> {
+pub(super) async fn next(farm: &mut Farm) -> Result<FinishedFrame, FarmError> {
     let address = farm.address();
     let mut alone_since = None;
     loop {

@@ -211,3 +211,85 @@ async fn a_run_that_cannot_render_its_frames_again_names_them_and_fails() {
     assert!(error.to_string().contains("frames 0 "), "{error}");
     assert!(renders.file("wrong", 0).exists());
 }
+
+/// Renders a picture to `NAME-0.ppm` with paths and these options, by a number of workers.
+async fn render_paths(
+    renders: &Renders,
+    name: &str,
+    options: &str,
+    workers: u32,
+) -> Result<(), CommandError> {
+    let run = renders.start_as(&format!("{name}-%d.ppm"), &format!("--integrator path {options}"));
+    // A run with wrong options does not listen.
+    tokio::select! {
+        () = renders.ready() => {}
+        () = async { while !run.is_finished() { tokio::time::sleep(Duration::from_millis(5)).await } } => {}
+    }
+    (0..workers).for_each(|_| drop(renders.real_worker()));
+    in_time(run).await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_continued_picture_is_that_of_a_run_without_interruption() {
+    let renders = Renders::new();
+    let path = |name: &str| renders.folder.path().join(name);
+    let picture = |name: &str| bytes(&renders.file(name, 0));
+    render_paths(&renders, "whole", "--samples 24", 1).await.unwrap();
+    let film = path("a.film").display().to_string();
+    render_paths(&renders, "part", &format!("--samples 5 --checkpoint {film}"), 2).await.unwrap();
+    assert!(picture("part") != picture("whole"));
+    render_paths(&renders, "rest", &format!("--samples 24 --continue {film}"), 2).await.unwrap();
+    assert!(picture("rest") == picture("whole"));
+    // Nothing is left to render, and another exposure shows the same film.
+    render_paths(&renders, "again", &format!("--samples 24 --continue {film}"), 1).await.unwrap();
+    assert!(picture("again") == picture("whole"));
+    render_paths(&renders, "brighter", "--samples 24 --exposure 1", 1).await.unwrap();
+    render_paths(&renders, "film", &format!("--samples 24 --exposure 1 --continue {film}"), 1).await.unwrap();
+    assert!(picture("film") == picture("brighter") && picture("film") != picture("whole"));
+    // A run that its time ends has at least one sample.
+    let early = path("b.film").display().to_string();
+    render_paths(&renders, "early", &format!("--samples 24 --time 0.001 --checkpoint {early}"), 1)
+        .await
+        .unwrap();
+    render_paths(&renders, "late", &format!("--samples 24 --continue {early}"), 1).await.unwrap();
+    assert!(picture("late") == picture("whole"));
+
+    for (options, hint) in [
+        (format!("--samples 24 --seed 4 --continue {film}"), "another picture"),
+        (format!("--samples 24 --size 32x63 --continue {film}"), "32x64 pixels"),
+        (format!("--samples 5 --continue {film}"), "24 samples already"),
+        (format!("--samples 5 --continue {film}.none"), "cannot be read"),
+        (format!("--integrator direct --samples 4 --continue {film}"), "--integrator path"),
+        (format!("--samples 5 --frames 2 --checkpoint {film}"), "one picture"),
+    ] {
+        let error = render_paths(&renders, "refused", &options, 0).await.unwrap_err().to_string();
+        assert!(error.contains(hint), "{options}: {error}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_picture_ends_at_its_largest_noise() {
+    let renders = Renders::new();
+    let film = renders.folder.path().join("a.film");
+    let options = format!("--samples 4096 --max-noise 0.5 --checkpoint {}", film.display());
+    render_paths(&renders, "noisy", &options, 2).await.unwrap();
+    let samples = u32::from_le_bytes(bytes(&film)[20..24].try_into().unwrap());
+    assert!((2..4096).contains(&samples) && (samples.is_power_of_two() || samples.is_multiple_of(16)));
+    render_paths(&renders, "same", &format!("--samples {samples}"), 1).await.unwrap();
+    assert!(bytes(&renders.file("noisy", 0)) == bytes(&renders.file("same", 0)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_film_with_wrong_pixels_starts_again() {
+    let renders = Renders::new();
+    render_paths(&renders, "right", "--samples 6", 1).await.unwrap();
+    let options = "--integrator path --samples 6 --verify 100 --checkpoint";
+    let film = renders.folder.path().join("a.film");
+    let run = renders.start_as("again-%d.ppm", &format!("{options} {}", film.display()));
+    renders.ready().await;
+    let worker = fake_worker::start(renders.address, Script::Correct).await;
+    in_time(worker).await.unwrap();
+    renders.real_worker();
+    in_time(run).await.unwrap().unwrap();
+    assert!(bytes(&renders.file("again", 0)) == bytes(&renders.file("right", 0)));
+}

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use rayfarm_farm::ViewRequest;
 use rayfarm_farm::accounting::RunAccount;
+use rayfarm_farm::{FinishedFrame, ViewRequest};
 
 use crate::app::plan::Plan;
-use crate::app::reports::{Knobs, MsPerFrame, RenderReport, VerificationReport};
+use crate::app::reports::{FilmReport, Knobs, MsPerFrame, RenderReport, VerificationReport};
 use crate::display::numbers::three_digits;
 use crate::error::CommandError;
 use crate::viewer::frame_counts::{BytesPerFrame, RaysPerFrame, mean};
@@ -32,6 +32,8 @@ pub(super) struct Totals {
     pub(super) hash: blake3::Hash,
     /// Result of verification, where segments are verified.
     pub(super) verification: Option<VerificationReport>,
+    /// The last picture, where pictures are rendered in passes.
+    pub(super) film: Option<FilmReport>,
 }
 
 impl Totals {
@@ -53,6 +55,7 @@ impl Totals {
             log,
             hash: blake3::hash(&[]),
             verification: None,
+            film: None,
         }
     }
 
@@ -75,13 +78,39 @@ impl Totals {
         let line = FrameLine::of(frame, number, at, elapsed, self.rate.fps(at));
         self.times.push(elapsed);
         self.latencies.push(frame.latency);
+        self.count(frame, &line)
+    }
+
+    /// Adds a pass of a picture, and its line to the frame log; `number` is that of the pass. The time of the picture is added when it is
+    /// complete.
+    ///
+    /// # Errors
+    /// A log that cannot be written.
+    pub(super) fn add_pass(&mut self, frame: &FinishedFrame, number: u64) -> Result<(), CommandError> {
+        let at = self.started.elapsed();
+        self.rate.completed(at, frame.elapsed);
+        let line = FrameLine::of(frame, number, at, frame.elapsed, self.rate.fps(at));
+        self.count(frame, &line)
+    }
+
+    /// Adds the time of a picture whose passes have been added.
+    pub(super) fn complete_picture(&mut self) {
+        let at = self.started.elapsed();
+        let elapsed = at.saturating_sub(self.previous);
+        self.previous = at;
+        self.times.push(elapsed);
+        self.latencies.push(elapsed);
+    }
+
+    /// Adds the rays, bytes and account of a frame, and its line to the frame log.
+    fn count(&mut self, frame: &FinishedFrame, line: &FrameLine) -> Result<(), CommandError> {
         self.rays.add(line.rays);
         self.bytes.add(line.bytes);
         self.scene_bytes = self.scene_bytes.saturating_add(frame.scene_bytes);
         self.account.add(&frame.account);
         (self.workers, self.threads) = (frame.workers, frame.threads);
         if let Some(log) = &mut self.log {
-            log.add(&line)?;
+            log.add(line)?;
         }
         Ok(())
     }
@@ -147,6 +176,7 @@ impl Totals {
             scene_bytes: self.scene_bytes,
             accounting: self.account.report(),
             verification: self.verification.clone(),
+            film: self.film,
             blake3: self.hash.to_hex().to_string(),
         }
     }
