@@ -11,6 +11,7 @@
 //!   rounding   error bounds of placed geometry
 //!   few        the primitives of scenes with few of them
 //!   sources    the lights that paths select from
+//!   volumes    volumes that scatter the light of paths
 //! ```
 
 mod affine;
@@ -19,6 +20,7 @@ mod few;
 mod instance;
 mod rounding;
 mod sources;
+mod volumes;
 
 use std::sync::Arc;
 
@@ -43,6 +45,7 @@ pub(crate) use instance::Instance;
 use instance::ToEye;
 use rounding::placement_rounding;
 pub(crate) use rounding::{F64_ERROR, corner_rounding, mesh_rounding};
+pub(crate) use volumes::{EyeBoundary, EyeVolume};
 
 /// Padding of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
@@ -70,6 +73,8 @@ pub struct PreparedFrame {
     pub(crate) few: Option<Few>,
     /// The lights that paths select from; only in frames of the path integrator.
     pub(crate) light_table: Option<LightTable>,
+    /// The volumes; only in frames of the path integrator.
+    pub(crate) volumes: Vec<EyeVolume>,
     /// The background as rays of the camera see it.
     pub(crate) seen_background: Background,
     /// Sine and cosine of the rotation of a sky.
@@ -151,6 +156,7 @@ impl PreparedFrame {
             lights: lights(&scene, view, &to_eye),
             few: None,
             light_table: None,
+            volumes: Vec::new(),
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
@@ -159,6 +165,9 @@ impl PreparedFrame {
             level: simd::best(),
             scene,
         };
+        if frame.features.volumes && view.integrator.path().is_some() {
+            frame.volumes = volumes::volumes(&frame.scene, view.spin, &to_eye, &frame.to_picture);
+        }
         go_on(cancelled)?;
         frame.make_pyramids();
         go_on(cancelled)?;

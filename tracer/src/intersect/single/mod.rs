@@ -9,6 +9,7 @@
 //!   filter          one ray against sixteen triangles
 //!   query           closest hit, any hit
 //!   transmittance   share of light that passes all surfaces
+//!   solid           where a ray crosses the surface of a closed mesh
 //!   leaves          the leaves of the scene's tree and of a mesh's tree
 //! ```
 
@@ -16,6 +17,7 @@ mod filter;
 mod leaves;
 mod near_ray;
 mod query;
+mod solid;
 #[cfg(test)]
 mod tests;
 mod transmittance;
@@ -23,6 +25,7 @@ mod traversal;
 
 use query::{Any, Closest};
 pub(super) use query::{Candidate, RayQuery};
+pub(super) use solid::SolidCrossing;
 pub(crate) use transmittance::Crossings;
 pub(super) use traversal::{Stack, with_stack};
 
