@@ -4,11 +4,13 @@
 //!   items        primitives with bounds, numbered through
 //!   bounds       placements of models, bounds of items
 //!   attributes   vertex attributes that the materials of a model use
+//!   solids       meshes that bound volumes
 //! ```
 
 mod attributes;
 mod bounds;
 mod items;
+mod solids;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -25,6 +27,7 @@ use attributes::{attribute_uses, uses_uvs};
 pub(crate) use bounds::{disk_reach, orientation, transformed_bounds};
 use bounds::{relative_boxes, world_bounds};
 pub(crate) use items::{Item, Items};
+pub(crate) use solids::Solid;
 
 /// Reasons why a scene cannot be traced.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +37,14 @@ pub enum CompileError {
     MissingMesh {
         /// Index of the model.
         model: usize,
+        /// The mesh.
+        id: MeshId,
+    },
+    /// A mesh that bounds a volume is missing.
+    #[error("volume {volume} names mesh {id}, which is missing")]
+    MissingSolid {
+        /// Index of the volume.
+        volume: usize,
         /// The mesh.
         id: MeshId,
     },
@@ -73,6 +84,8 @@ pub struct CompiledScene {
     meshes: Vec<Arc<CompiledMesh>>,
     /// One per model.
     attributes: Vec<AttributeUse>,
+    /// One per volume that a mesh bounds, in their order.
+    solids: Vec<Solid>,
     /// One per texture of the scene.
     textures: Vec<(Arc<Texture>, TextureMap)>,
     /// The tree over all items, one item a leaf. Its boxes are in world space; a frame replaces them.
@@ -116,6 +129,7 @@ impl CompiledScene {
             .enumerate()
             .map(|(model, description)| fitting_mesh(&scene, &by_id, model, description))
             .collect::<Result<_, _>>()?;
+        let solids = solids::of(&scene, &by_id)?;
         let attributes = attribute_uses(&scene, &meshes);
         let textures = textures_of(&scene, textures)?;
         let items = Items::of(&scene);
@@ -125,7 +139,7 @@ impl CompiledScene {
         let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default, cancelled)?;
         let features = SceneFeatures::of(&scene);
         let shown_directly = OnceLock::new();
-        Ok(Self { scene, meshes, attributes, textures, tree, bounds, features, shown_directly })
+        Ok(Self { scene, meshes, attributes, solids, textures, tree, bounds, features, shown_directly })
     }
 
     /// The scene for the frames of a view: with its materials as the direct integrator shows them, if it is the one.
@@ -176,6 +190,11 @@ impl CompiledScene {
     /// The vertex attributes that each model uses.
     pub(crate) fn attributes(&self) -> &[AttributeUse] {
         &self.attributes
+    }
+
+    /// The meshes of the volumes that have one, in their order.
+    pub(crate) fn solids(&self) -> &[Solid] {
+        &self.solids
     }
 
     /// The scene's textures with their maps.

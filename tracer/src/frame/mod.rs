@@ -12,6 +12,7 @@
 //!   rounding   error bounds of placed geometry
 //!   few        the primitives of scenes with few of them
 //!   sources    the lights that paths select from
+//!   volumes    volumes that scatter the light of paths
 //! ```
 
 mod affine;
@@ -21,6 +22,7 @@ mod instance;
 mod passage;
 mod rounding;
 mod sources;
+mod volumes;
 
 use std::sync::Arc;
 
@@ -46,6 +48,7 @@ use instance::ToEye;
 use passage::Passage;
 use rounding::placement_rounding;
 pub(crate) use rounding::{F64_ERROR, corner_rounding, mesh_rounding};
+pub(crate) use volumes::{EyeBoundary, EyeVolume};
 
 /// Padding of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
 const BOX_PADDING: f64 = 1.0 / (1 << 20) as f64;
@@ -73,6 +76,8 @@ pub struct PreparedFrame {
     pub(crate) few: Option<Few>,
     /// The lights that paths select from; only in frames of the path integrator.
     pub(crate) light_table: Option<LightTable>,
+    /// The volumes; only in frames of the path integrator.
+    pub(crate) volumes: Vec<EyeVolume>,
     /// The background as rays of the camera see it.
     pub(crate) seen_background: Background,
     /// Sine and cosine of the rotation of a sky.
@@ -156,6 +161,7 @@ impl PreparedFrame {
             lights: lights(&scene, view, &to_eye),
             few: None,
             light_table: None,
+            volumes: Vec::new(),
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
@@ -165,6 +171,9 @@ impl PreparedFrame {
             level: simd::best(),
             scene,
         };
+        if frame.features.volumes && view.integrator.path().is_some() {
+            frame.volumes = volumes::volumes(&frame.scene, view.spin, &to_eye, &frame.to_picture);
+        }
         go_on(cancelled)?;
         frame.make_pyramids();
         go_on(cancelled)?;

@@ -6,6 +6,7 @@
 //!   coincide   which of several coincident surfaces is hit
 //!   single     one ray: closest hit and any hit
 //!   block      any sixteen rays: closest hits and any hits
+//!   volumes    one ray: its ways inside of volumes
 //!   tile       256 rays of a tile: closest hits of the camera's rays, occlusion of a light
 //!   world      the same for rays of world space: the public interface
 //! ```
@@ -19,8 +20,10 @@ mod cutout;
 mod exact;
 mod single;
 pub(crate) mod tile;
+mod volumes;
 mod world;
 
 pub(crate) use exact::Hit;
 pub(crate) use single::Crossings;
+pub(crate) use volumes::{Scattered, VolumeSections};
 pub use world::{Primitive, RayHit, RaySegment};

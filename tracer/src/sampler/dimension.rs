@@ -15,10 +15,12 @@ pub(crate) enum Vertex {
     Light,
     /// The point on the light, or the direction to the sky.
     LightPoint,
+    /// The free path in volumes before the vertex.
+    Medium,
 }
 
 /// Number of the uses at a vertex.
-const USES: u32 = 4;
+const USES: u32 = 5;
 
 impl Dimension {
     /// The place in the pixel.

@@ -19,7 +19,7 @@ mod validate;
 pub use data::{
     Attenuation, Background, Camera, CameraKind, Disk, FovAxis, FrameView, Integrator, Lens, Light,
     LightKind, Model, NormalMode, PathSettings, PixelFormat, Plane, RenderSettings, Sampler, Scene,
-    SceneFeatures, Sky, SkyPicture, Sphere, ToneCurve, ToneMapping, Triangle,
+    SceneFeatures, Sky, SkyPicture, Sphere, ToneCurve, ToneMapping, Triangle, Volume, VolumeBoundary,
 };
 #[cfg(feature = "import")]
 pub use import::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError, Up};
@@ -29,7 +29,7 @@ pub use load::{LoadLimits, LoadedScene, compile_model, compile_model_with, load,
 pub use validate::{
     MAX_CLAMP, MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_EXPOSURE, MAX_IOR, MAX_LIGHT, MAX_LIGHTS,
     MAX_MATERIALS, MAX_MODELS, MAX_NORMAL_STRENGTH, MAX_PATH_SAMPLES, MAX_PLANES, MAX_SAMPLES,
-    MAX_SHADOW_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, ValidateError,
+    MAX_SHADOW_SAMPLES, MAX_SLOTS, MAX_SPHERES, MAX_TEXTURES, MAX_TRIANGLES, MAX_VOLUMES, ValidateError,
 };
 
 pub(crate) use crate::material::is_squared;

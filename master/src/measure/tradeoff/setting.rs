@@ -190,6 +190,7 @@ mod tests {
         checkered: false,
         normal_mapped: false,
         metallic_roughness: false,
+        volumes: false,
     };
     const EVERYTHING: SceneFeatures = SceneFeatures {
         specular: true,

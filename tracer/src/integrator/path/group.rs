@@ -10,7 +10,7 @@ use crate::bsdf::Media;
 use crate::cancel::Cancelled;
 use crate::film::{PixelSums, TilePixels};
 use crate::frame::{CameraRays, PreparedFrame};
-use crate::intersect::tile;
+use crate::intersect::{VolumeSections, tile};
 use crate::light::table::{LightTable, Selection};
 use crate::rays::{
     BATCH, BLOCKS, EyeTile, HitBlock, ParallelTile, PictureTile, RayBatch, RayBlock, RayCounts, RaySource,
@@ -52,6 +52,8 @@ pub(super) struct Group<'a> {
     /// Index of the first path of the current batch.
     base: usize,
     pub(super) shadow_rays: RayBlock<'a>,
+    /// Ways of the current ray inside of volumes.
+    pub(super) sections: VolumeSections,
     /// Radiance of each sample, by its number in the group and its place in the tile.
     pub(super) radiance: Vec<[f32; 3]>,
     pub(super) counts: RayCounts,
@@ -74,7 +76,7 @@ impl<'a> Group<'a> {
             cancelled,
             lens: EyeLens::of(frame),
             table: frame.light_table.as_ref(),
-            tiles_lights: without_extent <= MAX_TILED_LIGHTS,
+            tiles_lights: without_extent <= MAX_TILED_LIGHTS && !frame.features.volumes,
             seeds: [Indices::ZERO; BLOCKS],
             live: [0; BLOCKS],
             center: [0.0; 2],
@@ -88,6 +90,7 @@ impl<'a> Group<'a> {
             next: Vec::new(),
             base: 0,
             shadow_rays: RayBlock::new(frame),
+            sections: VolumeSections::default(),
             radiance: Vec::new(),
             counts: RayCounts::default(),
         })

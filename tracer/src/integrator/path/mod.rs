@@ -21,6 +21,7 @@
 //!   queue     paths that go on, generation by generation
 //!   group     some samples of all pixels of a tile, from their rays to their radiance
 //!   media     transparent bodies: indices of refraction, absorption
+//!   medium    volumes: free paths, scattering, transmittance
 //!   vertex    sixteen paths at the surfaces that they hit
 //!   delta     light of all lights without extent at the first vertices of a tile
 //! ```
@@ -29,6 +30,7 @@ mod camera;
 mod delta;
 mod group;
 mod media;
+mod medium;
 mod queue;
 #[cfg(test)]
 mod tests;

@@ -17,19 +17,19 @@ use crate::simd;
 /// Bytes of a pixel of sums.
 const BYTES: usize = PixelFormat::Sums.bytes_per_pixel();
 
-fn diffuse(color: Vec3) -> Material {
+pub(super) fn diffuse(color: Vec3) -> Material {
     Material { diffuse: color, specular: Vec3::ZERO, ..Material::NEUTRAL }
 }
 
-fn lamp(emission: Vec3) -> Material {
+pub(super) fn lamp(emission: Vec3) -> Material {
     Material { emission, ..diffuse(Vec3::ZERO) }
 }
 
-fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
+pub(super) fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
     Sphere { center, radius, material, inside_out: false, uv_rotate: DVec3::ZERO }
 }
 
-fn light(kind: LightKind) -> Light {
+pub(super) fn light(kind: LightKind) -> Light {
     Light {
         kind,
         color: Vec3::new(0.9, 0.8, 0.7),
@@ -41,11 +41,11 @@ fn light(kind: LightKind) -> Light {
 }
 
 /// A camera at `position` that looks at the origin.
-fn camera_at(position: DVec3) -> Camera {
+pub(super) fn camera_at(position: DVec3) -> Camera {
     Camera { position, look_at: DVec3::ZERO, up: DVec3::NEG_Z, fov: 10.0, ..Camera::default() }
 }
 
-fn path_view(scene: &Scene, side: u32, samples: u32, depth: u8) -> FrameView {
+pub(super) fn path_view(scene: &Scene, side: u32, samples: u32, depth: u8) -> FrameView {
     FrameView {
         width: side,
         height: side,
@@ -57,18 +57,18 @@ fn path_view(scene: &Scene, side: u32, samples: u32, depth: u8) -> FrameView {
     }
 }
 
-fn compiled(scene: &Scene) -> Arc<CompiledScene> {
+pub(super) fn compiled(scene: &Scene) -> Arc<CompiledScene> {
     Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap())
 }
 
-fn sums(frame: &PreparedFrame, rows: std::ops::Range<u32>) -> Vec<PixelSums> {
+pub(super) fn sums(frame: &PreparedFrame, rows: std::ops::Range<u32>) -> Vec<PixelSums> {
     let mut bytes = vec![0xa5; rows.len() * frame.row_bytes()];
     render_rows(frame, rows, &mut bytes, &|| false).unwrap();
     bytes.as_chunks::<BYTES>().0.iter().map(PixelSums::from_bytes).collect()
 }
 
 /// Mean radiance of all pixels.
-fn mean(scene: &Scene, view: &FrameView) -> [f64; 3] {
+pub(super) fn mean(scene: &Scene, view: &FrameView) -> [f64; 3] {
     let frame = PreparedFrame::new(compiled(scene), view).unwrap();
     let mut all = PixelSums::default();
     let pixels = sums(&frame, 0..view.height);
@@ -78,7 +78,7 @@ fn mean(scene: &Scene, view: &FrameView) -> [f64; 3] {
 }
 
 /// A box of triangles and balls with lamps of every kind.
-fn furnished() -> Scene {
+pub(super) fn furnished() -> Scene {
     let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
     let quad = |a: DVec3, b: DVec3, c: DVec3, d: DVec3, material| {
         [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, uvs: None, material })
@@ -187,7 +187,7 @@ fn a_white_scene_in_a_white_sky_is_invisible() {
 }
 
 /// A grey floor, seen from above.
-fn floor() -> Scene {
+pub(super) fn floor() -> Scene {
     Scene {
         camera: camera_at(DVec3::new(0.0, 3.0, 0.0)),
         materials: vec![diffuse(Vec3::splat(0.5)), lamp(Vec3::new(8.0, 4.0, 2.0))],

@@ -5,7 +5,7 @@ use super::super::stage::{Stage, Watch};
 use super::group::Group;
 use super::queue::Path;
 use crate::bsdf::scattering::{Evaluated, Scattering, Setting};
-use crate::light::table::LightScene;
+use crate::light::table::{LightSamples, LightScene};
 use crate::rays::{BLOCKS, PrimitiveId, Ray, RaySource, SurfaceSource};
 use crate::sampler::{Dimension, Vertex, pair};
 use crate::simd::vector::Vec3x16;
@@ -16,10 +16,10 @@ use crate::surface::Materials;
 
 /// Upper end of shadow rays, as a share of the way to the light: far enough before a surface that emits for it to be no candidate of the
 /// filters of `intersect::block`.
-const BEFORE_LIGHT: f64 = 1.0 - 1.0 / (1 << 13) as f64;
+pub(super) const BEFORE_LIGHT: f64 = 1.0 - 1.0 / (1 << 13) as f64;
 
 /// Bounces after which roulette begins.
-const ROULETTE_FROM: u32 = 3;
+pub(super) const ROULETTE_FROM: u32 = 3;
 
 /// What sixteen paths bring to their surfaces, lane by lane.
 pub(super) struct Incoming<S: Simd> {
@@ -55,8 +55,11 @@ impl Group<'_> {
 
     #[inline(always)]
     fn shade_block<S: Simd, W: Watch>(&mut self, simd: S, bounce: u32, block: usize, watch: &mut W) {
-        let live = self.batch.live(block);
+        let mut live = self.batch.live(block);
         let mut incoming = self.incoming(simd, block, live);
+        if self.frame.features.volumes {
+            live &= !self.scatter_in_volumes(simd, bounce, block, &incoming, watch);
+        }
         let hit = self.surfaces.blocks[block].hit & live;
         if live & !hit != 0 {
             self.add_background(simd, bounce, block, live & !hit, &incoming);
@@ -284,9 +287,42 @@ impl Group<'_> {
 
     /// Two random numbers of each path.
     #[inline(always)]
-    fn numbers<S: Simd>(&self, simd: S, incoming: &Incoming<S>, dimension: Dimension) -> [f32x16<S>; 2] {
+    pub(super) fn numbers<S: Simd>(
+        &self,
+        simd: S,
+        incoming: &Incoming<S>,
+        dimension: Dimension,
+    ) -> [f32x16<S>; 2] {
         let (seeds, numbers) = (incoming.seeds.load(simd), incoming.numbers.load(simd));
         pair(simd, self.settings.sampler, seeds, numbers, dimension)
+    }
+
+    /// Selects a light for each of some points, and a point on it; `None` if no light reaches any.
+    #[inline(always)]
+    pub(super) fn select_light<S: Simd>(
+        &self,
+        simd: S,
+        bounce: u32,
+        points: (Vec3x16<S>, u32),
+        incoming: &Incoming<S>,
+    ) -> Option<LightSamples> {
+        let [select_by, _] = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Light));
+        let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::LightPoint));
+        let scene = LightScene { lights: &self.frame.lights, sky_rotation: self.frame.sky_rotation };
+        let mut samples = self.table?.sample(simd, &scene, points, self.selection(bounce), select_by, at);
+        if samples.live == 0 {
+            return None;
+        }
+        if samples.sky != 0 {
+            let mut radiance = samples.direction;
+            sky_radiance(self.frame, samples.sky, &mut radiance);
+            for lane in each_bit(samples.sky) {
+                for channel in 0..3 {
+                    samples.radiance[channel].0[lane] = radiance[channel].0[lane];
+                }
+            }
+        }
+        Some(samples)
     }
 
     /// Adds the light of one light, selected at random, where nothing is before it.
@@ -300,36 +336,13 @@ impl Group<'_> {
         (incoming, setting, scattering): (&Incoming<S>, &Setting<S>, &Scattering<S>),
         watch: &mut W,
     ) {
-        let Some(table) = self.table else { return };
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
-        let [select_by, _] = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Light));
-        let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::LightPoint));
-        let scene = LightScene { lights: &self.frame.lights, sky_rotation: self.frame.sky_rotation };
-        let mut samples = table.sample(simd, &scene, (points, lanes), self.selection(bounce), select_by, at);
-        if samples.live == 0 {
-            return;
-        }
-        if samples.sky != 0 {
-            let mut radiance = samples.direction;
-            sky_radiance(self.frame, samples.sky, &mut radiance);
-            for lane in each_bit(samples.sky) {
-                for channel in 0..3 {
-                    samples.radiance[channel].0[lane] = radiance[channel].0[lane];
-                }
-            }
-        }
+        let Some(samples) = self.select_light(simd, bounce, (points, lanes), incoming) else { return };
         let to_light = Vec3x16::load(simd, &samples.direction);
         let Evaluated { value, density } = scattering.eval(simd, to_light);
         let along = setting.geometric.dot(to_light);
-        let zero = splat(simd, 0.0);
-        let chosen = samples.density.load(simd);
-        let alone = select(mask_of(simd, samples.alone), zero, density);
-        let share = power_heuristic(simd, chosen, alone);
-        let light = incoming.weight.mul(value).mul(Vec3x16::load(simd, &samples.radiance));
-        let light = light.scale(share / select(chosen.simd_gt(zero), chosen, splat(simd, 1.0)));
-        let [r, g, b] = light.0;
-        let lit =
-            bits(r.max(g).max(b).simd_gt(zero)) & bits(along.simd_gt(zero)) & bits(chosen.simd_gt(zero));
+        let (light, lit) = sampled_light(simd, &samples, incoming.weight.mul(value), density);
+        let lit = lit & bits(along.simd_gt(splat(simd, 0.0)));
         let mut visible = lanes & samples.live & lit;
         let shadowed = visible & samples.shadows;
         if shadowed != 0 {
@@ -356,8 +369,31 @@ impl Group<'_> {
             visible &= !self.frame.occluded_of(&self.shadow_rays);
             watch.enter(Stage::Shading);
         }
+        let mut light = light;
+        if self.frame.features.volumes {
+            self.dim_in_volumes(simd, (points, visible), &samples, &mut light);
+        }
         self.add(simd, block, visible, bounce + 1, light);
     }
+}
+
+/// Light of samples that are scattered by `value`, in directions that the material samples with `density`: weighted by the power heuristic,
+/// over the density of the samples. Also the bits of the samples with any light.
+#[inline(always)]
+pub(super) fn sampled_light<S: Simd>(
+    simd: S,
+    samples: &LightSamples,
+    value: Vec3x16<S>,
+    density: f32x16<S>,
+) -> (Vec3x16<S>, u32) {
+    let zero = splat(simd, 0.0);
+    let chosen = samples.density.load(simd);
+    let alone = select(mask_of(simd, samples.alone), zero, density);
+    let share = power_heuristic(simd, chosen, alone);
+    let light = value.mul(Vec3x16::load(simd, &samples.radiance));
+    let light = light.scale(share / select(chosen.simd_gt(zero), chosen, splat(simd, 1.0)));
+    let [r, g, b] = light.0;
+    (light, bits(r.max(g).max(b).simd_gt(zero)) & bits(chosen.simd_gt(zero)))
 }
 
 /// Weight of a direction that one strategy finds with `density`, and another with `other`: d^2 / (d^2 + o^2).
@@ -377,10 +413,10 @@ fn limited<S: Simd>(simd: S, light: Vec3x16<S>, limit: f32) -> Vec3x16<S> {
 }
 
 #[inline(always)]
-fn arrays<S: Simd>(vectors: Vec3x16<S>) -> [[f32; LANES]; 3] {
+pub(super) fn arrays<S: Simd>(vectors: Vec3x16<S>) -> [[f32; LANES]; 3] {
     three!(axis => vectors.0[axis].to_array())
 }
 
-fn vector(lanes: &[[f32; LANES]; 3], lane: usize) -> glam::DVec3 {
+pub(super) fn vector(lanes: &[[f32; LANES]; 3], lane: usize) -> glam::DVec3 {
     glam::DVec3::new(f64::from(lanes[0][lane]), f64::from(lanes[1][lane]), f64::from(lanes[2][lane]))
 }

@@ -131,7 +131,7 @@ impl<S: Simd, T: RayQuery> LeafVisitor<S> for TriangleLeaves<'_, T> {
 impl Instance {
     /// Passes every triangle of this model that the ray may hit to a query.
     #[inline(always)]
-    fn search<S: Simd>(
+    pub(super) fn search<S: Simd>(
         &self,
         simd: S,
         ray: &Ray,

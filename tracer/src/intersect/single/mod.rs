@@ -9,6 +9,7 @@
 //!   filter          one ray against sixteen triangles
 //!   query           closest hit, any hit
 //!   transmittance   share of light that passes all surfaces
+//!   solid           where a ray crosses the surface of a closed mesh
 //!   leaves          the leaves of the scene's tree and of a mesh's tree
 //! ```
 
@@ -16,13 +17,23 @@ mod filter;
 mod leaves;
 mod near_ray;
 mod query;
+mod solid;
 #[cfg(test)]
 mod tests;
 mod transmittance;
 mod traversal;
 
+<<<<<<< HEAD
 use query::Closest;
 pub(super) use query::{Any, Candidate, RayQuery};
+||||||| 898bb96
+use query::{Any, Closest};
+pub(super) use query::{Candidate, RayQuery};
+=======
+use query::{Any, Closest};
+pub(super) use query::{Candidate, RayQuery};
+pub(super) use solid::SolidCrossing;
+>>>>>>> x-volumes
 pub(crate) use transmittance::Crossings;
 pub(super) use traversal::{Stack, with_stack};
 

@@ -43,6 +43,8 @@ pub struct SceneFeatures {
     pub normal_mapped: bool,
     /// A material is metallic-roughness.
     pub metallic_roughness: bool,
+    /// A volume scatters light.
+    pub volumes: bool,
 }
 
 impl SceneFeatures {
@@ -71,6 +73,7 @@ impl SceneFeatures {
             checkered: any(|material| material.checker.is_some()),
             normal_mapped: any(|material| material.normal_map.is_some()),
             metallic_roughness: any(|material| material.metallic_roughness.is_some()),
+            volumes: scene.volumes.iter().any(|volume| volume.density > 0.0),
         }
     }
 

@@ -10,6 +10,7 @@ mod quality;
 mod scale;
 mod setting;
 mod view;
+mod volume;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,7 @@ pub use quality::{ColorDepth, ExponentPrecision, Quality, Shading, word_of};
 pub use scale::RenderScale;
 pub use setting::Setting;
 pub use view::{Background, Camera, CameraKind, FovAxis, FrameView, RenderSettings, Sky, SkyPicture};
+pub use volume::{Volume, VolumeBoundary};
 
 use crate::material::Material;
 use crate::texture::TextureMap;
@@ -61,6 +63,8 @@ pub struct Scene {
     pub planes: Vec<Plane>,
     /// Single triangles of the scene file.
     pub triangles: Vec<Triangle>,
+    /// Volumes that scatter light; only the path integrator has them.
+    pub volumes: Vec<Volume>,
 }
 
 impl Scene {
@@ -93,6 +97,7 @@ impl Default for Scene {
             disks: Vec::new(),
             planes: Vec::new(),
             triangles: Vec::new(),
+            volumes: Vec::new(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The `[[model]]` tables of a scene file: each file is loaded once, each table becomes an instance.
+//! The models of `[[model]]` and `[[volume]]` tables of a scene file: each file is loaded once, each table becomes an instance.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -67,9 +67,9 @@ struct LoadedModel {
 
 impl Models {
     /// Resolves all files, so that a missing one is reported with its place in the scene file before any is loaded.
-    pub(super) fn open(
+    pub(super) fn open<'t>(
         scene: &Path,
-        models: &[ModelText],
+        models: impl Iterator<Item = &'t ModelText>,
         materials: MaterialsText<'_>,
         options: LoadOptions,
         limits: LoadLimits,
@@ -179,6 +179,17 @@ impl Models {
             scale: text.scale,
             group: text.group,
         })
+    }
+
+    /// The closed mesh that bounds a volume, placed. The model is loaded and compiled unless an instance of it is.
+    pub(super) fn boundary(
+        &mut self,
+        text: &ModelText,
+        locate: &impl Fn(Fault) -> SceneError,
+    ) -> Result<Model, SceneError> {
+        // Its one material is none of the scene's: it is not seen.
+        let model = self.instance(text, &mut Vec::new(), &BTreeMap::new(), locate)?;
+        Ok(Model { materials: Vec::new(), ..model })
     }
 
     /// All meshes. Files with the same content are one mesh.

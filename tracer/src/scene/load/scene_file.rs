@@ -14,9 +14,11 @@ use super::limits::LoadLimits;
 use super::textures::Textures;
 use crate::mesh::CompiledMesh;
 use crate::scene::NormalMap;
-use crate::scene::data::{Background, Camera, Lens, Scene};
+use crate::scene::data::{Background, Camera, Lens, Scene, Volume, VolumeBoundary};
 use crate::scene::import::{LoadOptions, MAX_SCENE_BYTES, SceneError, bytes};
-use crate::scene::toml::{self, Aim, CameraText, Fault, SceneText, TextureText, TexturesText};
+use crate::scene::toml::{
+    self, Aim, BoundaryText, CameraText, Fault, SceneText, TextureText, TexturesText, VolumeText,
+};
 
 /// Loads a scene file and everything that it names.
 pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
@@ -30,7 +32,9 @@ pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Res
     let read = toml::read(text).map_err(locate)?;
     let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| locate(w).to_string()).collect();
     let materials = MaterialsText { materials: &read.materials, textures: &read.textures };
-    let mut models = Models::open(path, &read.models, materials, options, limits).map_err(locate)?;
+    let bounding = read.volumes.iter().filter_map(VolumeText::model);
+    let of_file = read.models.iter().chain(bounding);
+    let mut models = Models::open(path, of_file, materials, options, limits).map_err(locate)?;
     let mut loaded = assemble(path, read, &mut models, &locate)?;
     warnings.append(&mut models.warnings);
     loaded.warnings = warnings;
@@ -91,6 +95,9 @@ fn assemble(
         let instance = models.instance(model, &mut scene.materials, &text.textures, locate)?;
         scene.models.push(instance);
     }
+    for volume in &text.volumes {
+        scene.volumes.push(loaded_volume(volume, models, locate)?);
+    }
     load_textures(&models.folder, &text.textures, &mut scene, &mut models.textures).map_err(locate)?;
     scene.background =
         background(&models.folder, &text.background.radiance, &mut models.textures).map_err(locate)?;
@@ -100,8 +107,10 @@ fn assemble(
     models.warnings.extend(uncut(&scene));
     let meshes = models.take_meshes();
     let file_of = |mesh: &Arc<CompiledMesh>| {
-        let mut files = scene.models.iter().zip(&text.models);
-        files.find(|(model, _)| model.mesh == mesh.id()).map(|(_, text)| PathBuf::from(&text.file))
+        let of_volumes = scene.volumes.iter().zip(&text.volumes);
+        let of_volumes = of_volumes.filter_map(|(volume, text)| volume.boundary.model().zip(text.model()));
+        let mut files = scene.models.iter().zip(&text.models).chain(of_volumes);
+        files.find(|(model, _)| model.mesh == mesh.id()).map(|(_, text)| text.file.clone())
     };
     let mesh_files = meshes.iter().map(|mesh| file_of(mesh).unwrap_or_default()).collect();
     let bounds = framing::bounds(&scene, &meshes);
@@ -119,6 +128,19 @@ fn assemble(
         scene.has_default_light = true;
     }
     Ok(LoadedScene { scene, meshes, mesh_files, textures, warnings: Vec::new() })
+}
+
+/// A volume with its model.
+fn loaded_volume(
+    text: &VolumeText,
+    models: &mut Models,
+    locate: &impl Fn(Fault) -> SceneError,
+) -> Result<Volume, SceneError> {
+    let boundary = match &text.boundary {
+        BoundaryText::Whole(boundary) => boundary.clone(),
+        BoundaryText::Model(model) => VolumeBoundary::Model(models.boundary(model, locate)?),
+    };
+    Ok(Volume { boundary, density: text.density, color: text.color })
 }
 
 /// A warning if alpha cuts out a material of a sphere or a plane, which have no holes.

@@ -35,13 +35,14 @@ use crate::material::Material;
 use crate::scene::data::{Disk, Integrator, Light, Plane, RenderSettings, Sphere, Triangle};
 use crate::scene::validate::{
     MAX_DISKS, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
+    MAX_VOLUMES,
 };
 
 pub(super) use background::{BackgroundText, PictureText, RadianceText, SkyPictureText};
 pub(super) use camera::{Aim, CameraText};
 pub(super) use fault::{Fault, place};
 pub(super) use material::{TextureText, TexturesText};
-pub(super) use objects::ModelText;
+pub(super) use objects::{BoundaryText, ModelText, VolumeText};
 
 const KEYS: &[&str] = &[
     "ambient",
@@ -58,6 +59,7 @@ const KEYS: &[&str] = &[
     "rectangle",
     "box",
     "group",
+    "volume",
 ];
 
 /// Number of triangles of a rectangle and of a box.
@@ -83,6 +85,7 @@ pub(super) struct SceneText {
     pub(super) disks: Vec<Disk>,
     /// Single triangles, then those of rectangles and boxes.
     pub(super) triangles: Vec<Triangle>,
+    pub(super) volumes: Vec<VolumeText>,
     /// Accepted input that is probably a mistake.
     pub(super) warnings: Vec<Fault>,
 }
@@ -187,6 +190,11 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let mut materials = read_materials(top, integrator, reading, first);
     let plane = |table: Table<'_>| objects::plane(table, &mut materials, reading);
     let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
+    if *integrator == Integrator::Direct {
+        reading.idle(top, "volume", knobs::with(integrator));
+    }
+    let volume = |table: Table<'_>| objects::volume(table, reading);
+    let volumes = list(top, "volume", "[[volume]]", (objects::VOLUME_KEYS, MAX_VOLUMES), volume, first);
     let objects = read_objects(top, &mut materials, reading, first);
     reading.warnings.sort_by_key(|warning| warning.at);
     let (materials, textures) = materials.into_parts();
@@ -203,6 +211,7 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
         planes,
         disks: objects.disks,
         triangles: objects.triangles,
+        volumes,
         warnings: std::mem::take(&mut reading.warnings),
     })
 }

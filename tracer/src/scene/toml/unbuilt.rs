@@ -5,7 +5,6 @@ const UNBUILT: &[(&str, &[&str], &str)] = &[
     ("[camera]", &["shutter"], "motion blur"),
     ("[[model]]", &["translate_end", "rotate_end"], "motion blur"),
     ("[[sphere]]", &["center_end"], "motion blur"),
-    ("the scene file", &["volume"], "a volume"),
 ];
 
 /// The message about a key that is not built yet.

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::data::{
     Attenuation, Background, Camera, CameraKind, FrameView, Integrator, Lens, Light, LightKind, Model,
-    PixelFormat, Quality, RenderSettings, Scene, SkyPicture, ToneMapping, Triangle,
+    PixelFormat, Quality, RenderSettings, Scene, SkyPicture, ToneMapping, Triangle, Volume, VolumeBoundary,
 };
 use crate::image::MAX_SIDE;
 use crate::material::{Checker, MAX_EXPONENT, Material, NormalMap};
@@ -30,6 +30,8 @@ pub const MAX_DISKS: usize = 1 << 20;
 pub const MAX_PLANES: usize = 1024;
 /// Largest number of single triangles; larger sets belong into a model.
 pub const MAX_TRIANGLES: usize = 1 << 20;
+/// Largest number of volumes; every path tests all of them.
+pub const MAX_VOLUMES: usize = 64;
 /// Largest number of material slots of one model.
 pub const MAX_SLOTS: usize = 1 << 16;
 /// Largest number of rays per pixel with the direct integrator.
@@ -90,9 +92,10 @@ pub enum ValidateError {
 type Check = Result<(), ValidateError>;
 
 impl Scene {
-    /// Hashes of the meshes of all models.
+    /// Hashes of the meshes of all models and volumes.
     pub fn mesh_ids(&self) -> BTreeSet<MeshId> {
-        self.models.iter().map(|model| model.mesh).collect()
+        let of_volumes = self.volumes.iter().filter_map(|volume| volume.boundary.model());
+        self.models.iter().chain(of_volumes).map(|model| model.mesh).collect()
     }
 
     /// Hashes of all textures.
@@ -133,7 +136,8 @@ impl Scene {
             require(is_positive(plane.size), || format!("{name}.size"), "above zero and finite")?;
             self.check_material_index(plane.material, name)
         })?;
-        each("triangles", &self.triangles, |triangle, name| self.check_triangle(triangle, name))
+        each("triangles", &self.triangles, |triangle, name| self.check_triangle(triangle, name))?;
+        each("volumes", &self.volumes, |volume, name| self.check_volume(volume, name))
     }
 
     fn check_counts(&self) -> Check {
@@ -146,6 +150,7 @@ impl Scene {
             ("disks", self.disks.len(), MAX_DISKS),
             ("planes", self.planes.len(), MAX_PLANES),
             ("single triangles", self.triangles.len(), MAX_TRIANGLES),
+            ("volumes", self.volumes.len(), MAX_VOLUMES),
         ] {
             if count > limit {
                 return Err(ValidateError::TooMany { what, count, limit });
@@ -170,6 +175,27 @@ impl Scene {
             determinant != 0.0 && determinant.is_finite() && model.group.inverse().is_finite()
         };
         require(invertible, || format!("{name}.group"), "finite and invertible")
+    }
+
+    fn check_volume(&self, volume: &Volume, name: &str) -> Check {
+        let density = (0.0..=MAX_COORDINATE).contains(&volume.density);
+        require(density, || format!("{name}.density"), "not negative, at most 1e30")?;
+        require(is_color(volume.color, 1.0), || format!("{name}.color"), "from 0 to 1")?;
+        match &volume.boundary {
+            VolumeBoundary::Sphere { center, radius } => {
+                require(is_point(*center), || format!("{name}.center"), FINITE)?;
+                require(is_positive(*radius), || format!("{name}.radius"), "above zero and finite")
+            }
+            VolumeBoundary::Box { lower, upper } => {
+                require(is_point(*lower) && is_point(*upper), || format!("{name}.box"), FINITE)?;
+                require(lower.cmplt(*upper).all(), || format!("{name}.box"), "of three extents above zero")
+            }
+            VolumeBoundary::Model(model) => {
+                let bare = || format!("{name}.model.materials");
+                require(model.materials.is_empty(), bare, "empty")?;
+                self.check_model(model, &format!("{name}.model"))
+            }
+        }
     }
 
     fn check_background(&self) -> Check {

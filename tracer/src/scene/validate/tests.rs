@@ -364,3 +364,29 @@ fn passes_and_formats_are_those_of_the_integrator() {
         assert!(message.starts_with(expected), "{message} / {expected}");
     }
 }
+
+#[test]
+fn volumes_out_of_bounds_are_found_by_name() {
+    let volume = |boundary| Volume { boundary, density: 1.0, color: Vec3::ONE };
+    let ball = |radius| VolumeBoundary::Sphere { center: DVec3::ZERO, radius };
+    let with = |volume: Volume| spoiled(|s| s.volumes = vec![volume]);
+    let mut sound = scene();
+    sound.volumes = vec![volume(ball(1.0)); MAX_VOLUMES];
+    assert_eq!(sound.validate(), Ok(()));
+    sound.volumes.push(volume(ball(1.0)));
+    assert!(sound.validate().unwrap_err().to_string().contains("65 volumes; 64 are allowed"));
+    assert!(with(volume(ball(0.0))).starts_with("volumes[0].radius"));
+    assert!(with(Volume { density: -1.0, ..volume(ball(1.0)) }).starts_with("volumes[0].density"));
+    assert!(with(Volume { density: f64::NAN, ..volume(ball(1.0)) }).starts_with("volumes[0].density"));
+    assert!(with(Volume { color: Vec3::splat(1.5), ..volume(ball(1.0)) }).starts_with("volumes[0].color"));
+    let flat = VolumeBoundary::Box { lower: DVec3::ZERO, upper: DVec3::new(1.0, 0.0, 1.0) };
+    assert!(with(volume(flat)).starts_with("volumes[0].box"));
+    let bare = Model { materials: Vec::new(), ..scene().models[0].clone() };
+    sound.volumes = vec![volume(VolumeBoundary::Model(Model { mesh: MeshId([8; 32]), ..bare.clone() }))];
+    assert_eq!(sound.validate(), Ok(()));
+    assert_eq!(sound.mesh_ids(), BTreeSet::from([MeshId([7; 32]), MeshId([8; 32])]));
+    let seen = Model { materials: vec![0], ..bare.clone() };
+    assert!(with(volume(VolumeBoundary::Model(seen))).starts_with("volumes[0].model.materials"));
+    let flat = Model { scale: DVec3::ZERO, ..bare };
+    assert!(with(volume(VolumeBoundary::Model(flat))).starts_with("volumes[0].model.scale"));
+}

@@ -235,3 +235,21 @@ fn a_compiled_model_reads_pictures_in_its_folder_or_below_only() {
     let LoadedScene { textures, warnings, .. } = load_with(&folder.path("other/c.rfm"), allowed).unwrap();
     assert_eq!((textures.len(), warnings), (1, Vec::new()));
 }
+
+#[test]
+fn a_model_that_bounds_a_volume_is_loaded_and_is_no_model_of_the_scene() {
+    let scene = "[render]\nintegrator = \"path\"\n[[volume]]\nmodel = \"a.obj\"\ntranslate = [1, 2, 3]\n";
+    let folder = Folder::with(&[
+        ("s.toml", &format!("{CAMERA}{scene}")),
+        ("a.obj", TRIANGLE),
+        ("gone.toml", &format!("{CAMERA}{}", scene.replace("a.obj", "b.obj"))),
+    ]);
+    let LoadedScene { scene, meshes, mesh_files, warnings, .. } = folder.load("s.toml");
+    assert_eq!(warnings, [""; 0]);
+    assert!(scene.models.is_empty() && scene.materials.is_empty());
+    assert_eq!((meshes.len(), mesh_files), (1, vec![PathBuf::from("a.obj")]));
+    let bounding = scene.volumes[0].boundary.model().unwrap();
+    assert_eq!((bounding.mesh, bounding.translate), (meshes[0].id(), DVec3::new(1.0, 2.0, 3.0)));
+    assert_eq!(scene.validate(), Ok(()));
+    assert!(folder.refusal("gone.toml").contains("cannot read the model b.obj"));
+}

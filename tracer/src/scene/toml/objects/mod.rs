@@ -3,6 +3,7 @@
 mod model;
 mod primitives;
 mod triangles;
+mod volume;
 
 use super::fault::{Fault, Read, shortened};
 use super::table::Table;
@@ -11,6 +12,8 @@ pub(crate) use model::ModelText;
 pub(super) use model::{MODEL_KEYS, model, scale};
 pub(super) use primitives::{DISK_KEYS, PLANE_KEYS, SPHERE_KEYS, disk, plane, sphere};
 pub(super) use triangles::{BOX_KEYS, RECTANGLE_KEYS, TRIANGLE_KEYS, cuboid, rectangle, triangle};
+pub(crate) use volume::{BoundaryText, VolumeText};
+pub(super) use volume::{VOLUME_KEYS, volume};
 
 /// The name that the file gives an object or a group.
 #[derive(Clone, Debug, PartialEq)]

@@ -56,10 +56,7 @@ pub(in crate::scene::toml) fn model(
         let message = "`crease_angle` in [[model]] has no effect where `normals` is \"flat\"".to_owned();
         reading.warn(at, message);
     }
-    let rotate = table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
-    let scale = table.read("scale", scale)?.unwrap_or(DVec3::ONE);
-    let up = table.read("up", |value| value.word(&Up::WORDS))?.unwrap_or_default();
-    let (rotate, scale) = up.before(rotate, scale);
+    let [translate, rotate, scale] = placement(table)?;
     Ok(ModelText {
         file: PathBuf::from(name),
         at: file.start(),
@@ -67,11 +64,21 @@ pub(in crate::scene::toml) fn model(
         material_at: table.get("material").map_or(0, |value| value.start()),
         normals,
         crease_angle,
-        translate: table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO),
+        translate,
         rotate,
         scale,
         group: DMat3::IDENTITY,
     })
+}
+
+/// Translation, rotation and scale of a file.
+pub(super) fn placement(table: Table<'_>) -> Read<[DVec3; 3]> {
+    let rotate = table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
+    let scale = table.read("scale", scale)?.unwrap_or(DVec3::ONE);
+    let up = table.read("up", |value| value.word(&Up::WORDS))?.unwrap_or_default();
+    let (rotate, scale) = up.before(rotate, scale);
+    let translate = table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
+    Ok([translate, rotate, scale])
 }
 
 /// Factors along three axes, none of them zero.

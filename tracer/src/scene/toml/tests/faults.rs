@@ -138,7 +138,6 @@ fn unsupported_features_are_refused_by_name() {
         ("[[model]]\nfile = \"a.obj\"\ntranslate_end = [0,0,0]", "3:1", &["`translate_end`", yet]),
         ("[[model]]\nfile = \"a.obj\"\nrotate_end = [0,0,0]", "3:1", &["`rotate_end`", yet]),
         ("[[sphere]]\ncenter_end = [0,0,0]", "2:1", &["`center_end` in [[sphere]]", yet]),
-        ("[[volume]]\ndensity = 1", "1:3", &["a volume (`volume` in the scene file)", yet]),
     ]);
     assert_eq!(warnings("[render]\nintegrator = \"direct\""), [""; 0]);
 }

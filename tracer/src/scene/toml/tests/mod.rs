@@ -8,6 +8,7 @@ mod paths;
 mod shapes;
 mod textures;
 mod views;
+mod volumes;
 
 use glam::{DVec3, Vec2};
 use proptest::prelude::*;
