@@ -100,7 +100,16 @@ impl Oracle {
             textures.iter().filter(|_| trilinear).map(|texture| pyramid::levels(texture)).collect();
         let shown = scene.shown_directly().filter(|_| view.shows_materials_directly());
         let (scene, textures) = (shown.unwrap_or_else(|| scene.clone()), textures.to_vec());
-        Self { scene, view: *view, textures, primitives, light_points: Vec::new(), pyramids, size, half_diagonal }
+        Self {
+            scene,
+            view: *view,
+            textures,
+            primitives,
+            light_points: Vec::new(),
+            pyramids,
+            size,
+            half_diagonal,
+        }
     }
 
     /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,

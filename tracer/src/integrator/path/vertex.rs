@@ -138,6 +138,9 @@ impl Group<'_> {
             let other = table.density_of_sky(simd, self.frame.sky_rotation, selection, incoming.direction);
             light = light.scale(power_heuristic(simd, incoming.density, other));
         }
+        if self.frame.features.transparent {
+            light = self.absorbed_ahead(simd, (block, lanes), &[f64::INFINITY; LANES], &light);
+        }
         self.add(simd, block, lanes, bounce, light);
     }
 
@@ -322,6 +325,11 @@ impl Group<'_> {
         let share = power_heuristic(simd, chosen, alone);
         let light = incoming.weight.mul(value).mul(Vec3x16::load(simd, &samples.radiance));
         let light = light.scale(share / select(chosen.simd_gt(zero), chosen, splat(simd, 1.0)));
+        let light = if self.frame.features.transparent {
+            self.absorbed_ahead(simd, (block, samples.live), &samples.distance, &light)
+        } else {
+            light
+        };
         let [r, g, b] = light.0;
         let lit =
             bits(r.max(g).max(b).simd_gt(zero)) & bits(along.simd_gt(zero)) & bits(chosen.simd_gt(zero));

@@ -71,8 +71,7 @@ impl PathOracle<'_> {
             if transparent { c_t * (1.0 - share) } else { DVec3::ZERO },
         ];
         let mirrored = optics::leaving(optics::mirrored(direction, ns), surface.ng).normalize();
-        let bent =
-            if material.thin { Some(direction) } else { optics::bent(direction, ns, sides.indices) };
+        let bent = if material.thin { Some(direction) } else { optics::bent(direction, ns, sides.indices) };
         let refracted = bent.map(|bent| optics::leaving(bent, -surface.ng).normalize());
         Ok(Parts { normal: surface.ns, colors, mirrored, refracted })
     }

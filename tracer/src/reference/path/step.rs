@@ -81,8 +81,7 @@ impl PathOracle<'_> {
             sum.add(bounce, self.seen_background(bounce, &path));
             return Ok(None);
         };
-        path.weight *=
-            path.bodies.remaining(materials, (surface.material_index, surface.front), surface.way);
+        path.weight *= path.bodies.remaining(materials, (surface.material_index, surface.front), surface.way);
         sum.add(bounce, self.emitted(bounce, &path, &surface));
         if oracle.material(&surface).unlit {
             sum.add(bounce, path.weight * oracle.diffuse(&surface));

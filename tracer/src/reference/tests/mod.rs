@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   mirrors   reflection, and the number of rays
+//!   paths     single paths of the path integrator
 //!   glass     refraction, absorption, total internal reflection, energy
 //!   shadows   penumbrae, transparent occluders, smooth surfaces
 //!   cameras   rays of the camera
@@ -14,6 +15,7 @@ mod cameras;
 mod filters;
 mod glass;
 mod mirrors;
+mod paths;
 mod patterns;
 mod shadows;
 mod skies;
