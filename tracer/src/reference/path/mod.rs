@@ -7,7 +7,7 @@
 //! ```
 //!
 //! L_e at a hit has the weight of multiple importance sampling by the power heuristic (Veach 1997), and so has the light of one light that
-//! is selected at each vertex. Two things are shared with the integrator beside the scene: the random numbers, and the piecewise constant
+//! is selected at each vertex. Besides the scene, two things are shared with the integrator: the random numbers, and the piecewise constant
 //! distribution of the light of a panorama. All directions, densities, values and weights are computed here.
 //!
 //! Surfaces are diffuse, mirrors, glass, sheets, emitters, and sums of these. Rough reflection is missing: such paths have no result.

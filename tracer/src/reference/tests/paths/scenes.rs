@@ -121,7 +121,7 @@ pub(super) fn room_of_mirrors() -> Furnished {
     Furnished::plain(scene)
 }
 
-/// A floor under water that absorbs light, with a lamp and a point light in the water; the water has no bottom beside the floor.
+/// A floor under water that absorbs light, with a lamp and a point light in the water; the water has no bottom around the floor.
 pub(super) fn water() -> Furnished {
     let mut scene = room();
     scene.lights = vec![light(LightKind::Point { position: DVec3::new(0.9, -0.2, 0.5) }, Vec3::ONE)];
