@@ -78,6 +78,14 @@ impl Media {
         Some(DVec3::from_array(absorption.to_array().map(|share| libm::pow(f64::from(share), way))))
     }
 
+    /// Share of light that is left after a way inside that ends at no surface; `way` in world units, which may be infinite. `None` if the
+    /// innermost body absorbs nothing.
+    pub(crate) fn transmittance_ahead(&self, materials: &[Material], way: f64) -> Option<DVec3> {
+        let body = &materials[self.innermost()? as usize];
+        let left = || body.absorption.to_array().map(|share| libm::pow(f64::from(share), way));
+        body.absorbs().then(|| DVec3::from_array(left()))
+    }
+
     /// The absorption of the body that a ray is inside of, if it absorbs.
     fn absorbing(&self, materials: &[Material], (material, front): (u32, bool)) -> Option<Vec3> {
         // The back of a body that the ray never entered: it started inside.
@@ -153,5 +161,11 @@ mod tests {
         let started = Media::default().transmittance(&materials, (0, false), 1.0).unwrap();
         assert!((started - DVec3::new(0.5, 1.0, 0.25)).length() < 1e-12);
         assert_eq!(inside.transmittance_to_infinity(&materials), Some(DVec3::new(0.0, 1.0, 0.0)));
+        assert_eq!(inside.transmittance_ahead(&materials, f64::INFINITY), Some(DVec3::new(0.0, 1.0, 0.0)));
+        assert_eq!(
+            inside.transmittance_ahead(&materials, 2.0),
+            inside.transmittance(&materials, (0, false), 2.0)
+        );
+        assert_eq!(Media::default().transmittance_ahead(&materials, 2.0), None);
     }
 }

@@ -71,9 +71,12 @@ fn add_model(frame: &PreparedFrame, item: u32, index: usize, sources: &mut Sourc
     }
 }
 
-/// Whether a material makes primitives sources.
+/// Whether a material makes primitives sources. Unlit ones show their diffuse colour as well, which no selected light has.
 fn is_source(material: &Material) -> bool {
-    material.is_emissive() && material.emission_texture.is_none() && material.cutout.is_none()
+    material.is_emissive()
+        && !material.unlit
+        && material.emission_texture.is_none()
+        && material.cutout.is_none()
 }
 
 /// A_j at a distance in world units.

@@ -63,6 +63,13 @@ impl Bodies {
         DVec3::from_array(body.absorption.to_array().map(|share| libm::pow(f64::from(share), way)))
     }
 
+    /// Share of light that remains after a way of d world units that ends at no surface.
+    pub(super) fn remaining_in_innermost(&self, materials: &[Material], way: f64) -> DVec3 {
+        let Some(&body) = self.0.last() else { return DVec3::ONE };
+        let absorption = materials[body as usize].absorption.to_array();
+        DVec3::from_array(absorption.map(|share| libm::pow(f64::from(share), way)))
+    }
+
     /// The same after an infinite way.
     pub(super) fn remaining_at_infinity(&self, materials: &[Material]) -> DVec3 {
         let Some(&body) = self.0.last() else { return DVec3::ONE };

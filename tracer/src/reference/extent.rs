@@ -50,7 +50,7 @@ fn disc(across: DVec3) -> Vec<DVec3> {
 
 /// The map of the square [-1, 1]^2 to the unit disc that keeps areas in proportion (Shirley and Chiu, "A Low Distortion Map
 /// Between Disk and Square", 1997).
-fn concentric(a: f64, b: f64) -> DVec2 {
+pub(super) fn concentric(a: f64, b: f64) -> DVec2 {
     let (r, angle) = if a.abs() > b.abs() {
         (a, FRAC_PI_4 * b / a)
     } else if b != 0.0 {

@@ -23,7 +23,7 @@ pub(super) fn flatten(scene: &Scene, meshes: &[Arc<CompiledMesh>], view: &FrameV
     for (index, model) in scene.models.iter().enumerate() {
         let find = |id: MeshId| meshes.iter().find(|mesh| mesh.id() == id);
         let Some(mesh) = find(model.mesh) else { continue };
-        let linear = linear(model, view);
+        let linear = linear(model, view.spin);
         let scale = libm::exp2(f64::from(mesh.exponent()));
         let place = |p: Vec3| linear * (p.as_dvec3() * scale + mesh.center()) + (model.translate - eye);
         let placed = digits(&[model.translate, linear * mesh.center(), linear * DVec3::splat(scale), eye]);
@@ -91,7 +91,7 @@ impl Oracle {
         match name {
             Name::Model { model, .. } => {
                 let model = &self.scene.models[model];
-                linear(model, &self.view).inverse() * (in_world - model.translate)
+                linear(model, self.view.spin).inverse() * (in_world - model.translate)
             }
             Name::Sphere(index) => in_world - self.scene.spheres[index].center,
             Name::Triangle(index) => in_world - self.scene.triangles[index].vertices[0],
@@ -113,10 +113,10 @@ impl Oracle {
     }
 }
 
-/// Linear part of a model's transform to the world.
-fn linear(model: &Model, view: &FrameView) -> DMat3 {
+/// Linear part of a model's transform to the world, with a spin in degrees about +Y.
+pub(super) fn linear(model: &Model, spin: f64) -> DMat3 {
     let own = rotation(model.rotate.to_array()) * DMat3::from_diagonal(model.scale);
-    rotation([0.0, view.spin, 0.0]) * model.group * own
+    rotation([0.0, spin, 0.0]) * model.group * own
 }
 
 /// Rounding error of points.

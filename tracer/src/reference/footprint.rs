@@ -60,6 +60,6 @@ impl Oracle {
             CameraKind::Orthographic { view_height } => view_height / camera.zoom / height,
             CameraKind::Fisheye => camera.fov.to_radians() / width.min(height) * distance,
         };
-        of_pixel / f64::from(self.view.samples.isqrt())
+        of_pixel / f64::from(self.view.grid())
     }
 }

@@ -24,6 +24,7 @@
 //!   optics       reflection, refraction, Fresnel's equations
 //!   bodies       the transparent bodies around a ray
 //!   bounce       reflected and transmitted rays
+//!   path         single paths of the path integrator
 //!   auxiliary    pictures without light: normals, depth, items, diffuse colours
 //! ```
 
@@ -38,6 +39,7 @@ mod flatten;
 mod footprint;
 mod material;
 mod optics;
+mod path;
 mod pyramid;
 mod shading;
 mod shape;
@@ -62,6 +64,7 @@ use crate::scene::{Filter, FrameView, Light, Scene, TextureMap};
 use crate::srgb;
 use crate::texture::Texture;
 use cull::Boxes;
+pub use path::PathOracle;
 use pyramid::Level;
 use shape::Primitive;
 use visibility::Found;
@@ -81,6 +84,8 @@ pub struct Oracle {
     /// The levels of each texture; none if no texture is filtered by them.
     pyramids: Vec<Vec<Level>>,
     size: f64,
+    /// Half of the diagonal of all finite objects, in world units.
+    half_diagonal: Option<f64>,
 }
 
 impl Oracle {
@@ -94,6 +99,7 @@ impl Oracle {
     ) -> Self {
         let primitives = flatten::flatten(scene, meshes, view);
         let boxes = Boxes::new(&primitives);
+        let half_diagonal = path::half_diagonal(scene, meshes);
         let size = primitives.iter().map(|p| p.shape.size()).fold(0.0, f64::max);
         let filter_of = |map: &TextureMap| view.quality.filter.unwrap_or(map.filter);
         let trilinear = scene.textures.iter().any(|map| filter_of(map) == Filter::Trilinear);
@@ -101,8 +107,17 @@ impl Oracle {
             textures.iter().filter(|_| trilinear).map(|texture| pyramid::levels(texture)).collect();
         let shown = scene.shown_directly().filter(|_| view.shows_materials_directly());
         let (scene, textures) = (shown.unwrap_or_else(|| scene.clone()), textures.to_vec());
-        let light_points = Vec::new();
-        Self { scene, view: *view, textures, primitives, boxes, light_points, pyramids, size }
+        Self {
+            scene,
+            view: *view,
+            textures,
+            primitives,
+            boxes,
+            light_points: Vec::new(),
+            pyramids,
+            size,
+            half_diagonal,
+        }
     }
 
     /// Replaces the dense sampling of lights with a radius. For each light of the scene, sets of the points that shadow rays go to,

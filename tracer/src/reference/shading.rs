@@ -50,7 +50,7 @@ impl Oracle {
 }
 
 /// A_j at a distance.
-fn attenuation(light: &Light, r: f64) -> f64 {
+pub(super) fn attenuation(light: &Light, r: f64) -> f64 {
     match (light.kind, light.attenuation) {
         (LightKind::Directional { .. }, _) | (_, Attenuation::None) => 1.0,
         (_, Attenuation::InverseSquare) => 1.0 / (r * r),
@@ -61,7 +61,7 @@ fn attenuation(light: &Light, r: f64) -> f64 {
 }
 
 /// B_j for the unit vector to the light.
-fn beam(kind: &LightKind, l: DVec3) -> f64 {
+pub(super) fn beam(kind: &LightKind, l: DVec3) -> f64 {
     let LightKind::Spot { direction, beam_angle, penumbra, .. } = *kind else { return 1.0 };
     let outer = libm::cos((beam_angle / 2.0).to_radians());
     let inner = libm::cos((beam_angle / 2.0 - penumbra).max(0.0).to_radians());

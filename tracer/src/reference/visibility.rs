@@ -82,9 +82,24 @@ impl Oracle {
 
     /// Share of light per channel that passes all surfaces between a point and a light: the product of their transmitted shares.
     pub(super) fn unoccluded(&self, start: &ShadowStart, to_light: DVec3, reach: f64) -> DVec3 {
+        let mut share = DVec3::ONE;
+        self.visit_between(start, to_light, reach, |_, primitive| {
+            share *= self.passing_share(primitive);
+            share != DVec3::ZERO
+        });
+        share
+    }
+
+    /// Calls a function with the primitives between a point and a light, in no order, once for each crossing, as long as it returns `true`.
+    pub(super) fn visit_between(
+        &self,
+        start: &ShadowStart,
+        to_light: DVec3,
+        reach: f64,
+        mut visit: impl FnMut(usize, &Primitive) -> bool,
+    ) {
         let point = start.position;
         let near = NEAR * (self.size + point.length()) / to_light.length();
-        let mut share = DVec3::ONE;
         for index in self.boxes.candidates(point, to_light) {
             let primitive = &self.primitives[index];
             let flat = !matches!(primitive.shape, Shape::Sphere { .. });
@@ -93,17 +108,13 @@ impl Oracle {
             }
             let mut from = near;
             while let Some(hit) = primitive.shape.hit(point, to_light, from).filter(|hit| hit.t < reach) {
-                if self.is_present(primitive, &hit) {
-                    share *= self.passing_share(primitive);
+                if self.is_present(primitive, &hit) && !visit(index, primitive) {
+                    return;
                 }
                 // The second side of a sphere.
                 from = hit.t * (1.0 + F64_ERROR);
             }
-            if share == DVec3::ZERO {
-                break;
-            }
         }
-        share
     }
 
     /// Share of light that shadow rays keep at a surface.

@@ -37,6 +37,7 @@ pub use uv::{MAX_UV, are_usable, split_repeats, without_repeats};
 pub(crate) use alpha::LEAST_ALPHA;
 #[cfg(feature = "import")]
 pub(crate) use blob::check_size;
+pub(crate) use distribution::Distribution;
 pub(crate) use uv::is_usable;
 
 /// Most texels of one texture: 8192 x 8192, 192 or 256 MiB.

@@ -68,4 +68,25 @@ impl Group<'_> {
             incoming.weight = incoming.weight.mul(Vec3x16::load(simd, &left));
         }
     }
+    /// Light from ahead of paths, or of their hits, times the share that is left after ways that end at no surface; `ways` in eye units.
+    #[inline(never)]
+    pub(super) fn absorbed_ahead<S: Simd>(
+        &self,
+        simd: S,
+        (block, lanes): (usize, u32),
+        ways: &[f64; LANES],
+        light: &Vec3x16<S>,
+    ) -> Vec3x16<S> {
+        let mut left = [Lanes([1.0; LANES]); 3];
+        for lane in each_bit(lanes) {
+            let way = ways[lane] / self.frame.per_unit;
+            let media = &self.path(block, lane).media;
+            if let Some(share) = media.transmittance_ahead(&self.frame.scene().materials, way) {
+                for channel in 0..3 {
+                    left[channel].0[lane] = share[channel] as f32;
+                }
+            }
+        }
+        light.mul(Vec3x16::load(simd, &left))
+    }
 }

@@ -141,6 +141,9 @@ impl Group<'_> {
             let other = table.density_of_sky(simd, self.frame.sky_rotation, selection, incoming.direction);
             light = light.scale(power_heuristic(simd, incoming.density, other));
         }
+        if self.frame.features.transparent {
+            light = self.absorbed_ahead(simd, (block, lanes), &[f64::INFINITY; LANES], &light);
+        }
         self.add(simd, block, lanes, bounce, light);
     }
 
@@ -343,6 +346,11 @@ impl Group<'_> {
         let along = setting.geometric.dot(to_light);
         let (light, lit) = sampled_light(simd, &samples, incoming.weight.mul(value), density);
         let lit = lit & bits(along.simd_gt(splat(simd, 0.0)));
+        let light = if self.frame.features.transparent {
+            self.absorbed_ahead(simd, (block, samples.live), &samples.distance, &light)
+        } else {
+            light
+        };
         let mut visible = lanes & samples.live & lit;
         let shadowed = visible & samples.shadows;
         if shadowed != 0 {

@@ -23,17 +23,9 @@ mod tests;
 mod transmittance;
 mod traversal;
 
-<<<<<<< HEAD
 use query::Closest;
 pub(super) use query::{Any, Candidate, RayQuery};
-||||||| 898bb96
-use query::{Any, Closest};
-pub(super) use query::{Candidate, RayQuery};
-=======
-use query::{Any, Closest};
-pub(super) use query::{Candidate, RayQuery};
 pub(super) use solid::SolidCrossing;
->>>>>>> x-volumes
 pub(crate) use transmittance::Crossings;
 pub(super) use traversal::{Stack, with_stack};
 

@@ -3,6 +3,7 @@
 //! ```text
 //!   cull      boxes of triangles
 //!   mirrors   reflection, and the number of rays
+//!   paths     single paths of the path integrator
 //!   glass     refraction, absorption, total internal reflection, energy
 //!   shadows   penumbrae, transparent occluders, smooth surfaces
 //!   cameras   rays of the camera
@@ -16,6 +17,7 @@ mod cull;
 mod filters;
 mod glass;
 mod mirrors;
+mod paths;
 mod patterns;
 mod shadows;
 mod skies;

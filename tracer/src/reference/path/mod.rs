@@ -1,0 +1,77 @@
+//! Single paths in `f64`: the radiance of one sample of a pixel by the path integrator's estimator, from the same random numbers.
+//!
+//! Written from the rendering equation (Kajiya, "The rendering equation", 1986), to be compared path by path:
+//!
+//! ```text
+//! L = L_e + integral f L cos
+//! ```
+//!
+//! L_e at a hit has the weight of multiple importance sampling by the power heuristic (Veach 1997), and so has the light of one light that
+//! is selected at each vertex. Besides the scene, two things are shared with the integrator: the random numbers, and the piecewise constant
+//! distribution of the light of a panorama. All directions, densities, values and weights are computed here.
+//!
+//! Surfaces are diffuse, mirrors, glass, sheets, emitters, and sums of these. Rough reflection is missing: such paths have no result.
+//!
+//! ```text
+//!   numbers      random numbers of a sample
+//!   start        the ray of the camera: place in the pixel, place on the lens
+//!   hemisphere   directions around a normal
+//!   size         size of the scene, which powers of lights depend on
+//!   sources      the lights of paths, with their power
+//!   aim          directions to a source, and their densities
+//!   parts        how a surface scatters light
+//!   arriving     light of lights that are aimed at
+//!   step         a path from vertex to vertex
+//! ```
+
+mod aim;
+mod arriving;
+mod hemisphere;
+mod numbers;
+mod parts;
+mod size;
+mod sources;
+mod start;
+mod step;
+
+use super::Oracle;
+use super::camera::CameraRay;
+use crate::scene::PathSettings;
+use numbers::Numbers;
+pub(super) use size::half_diagonal;
+use sources::Sources;
+use step::{Path, Sum};
+
+/// Paths of an oracle whose view has the path integrator.
+pub struct PathOracle<'a> {
+    oracle: &'a Oracle,
+    settings: PathSettings,
+    sources: Sources,
+}
+
+impl Oracle {
+    /// The paths of the view; `None` unless it has the path integrator.
+    pub fn paths(&self) -> Option<PathOracle<'_>> {
+        let settings = *self.view.integrator.path()?;
+        Some(PathOracle { oracle: self, settings, sources: Sources::of(self) })
+    }
+}
+
+impl PathOracle<'_> {
+    /// Linear RGB of sample `number` of pixel (x, y), before it is bounded and rounded to the steps of [`crate::PixelSums`]. `None` if
+    /// the path meets a material with rough reflection.
+    pub fn radiance(&self, x: u32, y: u32, number: u32) -> Option<[f64; 3]> {
+        let numbers = Numbers::new(&self.settings, [x, y], number);
+        let CameraRay { ray, in_picture } = self.camera_ray([x, y], &numbers);
+        if !in_picture {
+            return Some(self.oracle.background_of_camera(ray.direction).to_array());
+        }
+        let mut sum = Sum::new(f64::from(self.settings.clamp_indirect));
+        let mut path = Some(Path::begin(ray));
+        for bounce in 0..=u32::from(self.oracle.view.quality.max_depth) {
+            let Some(current) = path else { break };
+            path = self.advance(bounce, current, &numbers, &mut sum).ok()?;
+        }
+        Some(sum.total.to_array())
+    }
+}

@@ -1,0 +1,191 @@
+//! The lights of paths: emitting triangles and spheres, lights of the scene, the sky. One is selected in proportion to its power.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::super::Oracle;
+use super::super::shading::attenuation;
+use super::super::shape::{Primitive, Shape};
+use crate::intersect::Primitive as Name;
+use crate::scene::{Background, Light, LightKind, Material, SkyPicture};
+use crate::texture::{Distribution, Texture};
+
+/// Most lights without extent whose light is computed at every first vertex.
+const ALL_AT_FIRST: usize = 16;
+
+/// The lights of a scene.
+pub(super) struct Sources {
+    list: Vec<Source>,
+    /// Indices of the lights of the scene that shine.
+    pub lights: Vec<usize>,
+    /// Whether the light of all lights without extent is computed at first vertices.
+    pub all_at_first: bool,
+}
+
+/// A light, with its power relative to the others.
+pub(super) struct Source {
+    pub kind: Kind,
+    power: f64,
+}
+
+/// The kinds of light.
+pub(super) enum Kind {
+    /// The front of a triangle, or the outside of a sphere: index of the primitive.
+    Surface(usize),
+    /// A light of the scene that is a ball.
+    Ball(usize),
+    /// A light of the scene without extent.
+    Point(usize),
+    Sky(Arc<Texture>),
+}
+
+/// Which lights are selected from.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Among {
+    WithExtent,
+    All,
+}
+
+/// A selected light with its probability.
+pub(super) struct Selected<'a> {
+    pub kind: &'a Kind,
+    pub probability: f64,
+}
+
+impl Sources {
+    /// The lights of the scene of an oracle.
+    pub(super) fn of(oracle: &Oracle) -> Self {
+        let scene = &oracle.scene;
+        let shines = oracle.primitives.iter().any(|primitive| material(oracle, primitive).is_emissive())
+            || matches!(scene.background, Background::Sky(_));
+        let shining = if scene.has_default_light && shines { 0 } else { scene.lights.len() };
+        let lights: Vec<usize> = (0..shining).collect();
+        let mut list = Vec::new();
+        // The light that an object of the size of the scene gets from lights that are no part of it.
+        let reach = oracle.half_diagonal.unwrap_or(1.0);
+        let section = PI * reach * reach;
+        for &index in &lights {
+            let light = &scene.lights[index];
+            let kind = if oracle.is_ball(light) { Kind::Ball(index) } else { Kind::Point(index) };
+            list.push(Source { kind, power: PI * section * mean(light.color) * attenuation(light, reach) });
+        }
+        list.extend(surfaces(oracle));
+        if let Some(panorama) = panorama(oracle)
+            && let Some(light) = panorama.light()
+        {
+            // The weights of the picture have the sines of its rows, whose mean is 2 / pi, and the channels added.
+            let power = PI * section * light.total() * (PI / 2.0) / 3.0 * strength(oracle);
+            list.push(Source { kind: Kind::Sky(Arc::clone(panorama)), power });
+        }
+        let without_extent = lights.iter().filter(|&&index| !oracle.is_ball(&scene.lights[index]));
+        let all_at_first = without_extent.count() <= ALL_AT_FIRST;
+        Self { list, lights, all_at_first }
+    }
+
+    /// The lights that the vertex after a number of bounces selects from.
+    pub(super) fn among(&self, bounce: u32) -> Among {
+        if bounce == 0 && self.all_at_first { Among::WithExtent } else { Among::All }
+    }
+
+    /// The light in whose share of [0, 1) a number is.
+    pub(super) fn select(&self, among: Among, number: f64) -> Option<Selected<'_>> {
+        let total = self.total(among);
+        let mut end = 0.0;
+        self.list.iter().filter(|source| source.power_among(among) > 0.0).find_map(|source| {
+            let power = source.power_among(among);
+            end += power;
+            let probability = power / total;
+            (number < end / total).then_some(Selected { kind: &source.kind, probability })
+        })
+    }
+
+    /// Probability of the lights for which a condition holds.
+    pub(super) fn probability(&self, among: Among, is: impl Fn(&Kind) -> bool) -> f64 {
+        let total = self.total(among);
+        let powers = self.list.iter().filter(|source| is(&source.kind));
+        let power: f64 = powers.map(|source| source.power_among(among)).sum();
+        if total > 0.0 { power / total } else { 0.0 }
+    }
+
+    /// The distribution of the light of the sky, if it is a light.
+    pub(super) fn sky(&self) -> Option<&Distribution> {
+        self.list.iter().find_map(|source| match &source.kind {
+            Kind::Sky(texture) => texture.light(),
+            _ => None,
+        })
+    }
+
+    fn total(&self, among: Among) -> f64 {
+        self.list.iter().map(|source| source.power_among(among)).sum()
+    }
+}
+
+impl Source {
+    fn power_among(&self, among: Among) -> f64 {
+        match (among, &self.kind) {
+            (Among::WithExtent, Kind::Point(_)) => 0.0,
+            _ if self.power.is_finite() => self.power,
+            _ => 0.0,
+        }
+    }
+}
+
+impl Oracle {
+    /// Whether a light is a ball: without shadows it has no extent.
+    pub(super) fn is_ball(&self, light: &Light) -> bool {
+        let placed = !matches!(light.kind, LightKind::Directional { .. });
+        placed && light.radius > 0.0 && light.shadows && self.view.quality.shadows
+    }
+}
+
+/// Emitting triangles and spheres: models first, in the order of their meshes, then spheres, then triangles. Emission that a texture or a
+/// cut-out changes from point to point is found by being hit, and so is that of unlit surfaces, and of spheres that shine inwards.
+fn surfaces(oracle: &Oracle) -> Vec<Source> {
+    let mut found = Vec::new();
+    for (index, primitive) in oracle.primitives.iter().enumerate() {
+        let material = material(oracle, primitive);
+        let varies = material.emission_texture.is_some() || material.cutout.is_some();
+        if !material.is_emissive() || varies || material.unlit {
+            continue;
+        }
+        let area = match primitive.shape {
+            Shape::Triangle { corners: [a, b, c], .. } => (b - a).cross(c - a).length() / 2.0,
+            Shape::Sphere { radius, inside_out: false, .. } => 4.0 * PI * radius * radius,
+            Shape::Sphere { .. } | Shape::Disk { .. } | Shape::Plane { .. } => continue,
+        };
+        let power = PI * area * mean(material.emission);
+        found.push((primitive.name, Source { kind: Kind::Surface(index), power }));
+    }
+    found.sort_by_key(|(name, _)| match *name {
+        Name::Model { model, triangle } => (0, model, triangle),
+        Name::Sphere(index) => (1, index, 0),
+        Name::Triangle(index) => (2, index, 0),
+        Name::Disk(index) | Name::Plane(index) => (3, index, 0),
+    });
+    found.into_iter().map(|(_, source)| source).collect()
+}
+
+fn material<'a>(oracle: &'a Oracle, primitive: &Primitive) -> &'a Material {
+    &oracle.scene.materials[primitive.material as usize]
+}
+
+fn panorama(oracle: &Oracle) -> Option<&Arc<Texture>> {
+    let Background::Sky(sky) = &oracle.scene.background else { return None };
+    let SkyPicture::Panorama(index) = sky.picture else { return None };
+    let id = oracle.scene.textures[index as usize].texture;
+    oracle.textures.iter().find(|texture| texture.id() == id)
+}
+
+fn strength(oracle: &Oracle) -> f64 {
+    match &oracle.scene.background {
+        Background::Sky(sky) => f64::from(sky.strength),
+        Background::Color(_) | Background::Gradient { .. } => 0.0,
+    }
+}
+
+/// Mean of the channels.
+fn mean(color: Vec3) -> f64 {
+    color.as_dvec3().dot(DVec3::ONE) / 3.0
+}

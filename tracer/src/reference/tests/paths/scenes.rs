@@ -1,0 +1,198 @@
+//! Small scenes with every kind of light that paths find.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::image::RgbImage;
+use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
+use crate::scene::{
+    Attenuation, Background, Camera, Filter, Light, LightKind, Material, Model, NormalMode, Plane, Scene,
+    Sky, SkyPicture, Sphere, TextureMap, Triangle,
+};
+use crate::texture::Texture;
+
+/// A scene with its meshes and textures.
+pub(super) struct Furnished {
+    pub scene: Scene,
+    pub meshes: Vec<Arc<CompiledMesh>>,
+    pub textures: Vec<Arc<Texture>>,
+}
+
+impl Furnished {
+    fn plain(scene: Scene) -> Self {
+        Self { scene, meshes: Vec::new(), textures: Vec::new() }
+    }
+}
+
+fn diffuse(color: Vec3) -> Material {
+    Material { diffuse: color, specular: Vec3::ZERO, ..Material::NEUTRAL }
+}
+
+fn lamp(emission: Vec3) -> Material {
+    Material { emission, ..diffuse(Vec3::ZERO) }
+}
+
+fn glass(absorption: Vec3) -> Material {
+    Material { transmit: Vec3::ONE, absorption, ..diffuse(Vec3::ZERO) }
+}
+
+fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
+    Sphere { center, radius, material, inside_out: false, uv_rotate: DVec3::ZERO }
+}
+
+fn light(kind: LightKind, color: Vec3) -> Light {
+    Light { kind, color, attenuation: Attenuation::None, shadows: true, radius: 0.0, shadow_samples: None }
+}
+
+/// Two triangles; their front is the side from which a, b, c, d are in counter-clockwise order.
+fn quad([a, b, c, d]: [DVec3; 4], material: u32) -> [Triangle; 2] {
+    [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, uvs: None, material })
+}
+
+/// Corners of a horizontal rectangle, with the front above.
+fn level(height: f64, half: f64) -> [DVec3; 4] {
+    [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| DVec3::new(x * half, height, z * half))
+}
+
+/// A corner of a room with lamps: triangles, a ball that emits, a light with a radius, a point light. Materials 0 to 4; no surface is in
+/// the centre.
+fn room() -> Scene {
+    let mut triangles = Vec::new();
+    triangles.extend(quad(level(-1.0, 2.0), 0));
+    let wall = [[-2., -1.], [2., -1.], [2., 2.], [-2., 2.]].map(|[x, y]| DVec3::new(x, y, -2.0));
+    triangles.extend(quad(wall, 1));
+    let [a, b, c, d] = level(1.9, 0.5);
+    triangles.extend(quad([d, c, b, a], 2));
+    let with_radius = LightKind::Point { position: DVec3::new(1.5, 1.0, 1.0) };
+    let with_radius = Light {
+        radius: 0.2,
+        attenuation: Attenuation::InverseSquare,
+        ..light(with_radius, Vec3::new(0.9, 0.8, 0.7))
+    };
+    Scene {
+        camera: Camera {
+            position: DVec3::new(0.5, 0.7, 5.0),
+            look_at: DVec3::ZERO,
+            fov: 45.0,
+            ..Camera::default()
+        },
+        background: Background::Color(Vec3::new(0.02, 0.03, 0.05)),
+        lights: vec![
+            light(LightKind::Point { position: DVec3::new(-1.5, 1.5, 1.0) }, Vec3::new(0.3, 0.4, 0.5)),
+            with_radius,
+        ],
+        materials: vec![
+            diffuse(Vec3::splat(0.7)),
+            diffuse(Vec3::new(0.7, 0.2, 0.2)),
+            lamp(Vec3::new(3.0, 2.5, 2.0)),
+            diffuse(Vec3::new(0.3, 0.6, 0.8)),
+            lamp(Vec3::new(0.5, 1.0, 4.0)),
+        ],
+        spheres: vec![ball(DVec3::new(0.0, -0.8, 0.8), 0.2, 4)],
+        triangles,
+        ..Scene::default()
+    }
+}
+
+/// The room with two diffuse balls.
+pub(super) fn diffuse_room() -> Furnished {
+    let mut scene = room();
+    scene.spheres.push(ball(DVec3::new(-0.8, -0.5, 0.0), 0.5, 3));
+    scene.spheres.push(ball(DVec3::new(0.8, -0.4, -0.5), 0.6, 0));
+    Furnished::plain(scene)
+}
+
+/// The room with a glass ball, a mirror ball that is diffuse as well, a coated ball and a sheet.
+pub(super) fn room_of_mirrors() -> Furnished {
+    let mut scene = room();
+    let first = scene.materials.len() as u32;
+    scene.materials.extend([
+        glass(Vec3::new(0.9, 0.8, 0.7)),
+        Material { reflect: Vec3::new(0.8, 0.7, 0.6), ..diffuse(Vec3::splat(0.1)) },
+        Material { reflect: Vec3::ONE, fresnel: true, ..diffuse(Vec3::new(0.2, 0.5, 0.2)) },
+        Material { thin: true, ..glass(Vec3::ONE) },
+    ]);
+    scene.spheres.push(ball(DVec3::new(-0.8, -0.5, 0.0), 0.5, first));
+    scene.spheres.push(ball(DVec3::new(0.8, -0.4, -0.5), 0.6, first + 1));
+    scene.spheres.push(ball(DVec3::new(-0.3, 0.6, -1.2), 0.4, first + 2));
+    let sheet = [[1.0, -1.0], [1.9, -1.0], [1.9, 1.2], [1.0, 1.2]].map(|[x, y]| DVec3::new(x, y, 1.0));
+    scene.triangles.extend(quad(sheet, first + 3));
+    Furnished::plain(scene)
+}
+
+/// A floor under water that absorbs light, with a lamp and a point light in the water; the water has no bottom around the floor.
+pub(super) fn water() -> Furnished {
+    let mut scene = room();
+    scene.lights = vec![light(LightKind::Point { position: DVec3::new(0.9, -0.2, 0.5) }, Vec3::ONE)];
+    let first = scene.materials.len() as u32;
+    scene.materials.push(glass(Vec3::new(0.5, 0.7, 0.9)));
+    scene.triangles.retain(|triangle| triangle.material == 0);
+    scene.planes = vec![Plane { point: DVec3::Y * 0.5, normal: DVec3::Y, material: first, size: 1.0 }];
+    scene.spheres.push(ball(DVec3::new(-0.8, -0.5, 0.0), 0.5, 3));
+    scene.camera.position = DVec3::new(0.5, 3.0, 4.0);
+    scene.background = Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::new(0.3, 0.5, 0.9) };
+    Furnished::plain(scene)
+}
+
+/// Many lights without extent: points, spots and directional ones.
+pub(super) fn many_lights() -> Furnished {
+    let mut furnished = diffuse_room();
+    let scene = &mut furnished.scene;
+    for i in 0..20 {
+        let (s, c) = libm::sincos(f64::from(i) * 2.4);
+        let position = DVec3::new(1.5 * c, 0.5 + 0.05 * f64::from(i), 1.5 * s);
+        let color = Vec3::new(0.1 + 0.01 * i as f32, 0.2, 0.3 - 0.01 * i as f32);
+        let kind = match i % 3 {
+            0 => LightKind::Point { position },
+            1 => {
+                let direction = (DVec3::NEG_Y - position * 0.3).normalize();
+                LightKind::Spot { position, direction, beam_angle: 70.0, penumbra: 20.0 }
+            }
+            _ => LightKind::Directional { direction: DVec3::new(c, -2.0, s).normalize() },
+        };
+        let attenuation =
+            Attenuation::Polynomial { constant: 0.5, linear: 0.1 * f64::from(i), quadratic: 0.3 };
+        scene.lights.push(Light { attenuation, ..light(kind, color) });
+    }
+    furnished
+}
+
+/// Balls on a floor under a turned panorama with a small sun, and two lamps that are the same mesh, one of them mirrored.
+pub(super) fn outdoors() -> Furnished {
+    let (width, height) = (32, 16);
+    let pixels = (0..height).flat_map(|y| {
+        (0..width).flat_map(move |x| match (x, y) {
+            (9, 4) => [255, 250, 230],
+            _ if y < 8 => [40 + 4 * y as u8, 60, 90 + x as u8],
+            _ => [30, 25, 20],
+        })
+    });
+    let picture = RgbImage { width, height, pixels: pixels.collect() };
+    let textures: Vec<Arc<Texture>> = Texture::new(&picture).into_iter().map(Arc::new).collect();
+    let mesh = Mesh {
+        positions: vec![DVec3::ZERO, DVec3::new(0.4, 0.0, 0.1), DVec3::new(0.0, 0.5, 0.0)],
+        triangles: vec![[0, 1, 2]],
+        triangle_materials: vec![0],
+        materials: vec![NamedMaterial::plain("lamp", Material::NEUTRAL)],
+        ..Mesh::default()
+    };
+    let meshes: Vec<_> = CompiledMesh::compile(&mesh).into_iter().map(|(mesh, _)| Arc::new(mesh)).collect();
+    let mut scene = room();
+    scene.lights.clear();
+    scene.triangles.truncate(2);
+    let model = |x: f64, scale: DVec3| Model {
+        mesh: meshes[0].id(),
+        materials: vec![2],
+        normals: NormalMode::Flat,
+        translate: DVec3::new(x, -0.9, 0.9),
+        rotate: DVec3::new(0.0, 30.0, 0.0),
+        scale,
+        group: DMat3::IDENTITY,
+    };
+    scene.models = vec![model(-0.3, DVec3::ONE), model(0.9, DVec3::new(-1.0, 1.0, 1.0))];
+    scene.spheres.push(ball(DVec3::new(-0.8, -0.5, 0.0), 0.5, 3));
+    scene.textures = vec![TextureMap::new(textures[0].id(), Filter::Bilinear)];
+    scene.background = Background::Sky(Sky { picture: SkyPicture::Panorama(0), rotate: 35.0, strength: 1.5 });
+    Furnished { scene, meshes, textures }
+}
