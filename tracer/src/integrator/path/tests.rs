@@ -25,7 +25,7 @@ fn lamp(emission: Vec3) -> Material {
     Material { emission, ..diffuse(Vec3::ZERO) }
 }
 
-fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
+pub(super) fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
     Sphere { center, radius, material, inside_out: false, uv_rotate: DVec3::ZERO }
 }
 
@@ -45,7 +45,7 @@ fn camera_at(position: DVec3) -> Camera {
     Camera { position, look_at: DVec3::ZERO, up: DVec3::NEG_Z, fov: 10.0, ..Camera::default() }
 }
 
-fn path_view(scene: &Scene, side: u32, samples: u32, depth: u8) -> FrameView {
+pub(super) fn path_view(scene: &Scene, side: u32, samples: u32, depth: u8) -> FrameView {
     FrameView {
         width: side,
         height: side,
@@ -57,7 +57,7 @@ fn path_view(scene: &Scene, side: u32, samples: u32, depth: u8) -> FrameView {
     }
 }
 
-fn compiled(scene: &Scene) -> Arc<CompiledScene> {
+pub(super) fn compiled(scene: &Scene) -> Arc<CompiledScene> {
     Arc::new(CompiledScene::new(scene.clone(), [], []).unwrap())
 }
 
@@ -78,7 +78,7 @@ fn mean(scene: &Scene, view: &FrameView) -> [f64; 3] {
 }
 
 /// A box of triangles and balls with lamps of every kind.
-fn furnished() -> Scene {
+pub(super) fn furnished() -> Scene {
     let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
     let quad = |a: DVec3, b: DVec3, c: DVec3, d: DVec3, material| {
         [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, uvs: None, material })
@@ -187,7 +187,7 @@ fn a_white_scene_in_a_white_sky_is_invisible() {
 }
 
 /// A grey floor, seen from above.
-fn floor() -> Scene {
+pub(super) fn floor() -> Scene {
     Scene {
         camera: camera_at(DVec3::new(0.0, 3.0, 0.0)),
         materials: vec![diffuse(Vec3::splat(0.5)), lamp(Vec3::new(8.0, 4.0, 2.0))],
