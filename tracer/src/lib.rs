@@ -72,7 +72,7 @@ pub mod texture;
 
 pub use cancel::{Cancelled, IsCancelled};
 pub use compile::{CompileError, CompiledScene};
-pub use film::{MAX_RADIANCE, PixelSums, develop};
+pub use film::{GUIDES, Guides, MAX_RADIANCE, PixelSums, denoise, develop, develop_denoised};
 pub use frame::{Basis, PreparedFrame};
 pub use integrator::{Stage, Watch, render_rows, render_rows_watched};
 pub use intersect::{Primitive, RayHit, RaySegment};

@@ -8,6 +8,8 @@ use super::cli::Aov;
 
 /// Name of the layer of the frame itself.
 pub(crate) const BEAUTY: &str = "beauty";
+/// Name of the layer of the frame itself, where its noise is filtered.
+pub(crate) const DENOISED: &str = "denoised";
 
 /// A picture for a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,12 +21,13 @@ pub(crate) enum Picture {
 }
 
 impl Picture {
-    /// Layers of a frame in linear light and its auxiliary pictures.
+    /// Layers of a frame in linear light, by this name, and its auxiliary pictures.
     pub(crate) fn of_layers(
+        name: &'static str,
         beauty: LinearImage,
         auxiliary: impl IntoIterator<Item = (Aov, LinearImage)>,
     ) -> Self {
-        let beauty = Layer { name: BEAUTY, channels: Channels::Color, picture: beauty };
+        let beauty = Layer { name, channels: Channels::Color, picture: beauty };
         let layer = |(aov, picture): (Aov, _)| Layer { name: aov.name(), channels: aov.channels(), picture };
         Self::Linear(std::iter::once(beauty).chain(auxiliary.into_iter().map(layer)).collect())
     }

@@ -261,7 +261,7 @@ mod tests {
     fn linear(aov: &[Aov]) -> Picture {
         let pixels = (0..6 * 4 * 3).map(|i| (i * 37 % 251) as f32 / 16.0).collect();
         let picture = LinearImage { width: 6, height: 4, pixels };
-        Picture::of_layers(picture.clone(), aov.iter().map(|aov| (*aov, picture.clone())))
+        Picture::of_layers(BEAUTY, picture.clone(), aov.iter().map(|aov| (*aov, picture.clone())))
     }
 
     #[test]

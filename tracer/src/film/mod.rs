@@ -7,8 +7,10 @@
 //!   tone           exposure and tone curves
 //!   dither         ordered dither, and reduction to fewer colours
 //!   sums           exact sums of samples
+//!   denoise        sums of samples without most of their noise, for display
 //! ```
 
+mod denoise;
 mod development;
 mod dither;
 mod encode;
@@ -19,10 +21,11 @@ mod tone;
 use std::ops::Range;
 
 use crate::frame::PreparedFrame;
-use crate::image;
+use crate::image::{self, ImageError};
 use crate::scene::{ColorDepth, FrameView, PixelFormat, Quality};
 use crate::simd;
 
+pub use denoise::{GUIDES, Guides, denoise};
 pub(crate) use development::Development;
 use dither::Dither;
 pub(crate) use encode::{Means, PixelIndex, write_corner_means, write_samples};
@@ -46,12 +49,47 @@ pub(crate) fn write_sums(frame: &PreparedFrame, rows: &Range<u32>, sums: &[Pixel
     Development::new(frame.level, view, rows.start).write_sums(view.samples, sums, out);
 }
 
+/// The same where pixels have different numbers of samples, `counts`.
+pub(crate) fn write_counted_sums(
+    frame: &PreparedFrame,
+    rows: &Range<u32>,
+    sums: &[PixelSums],
+    counts: &[u32],
+    out: &mut [u8],
+) {
+    let means = sums.iter().zip(counts).map(|(sums, samples)| sums.mean(*samples));
+    Development::new(frame.level, frame.view(), rows.start).write_light(means, out);
+}
+
 /// Writes the pixels that sums show: whole rows of a view's picture from `first_row` on, after a number of samples, in the view's
 /// format. The bytes are those that [`crate::render_rows`] writes for these samples.
 ///
 /// `out` has [`PixelFormat::bytes_per_pixel`] bytes for each sum. What is too much on either side is ignored.
 pub fn develop(view: &FrameView, first_row: u32, samples: u32, sums: &[PixelSums], out: &mut [u8]) {
     Development::new(simd::best(), view, first_row).write_sums(samples, sums, out);
+    finish_rows(view, first_row, out);
+}
+
+/// The pixels that sums of a view's whole picture show without most of their noise: those of [`denoise`], in the view's format, which is
+/// not [`PixelFormat::Sums`].
+///
+/// # Errors
+/// Guides of another size than the view, or another number of sums.
+pub fn develop_denoised(
+    view: &FrameView,
+    samples: u32,
+    sums: &[PixelSums],
+    guides: &Guides,
+) -> Result<Vec<u8>, ImageError> {
+    let light = denoise(sums, samples, guides)?;
+    let mut out = vec![0; view.format.bytes_of(view.width, view.height)];
+    develop_light(view, 0, &light, &mut out);
+    Ok(out)
+}
+
+/// Writes the pixels that show light, linear RGB: whole rows from `first_row` on, as [`develop`] does for the means of sums.
+fn develop_light(view: &FrameView, first_row: u32, light: &[[f32; 3]], out: &mut [u8]) {
+    Development::new(simd::best(), view, first_row).write_light(light.iter().copied(), out);
     finish_rows(view, first_row, out);
 }
 

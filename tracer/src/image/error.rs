@@ -29,15 +29,15 @@ pub enum ImageError {
         path: PathBuf,
     },
     /// The buffer of a picture does not match its size.
-    #[error("a picture of {width} x {height} pixels needs {expected} bytes, but has {actual}")]
+    #[error("a picture of {width} x {height} pixels needs {expected} bytes or numbers, but has {actual}")]
     WrongBuffer {
         /// Pixels per row.
         width: u32,
         /// Rows.
         height: u32,
-        /// Bytes that the size needs.
+        /// Bytes or numbers that the size needs.
         expected: usize,
-        /// Bytes of the buffer.
+        /// Bytes or numbers of the buffer.
         actual: usize,
     },
     /// Two pictures of different sizes cannot be compared.

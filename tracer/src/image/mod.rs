@@ -102,6 +102,23 @@ impl RgbImage {
     }
 }
 
+impl LinearImage {
+    /// Refuses a picture whose buffer does not match its size, and one of another size.
+    pub(crate) fn check_against(&self, other: &Self) -> Result<(), ImageError> {
+        let size = |picture: &Self| (picture.width, picture.height);
+        for picture in [self, other] {
+            let Self { width, height, ref pixels } = *picture;
+            let (expected, actual) = (byte_count(width, height), pixels.len());
+            if expected != actual {
+                return Err(ImageError::WrongBuffer { width, height, expected, actual });
+            }
+        }
+        let (a, b) = (size(self), size(other));
+        if a == b { Ok(()) } else { Err(ImageError::SizesDiffer { a, b }) }
+    }
+}
+
+/// Channels of all pixels of a picture.
 fn byte_count(width: u32, height: u32) -> usize {
     (width as usize).saturating_mul(height as usize).saturating_mul(3)
 }

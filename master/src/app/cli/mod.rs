@@ -167,6 +167,9 @@ pub(crate) struct RenderArgs {
     /// Auxiliary pictures of each frame, separated by commas, as layers of its .exr file.
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     pub(crate) aov: Vec<Aov>,
+    /// Filter the noise of paths, guided by albedo, normals and depth: an estimate, which may blur what is weaker than the noise.
+    #[arg(long)]
+    pub(crate) denoise: bool,
     #[command(flatten)]
     pub(crate) models: ModelArgs,
     #[command(flatten)]

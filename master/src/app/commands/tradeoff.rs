@@ -9,7 +9,7 @@ use std::time::Duration;
 use rayfarm_tracer::files::write_whole;
 use rayfarm_tracer::image::{self, RgbImage};
 use rayfarm_tracer::reference::Oracle;
-use rayfarm_tracer::scene::{FrameView, Integrator};
+use rayfarm_tracer::scene::{FrameView, Integrator, PathSettings};
 use rayfarm_tracer::simd_level;
 
 use super::interrupt::cancelled_by_signals;
@@ -22,7 +22,7 @@ use crate::error::CommandError;
 use crate::in_process::all_cores;
 use crate::measure::tradeoff::measure::{MeasureContext, summary};
 use crate::measure::tradeoff::oracle::{ReferenceCheck, affordable_pixels, check_pixels, sample_pixels};
-use crate::measure::tradeoff::report::{Report, chart, difference_name, markdown, picture_name};
+use crate::measure::tradeoff::report::{Report, chart, difference_name, markdown, noise_chart, picture_name};
 use crate::measure::tradeoff::setting::MeasuredSetting;
 use crate::measure::tradeoff::steps::Steps;
 use crate::measure::tradeoff::table::{Row, Table};
@@ -31,6 +31,7 @@ use crate::measure::tradeoff::table::{Row, Table};
 const TABLE: &str = "tradeoff.csv";
 const PAGE: &str = "tradeoff.md";
 const PLOTS: [&str; 2] = ["front.svg", "front.png"];
+const NOISE_PLOTS: [&str; 2] = ["noise.svg", "noise.png"];
 const REFERENCE: &str = "reference.png";
 
 /// Measures a scene and writes the folder, or reads an existing table; prints the Pareto front on standard output.
@@ -55,7 +56,8 @@ fn show_saved(path: &Path, json: bool) -> Result<(), CommandError> {
 
 fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandError> {
     let source = Source::load(scene, args.models, args.size)?;
-    let view = source.still_request(args.size, &LightArgs::default(), &QualityArgs::default())?.view;
+    let light = LightArgs { integrator: args.integrator, ..LightArgs::default() };
+    let view = with_all_samples(source.still_request(args.size, &light, &QualityArgs::default())?.view);
     let scene = Arc::new(source.compiled()?);
     let folder = Folder::open(&args.output)?;
     let runtime = runtime()?;
@@ -71,6 +73,19 @@ fn measure_and_write(scene: &Path, args: &TradeoffArgs) -> Result<(), CommandErr
     print(&format!("{}the rest is in {}\n", front(&report.table), args.output.join(PAGE).display()))
 }
 
+/// The view without a limit of noise, which would end its samples before the measured number.
+fn with_all_samples(view: FrameView) -> FrameView {
+    match view.integrator {
+        Integrator::Path(settings) if settings.max_noise > 0.0 => {
+            tracing::info!(
+                "max_noise of the scene is left out: settings are measured with all their samples"
+            );
+            FrameView { integrator: Integrator::Path(PathSettings { max_noise: 0.0, ..settings }), ..view }
+        }
+        _ => view,
+    }
+}
+
 fn measure(
     repeats: u32,
     source: &Source,
@@ -80,7 +95,7 @@ fn measure(
     let steps = Steps::new();
     let settings = MeasuredSetting::applicable(&context.scene.features(), &context.view);
     let reference_view = context.reference_view();
-    steps.part(&format!("reference, {} samples", reference_view.samples), u64::from(reference_view.height));
+    steps.part(&format!("reference, {} samples", reference_view.samples), context.reference_rows());
     let reference = context.reference(&|rows| steps.done(u64::from(rows)))?;
     folder.save(REFERENCE, &reference)?;
     // The oracle has direct light.
@@ -185,6 +200,11 @@ impl<'a> Folder<'a> {
         let chart = chart(report);
         for plot in PLOTS {
             chart.save(&self.0.join(plot)).map_err(CommandError::failed)?;
+        }
+        if let Some(chart) = noise_chart(report) {
+            for plot in NOISE_PLOTS {
+                chart.save(&self.0.join(plot)).map_err(CommandError::failed)?;
+            }
         }
         self.write(PAGE, markdown(report).as_bytes())?;
         self.write(TABLE, &report.table.to_csv().map_err(CommandError::failed)?)

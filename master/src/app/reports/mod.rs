@@ -31,6 +31,9 @@ pub(crate) struct RenderReport {
     pub(crate) samples: u32,
     /// Values of the knobs.
     pub(crate) quality: Knobs,
+    /// Whether the noise of the pictures is filtered; left out if not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) denoised: bool,
     /// Workers connected when the last frame was complete.
     pub(crate) workers: u32,
     /// Render threads of these workers.
@@ -55,7 +58,8 @@ pub(crate) struct RenderReport {
     /// The last picture, where pictures are rendered in passes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) film: Option<FilmReport>,
-    /// Hash of the last frame's pixels: RGB8 rows, top to bottom.
+    /// Hash of the last frame's pixels: rows from top to bottom, RGB8, or linear light for .exr and .hdr files. Of the sums of all samples
+    /// if `denoised`.
     pub(crate) blake3: String,
 }
 

@@ -27,6 +27,7 @@ fn the_json_line_has_the_documented_shape() {
         height: 48,
         samples: 4,
         quality: Knobs::of(full.setting()),
+        denoised: false,
         workers: 1,
         threads: 2,
         triangles: 12,
@@ -55,4 +56,6 @@ fn the_json_line_has_the_documented_shape() {
             r#""idle_tail":0.0,"scene":0.0},"workers":[]},"blake3":"00ff"}"#,
         )
     );
+    let denoised = serde_json::to_string(&RenderReport { denoised: true, ..report }).unwrap();
+    assert!(denoised.contains(r#""dither":false},"denoised":true,"workers":1"#), "{denoised}");
 }

@@ -25,7 +25,11 @@ pub(crate) fn ladder(table: &Table, wanted: &ViewRequest) -> Result<Ladder, Stri
             turned.join(", ")
         ));
     }
-    let known = |name: &str| MeasuredSetting::named(name).map(|setting| setting.applied_to(&wanted.view));
+    // Pictures of the viewer are not denoised by its quality controller.
+    let known = |name: &str| {
+        let setting = MeasuredSetting::named(name).filter(|setting| !setting.is_denoised());
+        setting.map(|setting| setting.applied_to(&wanted.view))
+    };
     let is_at_rest = |request: &ViewRequest| request == wanted;
     let full = table.rows.iter().find(|row| known(&row.setting).as_ref().is_some_and(is_at_rest));
     let Some(full) = full else {
@@ -69,7 +73,7 @@ fn is_below(request: &ViewRequest, wanted: &ViewRequest) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use rayfarm_tracer::scene::FrameView;
+    use rayfarm_tracer::scene::{FrameView, Integrator, PathSettings};
 
     use super::*;
 
@@ -108,6 +112,20 @@ mod tests {
         assert!(adaptive.quality.adaptive && adaptive.samples == 4);
         let last = wanted.at_most(&ladder.cheapest());
         assert_eq!((last.scale, last.view.samples), (RenderScale::Half, 1));
+    }
+
+    #[test]
+    fn denoised_pictures_are_no_rungs() {
+        let (mut table, mut wanted) = (table(), resting(32));
+        wanted.view =
+            wanted.view.with_setting(&wanted.setting().changed_to(Integrator::Path(PathSettings::DEFAULT)));
+        wanted.view.samples = 32;
+        table.rows.extend([row("samples-32+denoised", 1.0, 0.001), row("samples-32", 300.0, 0.02)]);
+        table.rows.push(row("samples-8+denoised", 1.0, 0.001));
+        let ladder = ladder(&table, &wanted).unwrap();
+        let figures: Vec<(f64, f64)> = ladder.rungs().iter().map(|rung| (rung.cost, rung.loss)).collect();
+        assert_eq!(figures[0], (1.0, 0.0));
+        assert!(figures.iter().all(|(cost, _)| *cost > 1.5 / 300.0), "{figures:?}");
     }
 
     #[test]

@@ -3,14 +3,14 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::image::{self, FlipMap, PIXELS_PER_DEGREE, RgbImage};
 use rayfarm_tracer::scene::{FrameView, Integrator, MAX_SAMPLES};
-use rayfarm_tracer::{CompiledScene, PreparedFrame};
 
+use super::rendering::passes_of;
 use super::setting::MeasuredSetting;
 use super::table::Row;
 use crate::error::CommandError;
-use crate::in_process::trace;
 use crate::quantile::{percentile, round_to_us};
 
 /// Paths per pixel of the reference: 32 times those of the best measured setting.
@@ -48,12 +48,19 @@ impl MeasureContext<'_> {
         FrameView { samples, ..MeasuredSetting::plain().applied_to(&self.view).view }
     }
 
-    /// Renders the reference picture. `done` receives the number of rows that were rendered since the last call.
+    /// Rows of all passes of the reference.
+    pub(crate) fn reference_rows(&self) -> u64 {
+        let view = self.reference_view();
+        u64::from(view.height) * passes_of(&view)
+    }
+
+    /// Renders the reference picture. `done` receives the number of rows that were rendered since the last call, of
+    /// [`Self::reference_rows`].
     ///
     /// # Errors
     /// The measurement was cancelled.
     pub(crate) fn reference(&self, done: &(dyn Fn(u32) + Sync)) -> Result<RgbImage, CommandError> {
-        self.render(&self.reference_view(), done)
+        self.in_passes(&self.reference_view(), done)
     }
 
     /// Renders a setting's picture and compares it with the reference.
@@ -97,15 +104,9 @@ impl MeasureContext<'_> {
     /// The picture under a setting, in its full size.
     fn picture(&self, setting: &MeasuredSetting) -> Result<RgbImage, CommandError> {
         let wanted = setting.applied_to(&self.view);
-        wanted.delivered(self.render(&wanted.rendered(), &|_| ())?).map_err(CommandError::failed)
-    }
-
-    fn render(&self, view: &FrameView, done: &(dyn Fn(u32) + Sync)) -> Result<RgbImage, CommandError> {
-        let frame = PreparedFrame::new(Arc::clone(&self.scene), view).map_err(CommandError::failed)?;
-        let mut picture = RgbImage::new(view.width, view.height);
-        trace(&frame, &mut picture.pixels, self.threads, self.cancelled, done)
-            .map_err(|_| CommandError::Interrupted("no table was written".to_owned()))?;
-        Ok(picture)
+        let view = wanted.rendered();
+        let rendered = if setting.is_denoised() { self.denoised(&view) } else { self.shown(&view, &|_| ()) };
+        wanted.delivered(rendered?).map_err(CommandError::failed)
     }
 }
 

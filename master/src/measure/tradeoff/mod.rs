@@ -7,6 +7,7 @@ pub(crate) mod ladder;
 pub(crate) mod measure;
 pub(crate) mod oracle;
 pub(crate) mod pareto;
+mod rendering;
 pub(crate) mod report;
 pub(crate) mod setting;
 pub(crate) mod steps;

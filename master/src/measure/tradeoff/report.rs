@@ -37,13 +37,14 @@ fn checked(check: &ReferenceCheck) -> String {
 /// The page in Markdown: method, then a line for each setting, the fastest first. Settings on the front are bold.
 pub(crate) fn markdown(report: &Report) -> String {
     let Table { scene, width, height, threads, simd_level, rows } = &report.table;
+    let noise = if noise_chart(report).is_some() { "![error against samples](noise.png)\n\n" } else { "" };
     let check = report.reference_check.as_ref().map_or_else(String::new, checked);
     let mut text = format!(
         "# Speed against accuracy: {scene}\n\n\
          {width} x {height} pixels, {threads} render thread{}, {simd_level}, rayfarm {}. Times are milliseconds per frame in one process, {} each, \
          settings in turn.\n\n\
          Errors are against full quality with {} samples a pixel.{check}\n\n\
-         ![time against error](front.png)\n\n\
+         ![time against error](front.png)\n\n{noise}\
          | setting | ms, median | ms, least | largest error | RMSE | PSNR, dB | SSIM | FLIP, mean |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         if *threads == 1 { "" } else { "s" },
@@ -120,6 +121,50 @@ pub(crate) fn chart(report: &Report) -> Chart {
     }
 }
 
+/// Settings whose error is plotted against the number of samples, by the rest of their names.
+const NOISE_SERIES: [(&str, &str); 3] = [("", "Sobol"), (INDEPENDENT, INDEPENDENT), ("denoised", "denoised")];
+const INDEPENDENT: &str = "independent";
+
+/// The plot of the number of samples (horizontal) against the RMSE (vertical), for pictures of paths: those that differ in their samples
+/// alone. Independent samples follow the dashed line.
+pub(crate) fn noise_chart(report: &Report) -> Option<Chart> {
+    let Table { scene, width, height, rows, .. } = &report.table;
+    let points = |kind: &str| {
+        let of_row = |row: &Row| {
+            let (samples, _) = samples_of(&row.setting).filter(|(_, rest)| *rest == kind)?;
+            // A logarithmic axis cannot show zero.
+            (row.rmse > 0.0).then_some(Point { x: samples.into(), y: row.rmse, spread: None, label: None })
+        };
+        let mut points: Vec<Point> = rows.iter().filter_map(of_row).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        points
+    };
+    let independent = points(INDEPENDENT);
+    let (first, last) = (independent.first()?.clone(), independent.last()?.clone());
+    let expected = Point { y: first.y * (first.x / last.x).sqrt(), ..last };
+    let series = |name: &str, line, points| Series { name: name.to_owned(), line, points, level: None };
+    let measured = NOISE_SERIES.map(|(kind, name)| series(name, Line::Solid, points(kind)));
+    let mut all: Vec<Series> = measured.into_iter().filter(|series| !series.points.is_empty()).collect();
+    all.push(series("1 / sqrt(samples)", Line::Dashed, vec![first, expected]));
+    let logarithmic = |label: &str| Axis { label: label.to_owned(), logarithmic: true, from_zero: false };
+    Some(Chart {
+        title: format!("{scene}, {width} x {height}, against {} samples", report.reference_samples),
+        x: logarithmic("samples per pixel"),
+        y: logarithmic("RMSE in steps of 1/255"),
+        series: all,
+    })
+}
+
+/// The number of samples of a setting, and the rest of its name; `None` for names that begin with something else.
+fn samples_of(setting: &str) -> Option<(u32, &str)> {
+    let (samples, rest) = match setting.split_once('+') {
+        Some(parts) => parts,
+        None if setting.starts_with("samples-") => (setting, ""),
+        None => ("samples-1", setting),
+    };
+    Some((samples.strip_prefix("samples-")?.parse().ok()?, rest))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,6 +215,42 @@ mod tests {
         {
             assert!(text.contains(part), "{part}: {text}");
         }
+    }
+
+    #[test]
+    fn the_error_of_paths_is_plotted_against_their_samples() {
+        let mut paths = report();
+        assert_eq!(noise_chart(&paths), None, "no paths");
+        let row =
+            |setting: &str, rmse| Row { setting: setting.to_owned(), rmse, ..report().table.rows[0].clone() };
+        paths.table.rows = vec![
+            row("samples-16", 2.0),
+            row("samples-1", 9.0),
+            row("independent", 10.0),
+            row("diffuse+no-shadows", 1.0),
+            row("samples-16+depth-3", 1.0),
+            row("samples-16+independent", 2.6),
+            row("samples-16+denoised", 1.5),
+            row("samples-4+denoised", 0.0),
+        ];
+        let chart = noise_chart(&paths).unwrap();
+        let lines: Vec<(&str, Vec<(f64, f64)>)> = chart
+            .series
+            .iter()
+            .map(|series| {
+                (series.name.as_str(), series.points.iter().map(|point| (point.x, point.y)).collect())
+            })
+            .collect();
+        assert_eq!(
+            lines,
+            [
+                ("Sobol", vec![(1.0, 9.0), (16.0, 2.0)]),
+                ("independent", vec![(1.0, 10.0), (16.0, 2.6)]),
+                ("denoised", vec![(16.0, 1.5)]),
+                ("1 / sqrt(samples)", vec![(1.0, 10.0), (16.0, 2.5)]),
+            ]
+        );
+        assert!(markdown(&paths).contains("(noise.png)") && !markdown(&report()).contains("noise.png"));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use rayfarm_tracer::scene::{FrameView, Integrator, PathSettings, RenderScale, Sc
 
 /// Names of all measured settings: each knob alone, then combinations towards speed, then towards quality. A name consists of
 /// the slugs of the changed values.
-const NAMES: [&str; 62] = [
+const NAMES: [&str; 69] = [
     PLAIN,
     "fast-exponent",
     "diffuse",
@@ -69,10 +69,20 @@ const NAMES: [&str; 62] = [
     "samples-32+clamp-10",
     "samples-32+depth-3",
     "samples-128",
+    "samples-2+independent",
+    "samples-8+independent",
+    "samples-128+independent",
+    "samples-2+denoised",
+    "samples-8+denoised",
+    "samples-32+denoised",
+    "samples-128+denoised",
 ];
 
 /// Name of the setting without changed knobs: one sample per pixel, full quality.
 const PLAIN: &str = "samples-1";
+
+/// Part of the names of settings whose pictures have their noise filtered, which is no knob of the tracer.
+const DENOISED: &str = "denoised";
 
 /// A setting with its name in tables.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +93,8 @@ pub(crate) struct MeasuredSetting {
     limit: Setting,
     /// The value of a knob that reduces nothing, which no limit changes.
     switched: Option<&'static KnobValue>,
+    /// Whether the noise of the picture is filtered.
+    denoised: bool,
 }
 
 impl MeasuredSetting {
@@ -93,11 +105,14 @@ impl MeasuredSetting {
         let mut found: Vec<Self> = Vec::new();
         let changes_picture = |measured: &Self| {
             let limit = measured.limit_of(view);
-            limit.without_idle(&features) == limit && has_listed_samples(&limit)
+            let is_possible = !measured.denoised || view.integrator != Integrator::Direct;
+            is_possible && limit.without_idle(&features) == limit && has_listed_samples(&limit)
         };
         for measured in all().filter(changes_picture) {
             let request = measured.applied_to(view);
-            if !found.iter().any(|other| other.applied_to(view) == request) {
+            let is_same =
+                |other: &Self| other.denoised == measured.denoised && other.applied_to(view) == request;
+            if !found.iter().any(is_same) {
                 found.push(measured);
             }
         }
@@ -108,7 +123,12 @@ impl MeasuredSetting {
     pub(crate) fn plain() -> Self {
         let paths = Integrator::Path(PathSettings::DEFAULT);
         let limit = Setting { samples: 1, ..Setting::full_with(paths) };
-        Self { name: PLAIN, limit, switched: None }
+        Self { name: PLAIN, limit, switched: None, denoised: false }
+    }
+
+    /// Whether the noise of the picture is filtered.
+    pub(crate) fn is_denoised(&self) -> bool {
+        self.denoised
     }
 
     /// The limits of the knobs of a view's integrator.
@@ -142,6 +162,10 @@ fn all() -> impl Iterator<Item = MeasuredSetting> {
 fn parsed(name: &'static str) -> Option<MeasuredSetting> {
     let mut measured = MeasuredSetting { name, ..MeasuredSetting::plain() };
     for slug in name.split('+') {
+        if slug == DENOISED {
+            measured.denoised = true;
+            continue;
+        }
         let (knob, value) = value_with(slug)?;
         if knob.reduces {
             value.apply(&mut measured.limit);
@@ -246,7 +270,16 @@ mod tests {
         for name in ["adaptive", "shadow", "terminator", "exponent", "contribution", "diffuse", "samples-9"] {
             assert!(!paths.iter().any(|found| found.contains(name)), "{name}: {paths:?}");
         }
-        for name in ["independent", "roulette", "clamp", "samples-2", "samples-8", "samples-128", "depth-5"] {
+        for name in [
+            "independent",
+            "roulette",
+            "clamp",
+            "samples-2",
+            "samples-8",
+            "samples-128",
+            "depth-5",
+            "denoised",
+        ] {
             assert!(!direct.iter().any(|found| found.contains(name)), "{name}: {direct:?}");
             assert!(paths.iter().any(|found| found.contains(name)), "{name}: {paths:?}");
         }
@@ -282,16 +315,16 @@ mod tests {
             FrameView { samples: 25, quality: Quality { shadows: false, ..Quality::default() }, ..view };
         for turned in [turned, FrameView { samples: 25, ..path_view() }] {
             let settings = MeasuredSetting::applicable(&EVERYTHING, &turned);
-            let pictures: Vec<ViewRequest> =
-                settings.iter().map(|setting| setting.applied_to(&turned)).collect();
-            for (index, picture) in pictures.iter().enumerate() {
+            let pictures: Vec<(ViewRequest, bool)> =
+                settings.iter().map(|setting| (setting.applied_to(&turned), setting.denoised)).collect();
+            for (index, (picture, denoised)) in pictures.iter().enumerate() {
                 assert_eq!(picture.rendered().validate(), Ok(()), "{}", settings[index].name);
                 assert_eq!(picture.view.camera, view.camera);
-                assert!(!pictures[..index].contains(picture), "{}", settings[index].name);
+                assert!(!pictures[..index].contains(&(*picture, *denoised)), "{}", settings[index].name);
             }
             let quality = Quality { shadows: true, ..turned.quality };
             let plain = FrameView { samples: 1, quality, ..turned };
-            assert_eq!(pictures[0].view, plain, "knobs of the view are reset");
+            assert_eq!(pictures[0].0.view, plain, "knobs of the view are reset");
         }
     }
 
@@ -308,6 +341,10 @@ mod tests {
         assert_eq!(paths("clamp-10"), (1, PathSettings { clamp_indirect: 10.0, ..own }));
         let independent = PathSettings { sampler: Sampler::Independent, ..own };
         assert_eq!(paths("samples-32+independent"), (32, independent));
+        let [plain, denoised] =
+            ["samples-32", "samples-32+denoised"].map(|name| MeasuredSetting::named(name).unwrap());
+        assert_eq!(plain.applied_to(&view), denoised.applied_to(&view));
+        assert!(denoised.is_denoised() && !plain.is_denoised());
     }
 
     #[test]

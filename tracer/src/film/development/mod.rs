@@ -74,17 +74,22 @@ impl Development {
             pixels.iter_mut().zip(sums).for_each(|(pixel, sums)| *pixel = sums.to_bytes());
             return;
         }
-        let count = sums.len().min(out.len() / self.format.bytes_per_pixel());
-        for (chunk, first) in sums[..count].chunks(LANES).zip((0..).step_by(LANES)) {
-            let mut light = [Lanes::ZERO; 3];
-            for (lane, sums) in chunk.iter().enumerate() {
-                let mean = sums.mean(samples);
+        self.write_light(sums.iter().map(|sums| sums.mean(samples)), out);
+    }
+
+    /// Writes pixels that show light, linear RGB; nothing in [`PixelFormat::Sums`]. What is too much on either side is ignored.
+    pub(super) fn write_light(&self, pixels: impl Iterator<Item = [f32; 3]>, out: &mut [u8]) {
+        let mut pixels = pixels.take(out.len() / self.format.bytes_per_pixel()).enumerate().peekable();
+        while pixels.peek().is_some() {
+            let (mut light, mut indices, mut count) = ([Lanes::ZERO; 3], [0; LANES], 0);
+            for (index, pixel) in pixels.by_ref().take(LANES) {
                 for channel in 0..3 {
-                    light[channel].0[lane] = mean[channel];
+                    light[channel].0[count] = pixel[channel];
                 }
+                indices[count] = index;
+                count += 1;
             }
-            let indices: [usize; LANES] = std::array::from_fn(|lane| first + lane);
-            self.write(&light, &indices[..chunk.len()], out);
+            self.write(&light, &indices[..count], out);
         }
     }
 }

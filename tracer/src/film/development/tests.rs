@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::compile::CompiledScene;
-use crate::film::develop;
+use crate::film::{develop, develop_light};
 use crate::integrator::render_rows;
 use crate::scene::{Background, Quality, RenderSettings, Scene, ToneCurve};
 use crate::simd;
@@ -149,6 +149,10 @@ proptest! {
         let sums: Vec<PixelSums> = light.into_iter().map(|light| sums_of(light, samples)).collect();
         let mut whole = vec![0; format.bytes_of(7, 23)];
         develop(&view, 0, samples, &sums, &mut whole);
+        let light: Vec<[f32; 3]> = sums.iter().map(|sums| sums.mean(samples)).collect();
+        let mut of_light = vec![0; whole.len()];
+        develop_light(&view, 0, &light, &mut of_light);
+        prop_assert!(format == PixelFormat::Sums || of_light == whole);
         let mut parts = vec![0; whole.len()];
         let (upper, lower) = parts.split_at_mut(format.bytes_of(7, cut));
         develop(&view, cut, samples, &sums[7 * cut as usize..], lower);

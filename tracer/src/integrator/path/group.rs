@@ -35,8 +35,8 @@ pub(super) struct Group<'a> {
     pub(super) tiles_lights: bool,
     /// Seeds of the pixels of the tile.
     seeds: [Indices; BLOCKS],
-    /// Bits of the requested pixels.
-    live: [u32; BLOCKS],
+    /// Bits of the pixels that are traced.
+    pub(super) live: [u32; BLOCKS],
     /// Centre of the tile, in pixels.
     center: [f64; 2],
     /// Number of the first sample.

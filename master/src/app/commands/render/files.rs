@@ -4,16 +4,18 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use rayfarm_farm::{FinishedFrame, ViewRequest};
+use rayfarm_tracer::PixelFormat;
 use rayfarm_tracer::image::{ImageError, RgbImage};
 use rayfarm_tracer::scene::{FrameView, RenderScale, Shading};
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
+use super::denoised::Denoised;
 use super::repair::Delivered;
 use super::totals::Totals;
 use crate::app::cli::Aov;
 use crate::app::output::FrameWriter;
-use crate::app::picture::Picture;
+use crate::app::picture::{BEAUTY, Picture};
 use crate::app::plan::Plan;
 use crate::app::progress::Progress;
 use crate::display::{Display, DisplayError};
@@ -39,6 +41,8 @@ pub(super) struct FrameFiles {
     pub(super) request: ViewRequest,
     /// Auxiliary pictures of each frame.
     pub(super) aov: Vec<Aov>,
+    /// Conversion of frames whose noise is filtered; the requested frames are sums then, with all guides.
+    pub(super) denoised: Option<Denoised>,
     pub(super) plan: Plan,
     pub(super) delivered: Delivered,
     pub(super) writer: FrameWriter,
@@ -51,12 +55,13 @@ impl FrameFiles {
     pub(super) fn new(
         request: ViewRequest,
         aov: Vec<Aov>,
+        denoised: Option<Denoised>,
         plan: Plan,
         writer: FrameWriter,
         totals: Totals,
     ) -> Self {
         let (delivered, unwritten) = (Delivered::default(), VecDeque::new());
-        Self { request, aov, plan, delivered, writer, totals, unwritten }
+        Self { request, aov, denoised, plan, delivered, writer, totals, unwritten }
     }
 
     /// Pictures that the auxiliary pictures of the plan's frames are.
@@ -119,9 +124,9 @@ impl FrameFiles {
         Ok(())
     }
 
-    /// Hash of the pixels as they are delivered.
+    /// Hash of the pixels as they are delivered, or of the sums where their noise is filtered for the file.
     fn hash(&self, frame: &FinishedFrame) -> Result<blake3::Hash, CommandError> {
-        if frame.request.scale == RenderScale::Full {
+        if frame.request.scale == RenderScale::Full || frame.format() == PixelFormat::Sums {
             return Ok(blake3::hash(&frame.pixels));
         }
         let FrameView { width, height, .. } = frame.view;
@@ -134,8 +139,16 @@ impl FrameFiles {
     pub(super) fn write_next(&mut self) {
         if let Some(Unwritten { number, frame, auxiliary, _slot }) = self.unwritten.pop_front() {
             // A frame without a file keeps its memory, which serves a later frame.
-            let aov = self.aov.clone();
-            self.writer.write(number, || move || picture(frame, aov.into_iter().zip(auxiliary)));
+            let (aov, denoised) = (self.aov.clone(), self.denoised);
+            self.writer.write(number, || {
+                move || {
+                    let auxiliary = aov.into_iter().zip(auxiliary);
+                    match denoised {
+                        None => picture(frame, auxiliary),
+                        Some(denoised) => denoised.picture(&frame, auxiliary),
+                    }
+                }
+            });
         }
     }
 }
@@ -147,7 +160,7 @@ fn picture(
 ) -> Result<Picture, ImageError> {
     if let Some(beauty) = frame.linear() {
         let auxiliary = auxiliary.filter_map(|(aov, frame)| Some((aov, frame.linear()?)));
-        return Ok(Picture::of_layers(beauty, auxiliary));
+        return Ok(Picture::of_layers(BEAUTY, beauty, auxiliary));
     }
     let FrameView { width, height, .. } = frame.view;
     let request = frame.request;

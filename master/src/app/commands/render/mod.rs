@@ -6,6 +6,7 @@ use rayfarm_tracer::scene::{FrameView, PixelFormat, RenderScale};
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
+use denoised::{Denoised, with_guides};
 use files::{FileDisplay, FrameFiles};
 use passes::PassRules;
 use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
@@ -18,7 +19,7 @@ use super::quality::within_error;
 use super::source::{Source, animation};
 use crate::app::cli::RenderArgs;
 use crate::app::output::{FrameWriter, OutputPattern, check_writable};
-use crate::app::picture::BEAUTY;
+use crate::app::picture::{BEAUTY, DENOISED};
 use crate::app::plan::{Existing, Plan};
 use crate::app::progress::Progress;
 use crate::app::reports::{RenderReport, print_json};
@@ -27,6 +28,7 @@ use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
 use crate::viewer::{FrameLogFile, Viewer};
 
+mod denoised;
 mod files;
 mod film_file;
 mod passes;
@@ -51,15 +53,17 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let request = within_error(&args.error, &source, source.request(&args.picture)?)?;
     let request = in_format_of(&args, &pattern, request)?;
     let passes = PassRules::of(&args, &source, &request)?;
+    let (request, denoised) = denoised_of(&args, request)?;
     let plan = plan(&args, &pattern, &request)?;
     let triangles = source.compiled()?.triangle_count();
     let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
     let observability = Observability::new(&args.observability)?;
     let totals = Totals::new(triangles, log);
+    let aov = if args.denoise { with_guides(&args.aov) } else { args.aov };
     let run = Run {
         animation: animation(&args.picture, args.frames),
         wait_for_workers: args.wait_for_workers,
-        files: FrameFiles::new(request, args.aov, plan, FrameWriter::new(pattern), totals),
+        files: FrameFiles::new(request, aov, denoised, plan, FrameWriter::new(pattern), totals),
         observability,
         passes,
         samples_so_far: None,
@@ -107,6 +111,25 @@ fn in_format_of(
     Ok(ViewRequest { view: FrameView { format: PixelFormat::Linear, ..request.view }, ..request })
 }
 
+/// The request for frames of sums in place of those of `request`, and their conversion to the requested format, where noise is filtered.
+///
+/// # Errors
+/// A view without sums of samples.
+fn denoised_of(
+    args: &RenderArgs,
+    request: ViewRequest,
+) -> Result<(ViewRequest, Option<Denoised>), CommandError> {
+    if !args.denoise {
+        return Ok((request, None));
+    }
+    if let Some(problem) = denoised::refusal(&request.view) {
+        return Err(CommandError::WrongInput(problem.to_owned()));
+    }
+    let denoised = Denoised { format: request.view.format, layers: args.aov.len() };
+    let view = FrameView { format: PixelFormat::Sums, ..request.view };
+    Ok((ViewRequest { view, ..request }, Some(denoised)))
+}
+
 /// The frames to render.
 fn plan(args: &RenderArgs, pattern: &OutputPattern, request: &ViewRequest) -> Result<Plan, CommandError> {
     let FrameView { width, height, .. } = request.view;
@@ -120,7 +143,8 @@ fn plan(args: &RenderArgs, pattern: &OutputPattern, request: &ViewRequest) -> Re
 
 /// Names of the layers of each file that has layers.
 fn layers(args: &RenderArgs) -> Vec<&'static str> {
-    std::iter::once(BEAUTY).chain(args.aov.iter().map(|aov| aov.name())).collect()
+    let first = if args.denoise { DENOISED } else { BEAUTY };
+    std::iter::once(first).chain(args.aov.iter().map(|aov| aov.name())).collect()
 }
 
 /// One run of `render`.
@@ -234,8 +258,9 @@ impl Run {
     ) -> Result<RenderReport, CommandError> {
         let files = &mut self.files;
         let written = files.writer.finish().await;
-        let FrameFiles { totals, writer, plan, .. } = files;
-        progress.finish(&totals.summary(writer.written(), plan, writer.has_files()));
+        let FrameFiles { totals, writer, plan, denoised, .. } = files;
+        let filtered = if denoised.is_some() { ", denoised" } else { "" };
+        progress.finish(&(totals.summary(writer.written(), plan, writer.has_files()) + filtered));
         let verifies = farm.status().verification.is_some();
         if verifies && rendered.is_ok() && written.is_ok() {
             self.repair(&mut farm, interrupted).await;
@@ -271,6 +296,7 @@ impl Run {
     }
 
     fn report(&self) -> RenderReport {
-        self.files.totals.report(&self.files.request, &self.files.plan)
+        let FrameFiles { totals, request, plan, denoised, .. } = &self.files;
+        RenderReport { denoised: denoised.is_some(), ..totals.report(request, plan) }
     }
 }

@@ -144,6 +144,39 @@ async fn linear_files_show_the_same_light_and_have_the_requested_layers() {
     }
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn denoised_files_show_the_same_light_in_any_cut_and_say_so() {
+    let renders = Renders::new();
+    let outputs = [
+        ("noisy-%d.ppm", ""),
+        ("denoised-%d.ppm", "--denoise"),
+        ("cut-%d.ppm", "--denoise --segment static:64"),
+        ("small-%d.ppm", "--denoise --scale 1/2"),
+        ("layers-%d.exr", "--denoise --aov normal"),
+    ];
+    for (output, options) in outputs {
+        let paths = "--integrator path --samples 8 --frames 2 --orbit 90";
+        let run = renders.start_as(output, &format!("{paths} {options}"));
+        renders.ready().await;
+        renders.real_worker();
+        in_time(run).await.unwrap().unwrap();
+    }
+    for index in 0..2 {
+        let path = |name: &str| renders.folder.path().join(name.replace("%d", &index.to_string()));
+        let [noisy, denoised, cut, small] = ["noisy-%d.ppm", "denoised-%d.ppm", "cut-%d.ppm", "small-%d.ppm"]
+            .map(|name| image::load(&path(name)).unwrap());
+        assert!(denoised == cut && denoised != noisy && small != denoised);
+        assert_eq!((small.width, small.height), (32, 64));
+        let difference = image::compare(&noisy, &denoised).unwrap();
+        assert!(difference.rmse < 8.0, "{}", difference.rmse);
+        assert_eq!(image::layer_names(&path("layers-%d.exr"), 32, 64).unwrap(), ["denoised", "normal"]);
+        let light = linear(&path("layers-%d.exr"));
+        let encoded = light.pixels.as_chunks::<3>().0.iter().map(|light| srgb::encode((*light).into()));
+        let off = encoded.flatten().zip(&denoised.pixels).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(off <= Some(1), "off by {off:?}");
+    }
+}
+
 #[test]
 fn files_that_cannot_have_what_is_requested_are_refused_before_anything_is_rendered() {
     let folder = tempfile::tempdir().unwrap();
@@ -154,6 +187,8 @@ fn files_that_cannot_have_what_is_requested_are_refused_before_anything_is_rende
         ("a.hdr", "--aov depth", ".exr"),
         ("a.exr", "--aov depth,item,depth", "depth twice"),
         ("a.exr", "--scale 1/2", "--scale 1"),
+        ("a.png", "--denoise", "--integrator path"),
+        ("a.png", "--denoise --integrator path --max-noise 0.1", "--max-noise"),
     ] {
         let output = folder.path().join(output);
         let words = format!("rayfarm-master render {} -o {} {options}", scene.display(), output.display());

@@ -163,6 +163,7 @@ impl Totals {
             height: view.height,
             samples: view.samples,
             quality: Knobs::of(request.setting()),
+            denoised: false,
             workers: self.workers,
             threads: self.threads,
             triangles: self.triangles,
