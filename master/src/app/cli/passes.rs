@@ -33,3 +33,39 @@ impl PassesArgs {
         .find_map(|(is_given, option)| is_given.then_some(option))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::cli::{Command, Invocation};
+
+    fn passes(options: &str) -> PassesArgs {
+        let line = format!("rayfarm-master render a.toml -o b.png {options}");
+        match Invocation::parse(line.split_whitespace().map(Into::into)) {
+            Ok(Invocation::Command(command, _)) => match *command {
+                Command::Render(args) => args.passes,
+                other => panic!("{options}: {other:?}"),
+            },
+            other => panic!("{options}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_picture_has_a_time_and_a_film() {
+        assert_eq!(passes("").given(), None);
+        let all = passes("--time 1.5 --checkpoint a.film --continue b.film");
+        assert_eq!((all.time, all.given()), (Some(Duration::from_millis(1500)), Some("--time")));
+        assert_eq!(all.checkpoint, Some(PathBuf::from("a.film")));
+        assert_eq!(all.continued, Some(PathBuf::from("b.film")));
+        assert_eq!(passes("--continue b.film").given(), Some("--continue"));
+    }
+
+    #[test]
+    fn times_are_above_zero_and_finite() {
+        for wrong in ["0", "-1", "nan", "inf", "1e10", "soon"] {
+            let line = ["rayfarm-master", "render", "a.toml", "-o", "b.png", &format!("--time={wrong}")];
+            let error = Invocation::parse(line.map(Into::into)).unwrap_err().to_string();
+            assert!(error.contains("expected seconds above 0"), "{wrong}: {error}");
+        }
+    }
+}

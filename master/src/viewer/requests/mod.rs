@@ -10,11 +10,13 @@ use std::time::{Duration, Instant};
 use rayfarm_farm::accounting::FrameAccount;
 use rayfarm_farm::{Farm, FrameId, ViewRequest};
 
-use super::film::passes;
+use super::film::passes as film_passes;
 use super::film::still::Pass;
 use super::orbit::Animation;
 use super::quality_controller::{QualityController, QualityMode};
 use super::sequence::{SequencePlan, Slot};
+
+use passes::Passes;
 
 /// Requests in flight: the frame being rendered, and the next one, which workers begin when the first has no rows left.
 pub(crate) const OPEN_REQUESTS: usize = 2;
@@ -85,28 +87,6 @@ struct Requested {
     /// Request before the quality controller.
     wanted: ViewRequest,
     mode: Option<QualityMode>,
-}
-
-/// Passes of a view at rest.
-#[derive(Clone, Copy, Debug)]
-struct Passes {
-    /// The request for the whole picture.
-    whole: ViewRequest,
-    /// Number of their film.
-    film: u64,
-    /// First sample of the next pass.
-    next: u32,
-    /// Whether the picture needs no more passes, although it could have some.
-    is_complete: bool,
-}
-
-impl Passes {
-    /// The next pass, if there is one.
-    fn pass(&self) -> Option<Pass> {
-        let Self { whole, film, next, is_complete } = *self;
-        let range = passes::next(next, whole.view.samples).filter(|_| !is_complete)?;
-        Some(Pass { film, whole, first: range.start, samples: range.end - range.start })
-    }
 }
 
 /// A request in flight.
@@ -237,7 +217,7 @@ impl Requests {
     /// Requests no further pass of the picture, and drops those in flight.
     pub(super) fn complete_picture(&mut self, farm: &impl Renderer) {
         let Some(passes) = &mut self.passes else { return };
-        passes.is_complete = true;
+        passes.complete();
         if !self.open.is_empty() {
             let (passes, requested) = (self.passes, self.requested.take());
             self.drop_all(farm);
@@ -314,9 +294,9 @@ impl Requests {
         let request = animation.request(&request, number);
         let request = self.plan.as_ref().map_or(request, |plan| plan.request(self.next, request));
         let is_moving = animation.is_moving() || is_moving(mode);
-        let (request, passes) = match self.plan.is_none() && passes::has_passes(&request.view) {
+        let (request, passes) = match self.plan.is_none() && film_passes::has_passes(&request.view) {
             false => (request, None),
-            true if is_moving => (passes::while_moving(&request), None),
+            true if is_moving => (film_passes::while_moving(&request), None),
             true => (request, Some(self.passes_of(&request))),
         };
         let pass = match passes.map(|passes| passes.pass()) {
@@ -329,15 +309,13 @@ impl Requests {
             Some(pass) => pass,
         };
         let request = pass.map_or(request, |Pass { first, samples, .. }| ViewRequest {
-            view: passes::pass(&request.view, first..first.saturating_add(samples)),
+            view: film_passes::pass(&request.view, first..first.saturating_add(samples)),
             ..request
         });
         if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
             self.drop_all(farm);
         }
-        self.passes = passes
-            .zip(pass)
-            .map(|(passes, pass)| Passes { next: pass.first.saturating_add(pass.samples), ..passes });
+        self.passes = passes.zip(pass).map(|(passes, pass)| passes.after(&pass));
         self.films = self.passes.map_or(self.films, |passes| passes.film);
         // A request that replaces another one is as old as the camera that it shows.
         let input_at = self.moved_at.unwrap_or(now);
@@ -350,7 +328,7 @@ impl Requests {
 
     /// Passes of a picture: those that are being rendered, or those of a new film.
     fn passes_of(&self, whole: &ViewRequest) -> Passes {
-        let first = Passes { whole: *whole, film: self.films + 1, next: 0, is_complete: false };
+        let first = Passes::new(whole, self.films + 1);
         match self.passes.filter(|passes| passes.whole == *whole) {
             // A measurement renders the picture again and again, each time to its end.
             Some(passes) if self.policy.continuous && passes.pass().is_none() && self.open.is_empty() => {
@@ -403,5 +381,6 @@ fn is_moving(mode: Option<QualityMode>) -> bool {
     mode.is_some_and(|mode| mode != QualityMode::Resting)
 }
 
+mod passes;
 #[cfg(test)]
 mod tests;

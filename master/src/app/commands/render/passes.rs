@@ -206,6 +206,9 @@ impl Run {
             let mut picture = Picture::new(whole, rules.continued.take(), rules.time);
             let rendered = self.render_picture(farm, &mut picture, &rules, progress, interrupted).await;
             let saved = save(&mut picture, &rules).await;
+            if let (Err(_), Err(problem)) = (&rendered, &saved) {
+                tracing::error!("{problem}");
+            }
             self.note(&picture, &rules);
             rendered.and(saved)?;
             self.files.totals.complete_picture();
@@ -274,7 +277,7 @@ impl Run {
         self.files.totals.film =
             Some(FilmReport { passes: *passes, samples, continued: *continued, error: *error });
         let file = match &rules.file {
-            Some(FilmFile { path, .. }) if samples > 0 => {
+            Some(FilmFile { path, .. }) if picture.saved > 0 => {
                 format!("; the same command with --continue {} goes on", path.display())
             }
             _ => String::new(),
