@@ -14,6 +14,7 @@ mod handle;
 mod input_action;
 mod knob_change;
 mod latency;
+mod open_requests;
 pub(crate) mod orbit;
 pub(crate) mod quality_controller;
 mod requests;
@@ -30,7 +31,8 @@ pub(crate) use handle::{KnobSender, PresentedFrame, ViewerHandle};
 #[cfg(feature = "window")]
 pub(crate) use input_action::InputAction;
 pub(crate) use knob_change::KnobChange;
-pub(crate) use requests::{OPEN_REQUESTS, RequestPolicy};
+pub(crate) use open_requests::OPEN_REQUESTS;
+pub(crate) use requests::RequestPolicy;
 pub(crate) use sequence::{FrameSequence, SequenceFrame, Slot};
 pub(crate) use statistics::Statistics;
 pub(crate) use worker_command::KICK_REASON;

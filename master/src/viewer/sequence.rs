@@ -7,7 +7,7 @@ use rayfarm_tracer::scene::Shading;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 use super::handle::PresentedFrame;
-use super::requests::OPEN_REQUESTS;
+use super::open_requests::OPEN_REQUESTS;
 
 /// Complete frames that may wait for the display, for instance for a disk.
 const MAX_UNTAKEN: usize = 2;

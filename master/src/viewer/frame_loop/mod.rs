@@ -1,7 +1,7 @@
 //! The viewer: owns camera, quality controller, requests and statistics, and runs the frame loop over the farm.
 //!
 //! Input of all displays arrives as actions. Snapshots of frames, farm and statistics go out, and no display is waited for.
-//! While something moves, [`OPEN_REQUESTS`](super::requests::OPEN_REQUESTS) frames are in flight, and a moved camera
+//! While something moves, [`OPEN_REQUESTS`](super::open_requests::OPEN_REQUESTS) frames are in flight, and a moved camera
 //! replaces the last one as long as it has not begun. At rest the picture is requested once; from then on the loop only
 //! looks at the farm ten times a second. A picture of the path integrator at rest is requested in passes instead, and what its
 //! [`film`](super::film) shows is published after each.

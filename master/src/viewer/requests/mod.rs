@@ -12,14 +12,12 @@ use rayfarm_farm::{Farm, FrameId, ViewRequest};
 
 use super::film::passes as film_passes;
 use super::film::still::Pass;
+use super::open_requests::OPEN_REQUESTS;
 use super::orbit::Animation;
 use super::quality_controller::{QualityController, QualityMode};
 use super::sequence::{SequencePlan, Slot};
 
 use passes::Passes;
-
-/// Requests in flight: the frame being rendered, and the next one, which workers begin when the first has no rows left.
-pub(crate) const OPEN_REQUESTS: usize = 2;
 
 /// Accepts requests for frames.
 pub(super) trait Renderer {
