@@ -48,7 +48,7 @@ pub(super) fn with_smooth_variance(estimates: &[Estimate], guides: &Guides) -> V
 }
 
 /// A number for each pixel, rows in parallel.
-fn each_pixel(guides: &Guides, one: impl Fn(usize) -> Estimate + Sync) -> Vec<Estimate> {
+fn each_pixel(guides: &Guides, one: impl Fn(usize) -> Estimate + Sync + Send) -> Vec<Estimate> {
     let width = guides.width().max(1);
     (0..guides.pixels().len()).into_par_iter().with_min_len(width).map(one).collect()
 }
