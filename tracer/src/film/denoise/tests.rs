@@ -163,9 +163,9 @@ fn edges_of_normals_and_depth_separate_light() {
         let step = side(&found, WIDTH / 2 - 1) - side(&found, WIDTH / 2);
         assert!((step - 0.1).abs() < 0.03, "{step}");
     }
-    // Without an edge of the guides the same step disappears in the noise.
+    // Without an edge of the guides the same step is blurred.
     let found = denoise(&sums, SAMPLES, &flat()).unwrap();
-    assert!(side(&found, WIDTH / 2 - 1) - side(&found, WIDTH / 2) < 0.03);
+    assert!(side(&found, WIDTH / 2 - 1) - side(&found, WIDTH / 2) < 0.06);
 }
 
 #[test]
