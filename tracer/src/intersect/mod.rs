@@ -25,5 +25,5 @@ mod world;
 
 pub(crate) use exact::Hit;
 pub(crate) use single::Crossings;
-pub(crate) use volumes::{Scattered, VolumeSections};
+pub(crate) use volumes::VolumeSections;
 pub use world::{Primitive, RayHit, RaySegment};

@@ -233,6 +233,7 @@ mod tests {
             checkered: true,
             normal_mapped: true,
             metallic_roughness: true,
+            volumes: true,
         };
         let at = |shading| everything.at(&Quality { shading, ..Quality::default() });
         assert_eq!(at(Shading::Full), everything);

@@ -1,7 +1,7 @@
 //! Loading of scene files: parsing, models, textures, and defaults for what the file leaves open.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::Vec3;
