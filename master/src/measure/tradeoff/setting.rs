@@ -148,6 +148,7 @@ mod tests {
         soft_shadows: false,
         checkered: false,
         normal_mapped: false,
+        metallic_roughness: false,
     };
     const EVERYTHING: SceneFeatures = SceneFeatures {
         specular: true,
