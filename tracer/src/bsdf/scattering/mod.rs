@@ -81,7 +81,7 @@ pub(crate) struct Scattered<S: Simd> {
     pub refracted: u32,
 }
 
-/// What scattering depends on beside the materials.
+/// What scattering depends on except the materials.
 pub(crate) struct Setting<S: Simd> {
     /// Unit vectors to where the light goes.
     pub to_viewer: Vec3x16<S>,

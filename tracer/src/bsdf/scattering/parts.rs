@@ -14,7 +14,7 @@
 //! Radiance is that of the vacuum: L / n^2, which refraction leaves as it is, so weights have no factor eta^2. Where a path starts and ends
 //! outside of all bodies the factors cancel; an emitter inside of a body states L / n^2.
 
-use super::albedo::{Rows, Terms};
+use super::albedo::{LobeTerms, Rows};
 use super::fresnel::{exact, of_sheet, schlick};
 use super::ggx::{LEAST_ALPHA, Microfacets, Reflection};
 use super::recipe::Recipe;
@@ -121,7 +121,7 @@ impl<S: Simd> Weights<S> {
 
     /// Albedo of the lobe, linear RGB, with an estimate of that of glass.
     #[inline(always)]
-    fn albedo(&self, simd: S, terms: &Terms<S>, glass: f32x16<S>) -> Vec3x16<S> {
+    fn albedo(&self, simd: S, terms: &LobeTerms<S>, glass: f32x16<S>) -> Vec3x16<S> {
         let one = splat(simd, 1.0);
         let of = |straight: f32x16<S>| one - (one - straight) * (terms.a + straight * terms.b);
         let grey = self.opaque * of(self.opaque_straight) + self.glass * glass;
