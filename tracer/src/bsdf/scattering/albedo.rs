@@ -24,9 +24,9 @@ use crate::simd::{LANES, Lanes, Simd, SimdBase, SimdFloat, f32x16, splat};
 /// Means of a and b over the hemisphere, 4 times the integral of x^3 over x = sqrt(cos), for each row.
 const MEANS: [[f32; 2]; STEPS + 1] = means();
 
-/// Terms of the albedo at sixteen cosines.
+/// Terms of the lobe at sixteen cosines.
 #[derive(Clone, Copy)]
-pub(super) struct AlbedoTerms<S: Simd> {
+pub(super) struct LobeTerms<S: Simd> {
     pub scale: f32x16<S>,
     pub a: f32x16<S>,
     pub b: f32x16<S>,
@@ -45,7 +45,7 @@ impl<S: Simd> Rows<S> {
 
     /// The terms at cosines in [0, 1], between the places of the table.
     #[inline(always)]
-    pub(super) fn at(self, simd: S, cosine: f32x16<S>) -> AlbedoTerms<S> {
+    pub(super) fn at(self, simd: S, cosine: f32x16<S>) -> LobeTerms<S> {
         let (rows, columns) = (self.0.to_array(), place(simd, cosine).to_array());
         let mut terms = [Lanes::ZERO; 3];
         for lane in 0..LANES {
@@ -58,7 +58,7 @@ impl<S: Simd> Rows<S> {
                 term.0[lane] = first + down * (second - first);
             }
         }
-        AlbedoTerms { scale: terms[0].load(simd), a: terms[1].load(simd), b: terms[2].load(simd) }
+        LobeTerms { scale: terms[0].load(simd), a: terms[1].load(simd), b: terms[2].load(simd) }
     }
 
     /// Means of a and b.

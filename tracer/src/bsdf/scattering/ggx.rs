@@ -34,7 +34,7 @@ pub(super) struct Microfacets<S: Simd> {
 pub(super) struct Reflection<S: Simd> {
     /// f1 cos; zero below the surface.
     pub value: f32x16<S>,
-    /// Density over solid angle of mirrored directions at visible half vectors.
+    /// Density over solid angle of mirrored directions at visible half vectors, above and below the surface.
     pub density: f32x16<S>,
     /// v.h.
     pub cosine: f32x16<S>,
@@ -77,7 +77,7 @@ impl<S: Simd> Microfacets<S> {
         Vec3x16([across * self.alpha, along * self.alpha, up]).normalize(simd)
     }
 
-    /// The viewers' directions, mirrored at half vectors, and v.h.
+    /// The viewers' directions, mirrored at half vectors, and v.h. Some are below the surface.
     #[inline(always)]
     pub(super) fn mirrored(&self, half: Vec3x16<S>) -> (Vec3x16<S>, f32x16<S>) {
         let cosine = self.viewer.dot(half);
@@ -100,10 +100,9 @@ impl<S: Simd> Microfacets<S> {
         let smith = |cosine: f32x16<S>| (square + (one - square) * cosine * cosine).sqrt();
         let (of_viewer, of_light) = (smith(cos_v), smith(cos_l));
         let value = distribution * cos_l / (two * (cos_l * of_viewer + cos_v * of_light));
-        // Directions below the surface are sampled, too, and lost.
-        let density = distribution / (two * (cos_v + of_viewer));
+        let density = select(z.simd_gt(zero), distribution / (two * (cos_v + of_viewer)), zero);
         let cosine = length * splat(simd, 0.5);
-        Reflection { value: select(above, value, zero), density: select(above, density, zero), cosine }
+        Reflection { value: select(above, value, zero), density, cosine }
     }
 }
 

@@ -22,12 +22,13 @@
 //! Blinn-Phong          f1 F(c_s) + c_d g(v) g(l) / (pi G), alpha = sqrt(2 / (p + 2)): at most 1 where c_d + c_s is
 //! mirror               c_r R, with `fresnel` c_r Fx R; added to the diffuse part, whose colour stays
 //! glass                max(c_r, c_t) Fx R + c_t (1 - Fx) T; `thin`: T goes straight through, and Fx is that of a sheet
-//! metallic-roughness   m f1 F(base) + (1 - m) (1 - t) (k f1 F(d) + base c(v) c(l) / (pi C)) + (1 - m) t (f1 s s Fx + base (1 - Fx) T)
+//! metallic-roughness   m f1 F(base) + (1 - m) (1 - t) (k f1 F(d) + base c(v) c(l) / (pi C)) + (1 - m) t (p Fx + base (1 - Fx) T)
 //!                      with alpha = roughness^2, d = ((ior - 1) / (ior + 1))^2, k = specular_factor, c = 1 - k E the share that the
 //!                      dielectric leaves, and C its mean
 //! ```
 //!
-//! Surfaces with alpha below 0.001 are perfectly smooth. Rough glass refracts by visible microfacets, each weighted by its own 1 - Fx; light
+//! Surfaces with alpha below 0.001 are perfectly smooth. Rough glass refracts by visible microfacets, each weighted by its own 1 - Fx, and
+//! reflects by the density p of visible ones over cos; light
 //! behind it is found by being hit alone.
 
 mod albedo;
@@ -80,7 +81,7 @@ pub(crate) struct Scattered<S: Simd> {
     pub refracted: u32,
 }
 
-/// What scattering depends on apart from the materials.
+/// What scattering depends on except the materials.
 pub(crate) struct Setting<S: Simd> {
     /// Unit vectors to where the light goes.
     pub to_viewer: Vec3x16<S>,

@@ -2,17 +2,19 @@
 //!
 //! ```text
 //! diffuse     D c(v) c(l) / (pi C): what the lobe leaves, see [`super::albedo`]
-//! lobe        f1 (m F(b) + w F(d) + t s(v) s(l) Fx), Fx the exact share
-//!             F(x) = (x + (1 - x) (1 - v.h)^5) (1 + x (s(v) s(l) - 1))
+//! lobe        f1 (m F(b) + w F(d)) + t Fx p, F(x) = (x + (1 - x) (1 - v.h)^5) (1 + x (s(v) s(l) - 1)), Fx the exact share
 //! mirrored    perfectly smooth
 //! refracted   perfectly smooth
 //! frosted     refraction by microfacets
 //! ```
 //!
+//! Directions that leave a microfacet to the wrong side of the surface are mirrored at it, and p is the density of the result over cos. Rough
+//! glass has its reflection and refraction by that density, without further masking: it absorbs nothing, so none of its light is lost.
+//!
 //! Radiance is that of the vacuum: L / n^2, which refraction leaves as it is, so weights have no factor eta^2. Where a path starts and ends
 //! outside of all bodies the factors cancel; an emitter inside of a body states L / n^2.
 
-use super::albedo::{AlbedoTerms, Rows};
+use super::albedo::{LobeTerms, Rows};
 use super::fresnel::{exact, of_sheet, schlick};
 use super::ggx::{LEAST_ALPHA, Microfacets, Reflection};
 use super::recipe::Recipe;
@@ -24,7 +26,7 @@ use crate::simd::{Simd, SimdBase, bits, f32x16, mask_of, mask32x16, select, spla
 const LEAST_COSINE: f32 = 1e-3;
 
 /// Least estimate of the share that frosted glass transmits: where its normal reflects all light, some of its microfacets do not.
-const LEAST_FROSTED: f32 = 0.1;
+const LEAST_FROSTED: f32 = 0.25;
 
 /// The parts of sixteen materials.
 pub(super) struct Parts<S: Simd> {
@@ -108,19 +110,18 @@ impl<S: Simd> Rest<S> {
 }
 
 impl<S: Simd> Weights<S> {
-    /// Reflected light, linear RGB. `edge` is (1 - v.h)^5, `more` is s(v) s(l) - 1, and `glass` the exact share.
+    /// Light that metal and opaque dielectric reflect, linear RGB. `edge` is (1 - v.h)^5, and `more` is s(v) s(l) - 1.
     #[inline(always)]
-    fn reflected(&self, simd: S, edge: f32x16<S>, more: f32x16<S>, glass: f32x16<S>) -> Vec3x16<S> {
+    fn reflected(&self, simd: S, edge: f32x16<S>, more: f32x16<S>) -> Vec3x16<S> {
         let one = splat(simd, 1.0);
         let of = |straight: f32x16<S>| (straight + (one - straight) * edge) * (one + straight * more);
-        // Glass absorbs nothing: all that the microfacets lose comes back.
-        let grey = self.opaque * of(self.opaque_straight) + self.glass * glass * (one + more);
+        let grey = self.opaque * of(self.opaque_straight);
         Vec3x16(three!(i => self.metal * of(self.metal_straight.0[i]) + grey))
     }
 
     /// Albedo of the lobe, linear RGB, with an estimate of that of glass.
     #[inline(always)]
-    fn albedo(&self, simd: S, terms: &AlbedoTerms<S>, glass: f32x16<S>) -> Vec3x16<S> {
+    fn albedo(&self, simd: S, terms: &LobeTerms<S>, glass: f32x16<S>) -> Vec3x16<S> {
         let one = splat(simd, 1.0);
         let of = |straight: f32x16<S>| one - (one - straight) * (terms.a + straight * terms.b);
         let grey = self.opaque * of(self.opaque_straight) + self.glass * glass;
@@ -170,9 +171,9 @@ impl<S: Simd> Parts<S> {
         let dielectric = Dielectric { eta: select(thin, recipe.inverse_ior, setting.eta.load(simd)), thin };
         let glass = dielectric.share(simd, cosine);
         let factor = |of_glass: f32x16<S>| select(on(recipe.fresnel), of_glass, one);
-        let smooth_reflect = weights.reflected(simd, schlick(simd, cosine), zero, glass);
+        let smooth_reflect = weights.reflected(simd, schlick(simd, cosine), zero);
         let reflect = Vec3x16(three!(i => {
-            select(metallic_roughness | highlight, select(rough, zero, smooth_reflect.0[i]), zero)
+            select(metallic_roughness | highlight, select(rough, zero, smooth_reflect.0[i] + weights.glass * glass), zero)
                 + recipe.reflect[i] * factor(glass)
         }));
         let tinted = Vec3x16(three!(i => weights.glass * base.0[i]));
@@ -246,11 +247,20 @@ impl<S: Simd> Parts<S> {
     fn lobe(&self, simd: S, direction: Vec3x16<S>) -> Evaluated<S> {
         let Lobe { facets, rows, scale, weights, .. } = &self.lobe;
         let light = facets.local(direction);
-        let Reflection { value, density, cosine } = facets.reflection(simd, light);
-        let more = *scale * rows.at(simd, light.0[2]).scale - splat(simd, 1.0);
-        let glass = self.dielectric.share(simd, cosine);
-        let reflected = weights.reflected(simd, schlick(simd, cosine), more, glass);
-        Evaluated { value: reflected.scale(value), density }
+        let [x, y, z] = light.0;
+        let above = z.simd_gt(splat(simd, 0.0));
+        let direct = facets.reflection(simd, light);
+        let from_below = facets.reflection(simd, Vec3x16([x, y, -z]));
+        let more = *scale * rows.at(simd, z).scale - splat(simd, 1.0);
+        let reflected = weights.reflected(simd, schlick(simd, direct.cosine), more);
+        let of_glass =
+            |reflection: &Reflection<S>| reflection.density * self.dielectric.share(simd, reflection.cosine);
+        let glass = weights.glass * (of_glass(&direct) + of_glass(&from_below));
+        let value = Vec3x16(three!(i => {
+            select(above, reflected.0[i] * direct.value + glass, splat(simd, 0.0))
+        }));
+        let density = select(above, direct.density + from_below.density, splat(simd, 0.0));
+        Evaluated { value, density }
     }
 
     /// Random directions.
@@ -268,7 +278,8 @@ impl<S: Simd> Parts<S> {
         let facets = &self.lobe.facets;
         let half = if lobe | frosted == 0 { self.normals } else { facets.half_vectors(simd, at) };
         if lobe != 0 {
-            put(lobe, facets.global(facets.mirrored(half).0).normalize(simd));
+            let [x, y, z] = facets.mirrored(half).0.0;
+            put(lobe, facets.global(Vec3x16([x, y, z.abs()])).normalize(simd));
         }
         let mut through = Vec3x16::splat(simd, [0.0; 3]);
         if mirrored != 0 {
