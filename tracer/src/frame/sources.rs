@@ -63,9 +63,10 @@ fn add_model(frame: &PreparedFrame, item: u32, index: usize, sources: &mut Sourc
         if is_source(material) {
             let corners = instance.mesh.corners(triangle);
             let corners = corners.map(|corner| instance.linear * corner.as_dvec3() + instance.translation);
-            // The winding of the placed corners: a mirrored mesh shines to the side that it shows as its front.
             let [a, b, c] = corners;
-            let front = (b - a).cross(c - a).normalize_or_zero();
+            let winding = (b - a).cross(c - a).normalize_or_zero();
+            // A mirror turns the winding of the placed corners round, and leaves the front where it is.
+            let front = if instance.linear.determinant() < 0.0 { -winding } else { winding };
             sources.add_triangle((item, triangle), corners, front, material.emission);
         }
     }

@@ -59,10 +59,8 @@ impl PreparedFrame {
             Item::Model(index) => {
                 let instance = &self.instances[index];
                 let [a, b, c] = instance.mesh.corners(triangle).map(Vec3::as_dvec3);
-                // Scaled first: the cross product of a tiny triangle may underflow.
-                let normal =
-                    (instance.normals * (b - a).cross(c - a).normalize_or_zero()).normalize_or_zero();
-                if instance.linear.determinant() < 0.0 { -normal } else { normal }
+                // Scaled first: the cross product of a tiny triangle may underflow. The map of normals keeps the front of mirrored meshes.
+                (instance.normals * (b - a).cross(c - a).normalize_or_zero()).normalize_or_zero()
             }
         }
     }

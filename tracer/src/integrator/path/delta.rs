@@ -16,6 +16,8 @@ impl Group<'_> {
     #[inline(always)]
     pub(super) fn add_delta_lights<S: Simd, W: Watch>(&mut self, simd: S, watch: &mut W) {
         let frame = self.frame;
+        // Shadow tiles leave out surfaces that light may pass. All occlude here: light through glass is found by hitting its source.
+        self.batch.neighbours &= !frame.has_translucent_items();
         for light in frame.lights.iter().filter(|light| light.extent.is_none()) {
             self.add_delta_light(simd, light, watch);
         }

@@ -85,10 +85,10 @@ impl Compared {
         [found / count, expected / count]
     }
 
-    /// The mean of the differences in units of its standard deviation, largest channel: rounding that sends paths elsewhere brightens as many
-    /// as it darkens.
+    /// The mean of the differences of the samples that differ, in units of its standard deviation, largest channel: rounding that sends paths
+    /// elsewhere brightens as many as it darkens.
     pub(super) fn bias(&self) -> f64 {
-        let differences = || self.samples.iter().map(|(_, _, found, expected)| *found - *expected);
+        let differences = || self.different().map(|(_, _, found, expected)| *found - *expected);
         let sum: DVec3 = differences().sum();
         let squares: DVec3 = differences().map(|difference| difference * difference).sum();
         let deviation = DVec3::from_array(squares.to_array().map(f64::sqrt)).max(DVec3::splat(STEP));

@@ -17,7 +17,7 @@ use scenes::Furnished;
 use crate::scene::{CameraKind, Lens, PathSettings, Sampler};
 
 /// Largest share of samples that rounding may send elsewhere.
-const FEW: f64 = 0.01;
+const FEW: f64 = 0.002;
 
 /// Largest bias in standard deviations.
 const NO_BIAS: f64 = 4.5;

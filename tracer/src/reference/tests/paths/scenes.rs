@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::image::RgbImage;
-use crate::mesh::{CompiledMesh, Mesh, NamedMaterial};
+use crate::mesh::{CompiledMesh, Mesh, MeshId, NamedMaterial};
 use crate::scene::{
     Attenuation, Background, Camera, Filter, Light, LightKind, Material, Model, NormalMode, Plane, Scene,
     Sky, SkyPicture, Sphere, TextureMap, Triangle,
@@ -95,6 +95,31 @@ fn room() -> Scene {
     }
 }
 
+fn model(mesh: MeshId, material: u32, translate: DVec3, scale: DVec3) -> Model {
+    let rotate = DVec3::new(0.0, 30.0, 0.0);
+    let (materials, normals, group) = (vec![material], NormalMode::Flat, DMat3::IDENTITY);
+    Model { mesh, materials, normals, translate, rotate, scale, group }
+}
+
+fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
+    let triangle_materials = vec![0; triangles.len()];
+    let materials = vec![NamedMaterial::plain("m", Material::NEUTRAL)];
+    Mesh { positions, triangles, triangle_materials, materials, ..Mesh::default() }
+}
+
+fn compiled(mesh: &Mesh) -> Vec<Arc<CompiledMesh>> {
+    CompiledMesh::compile(mesh).into_iter().map(|(mesh, _)| Arc::new(mesh)).collect()
+}
+
+/// A closed mesh, its fronts outside.
+fn octahedron() -> Mesh {
+    let [x, y, z] = DVec3::AXES;
+    let equator = [z, x, -z, -x];
+    let positions = equator.into_iter().chain([y, -y]).collect();
+    let sides = (0..4_u32).flat_map(|i| [[i, (i + 1) % 4, 4], [(i + 1) % 4, i, 5]]);
+    mesh(positions, sides.collect())
+}
+
 /// The room with two diffuse balls.
 pub(super) fn diffuse_room() -> Furnished {
     let mut scene = room();
@@ -103,7 +128,8 @@ pub(super) fn diffuse_room() -> Furnished {
     Furnished::plain(scene)
 }
 
-/// The room with a glass ball, a mirror ball that is diffuse as well, a coated ball and a sheet.
+/// The room with a glass ball, a mirror ball that is diffuse as well, a coated ball, a sheet, and two pieces of glass that are the same mesh, one
+/// of them mirrored.
 pub(super) fn room_of_mirrors() -> Furnished {
     let mut scene = room();
     let first = scene.materials.len() as u32;
@@ -118,7 +144,10 @@ pub(super) fn room_of_mirrors() -> Furnished {
     scene.spheres.push(ball(DVec3::new(-0.3, 0.6, -1.2), 0.4, first + 2));
     let sheet = [[1.0, -1.0], [1.9, -1.0], [1.9, 1.2], [1.0, 1.2]].map(|[x, y]| DVec3::new(x, y, 1.0));
     scene.triangles.extend(quad(sheet, first + 3));
-    Furnished::plain(scene)
+    let meshes = compiled(&octahedron());
+    let gem = |x: f64, scale: DVec3| model(meshes[0].id(), first, DVec3::new(x, -0.6, 1.0), scale);
+    scene.models = vec![gem(-0.5, DVec3::splat(0.3)), gem(0.5, DVec3::new(-0.3, 0.3, 0.3))];
+    Furnished { scene, meshes, textures: Vec::new() }
 }
 
 /// A floor under water that absorbs light, with a lamp and a point light in the water; the water has no bottom around the floor.
@@ -170,27 +199,13 @@ pub(super) fn outdoors() -> Furnished {
     });
     let picture = RgbImage { width, height, pixels: pixels.collect() };
     let textures: Vec<Arc<Texture>> = Texture::new(&picture).into_iter().map(Arc::new).collect();
-    let mesh = Mesh {
-        positions: vec![DVec3::ZERO, DVec3::new(0.4, 0.0, 0.1), DVec3::new(0.0, 0.5, 0.0)],
-        triangles: vec![[0, 1, 2]],
-        triangle_materials: vec![0],
-        materials: vec![NamedMaterial::plain("lamp", Material::NEUTRAL)],
-        ..Mesh::default()
-    };
-    let meshes: Vec<_> = CompiledMesh::compile(&mesh).into_iter().map(|(mesh, _)| Arc::new(mesh)).collect();
+    let corners = vec![DVec3::ZERO, DVec3::new(0.4, 0.0, 0.1), DVec3::new(0.0, 0.5, 0.0)];
+    let meshes = compiled(&mesh(corners, vec![[0, 1, 2]]));
     let mut scene = room();
     scene.lights.clear();
     scene.triangles.truncate(2);
-    let model = |x: f64, scale: DVec3| Model {
-        mesh: meshes[0].id(),
-        materials: vec![2],
-        normals: NormalMode::Flat,
-        translate: DVec3::new(x, -0.9, 0.9),
-        rotate: DVec3::new(0.0, 30.0, 0.0),
-        scale,
-        group: DMat3::IDENTITY,
-    };
-    scene.models = vec![model(-0.3, DVec3::ONE), model(0.9, DVec3::new(-1.0, 1.0, 1.0))];
+    let lamp = |x: f64, scale: DVec3| model(meshes[0].id(), 2, DVec3::new(x, -0.9, 0.9), scale);
+    scene.models = vec![lamp(-0.3, DVec3::ONE), lamp(0.9, DVec3::new(-1.0, 1.0, 1.0))];
     scene.spheres.push(ball(DVec3::new(-0.8, -0.5, 0.0), 0.5, 3));
     scene.textures = vec![TextureMap::new(textures[0].id(), Filter::Bilinear)];
     scene.background = Background::Sky(Sky { picture: SkyPicture::Panorama(0), rotate: 35.0, strength: 1.5 });
