@@ -10,6 +10,7 @@ import time
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 import neutral
 
@@ -76,10 +77,9 @@ def _camera(camera):
         data.dof.use_dof, data.dof.focus_distance = True, camera.focus_distance
         data.dof.aperture_fstop = data.lens / 1000.0 / (2.0 * camera.aperture)
     placed = bpy.data.objects.new("camera", data)
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.column_stack(camera.axes())
-    matrix[:3, 3] = camera.position
-    placed.matrix_world = [list(row) for row in matrix.tolist()]
+    placed.location = camera.position
+    placed.rotation_mode = "QUATERNION"
+    placed.rotation_quaternion = Matrix(np.column_stack(camera.axes()).tolist()).to_quaternion()
     bpy.context.scene.collection.objects.link(placed)
     bpy.context.scene.camera = placed
 
