@@ -32,9 +32,9 @@ samples = 64
 max_depth = 6
 
 [camera]
-position = [0.0, 5.0, 15.0]
-look_at = [0.0, 0.5, 0.0]
-fov = 40.0
+position = [0.0, 5.4, 12.0]
+look_at = [0.0, -0.7, 0.6]
+fov = 39.0
 
 [background]
 panorama = \"sky/hazy.hdr\"
