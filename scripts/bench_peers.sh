@@ -6,6 +6,12 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 peers=$root/scripts/peers
 export PYTHONDONTWRITEBYTECODE=1
 
+# Paths have peers and options of their own.
+if [ "${1:-}" = --path ]; then
+    shift
+    exec "$peers/bench_paths.sh" "$@"
+fi
+
 usage() {
     cat <<'TEXT'
 usage: scripts/bench_peers.sh [OPTION ...]
@@ -25,6 +31,7 @@ both give the same picture, and prints milliseconds per frame and their ratio. T
                    and w2 with a mirror for a ground and one glass model
   --only-rays      measure nothing else
   --csv FILE       write the table to FILE as well
+  --path OPTION .. as the first option: compare the path integrator with Mitsuba and Cycles instead; --path --help
   --keep DIR       keep scenes, pictures and all figures in DIR
   --help           this text
 

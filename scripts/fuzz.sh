@@ -18,7 +18,7 @@ fi
 # seeds TARGET FOLDER: inputs to begin with, where the project has some.
 seeds() {
     case $1 in
-        scene) cp models/*.toml "$2" ;;
+        scene) find models -name '*.toml' -size -64k -exec cp {} "$2" \; ;;
         obj) find models -name '*.obj' -size -64k -exec cp {} "$2" \; ;;
     esac
 }

@@ -1,4 +1,4 @@
-//! Writes the meshes and textures of `models/`: everything that comes with the project to look at is made here.
+//! Writes the meshes, textures and skies of `models/`, and its scenes of many balls.
 //!
 //! `cargo run --release -p rayfarm-tracer --example make_models -- models`
 //!
@@ -39,6 +39,9 @@ fn write_all(folder: &Path) -> Result<(), String> {
         match &file.content {
             Content::Text(text) => std::fs::write(&path, text).map_err(told)?,
             Content::Picture(picture) => image::save(&path, picture).map_err(|error| error.to_string())?,
+            Content::Light(picture) => {
+                generator::save_light(&path, picture).map_err(|error| error.to_string())?;
+            }
         }
         println!("{:28} {:8} triangles", file.path, file.triangles);
     }

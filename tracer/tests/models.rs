@@ -8,15 +8,15 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use rayfarm_tracer::CompiledScene;
-use rayfarm_tracer::image;
-use rayfarm_tracer::scene::{LightKind, LoadedScene, load};
+use rayfarm_tracer::image::{self, SkyPixels};
+use rayfarm_tracer::scene::{FrameView, LightKind, LoadedScene, load};
 
 #[path = "../examples/make_models/mod.rs"]
 mod generator;
 
 use generator::Content;
 
-const SCENES: [&str; 8] = [
+const SCENES: [&str; 15] = [
     "room.toml",
     "room-soft.toml",
     "table.toml",
@@ -25,8 +25,15 @@ const SCENES: [&str; 8] = [
     "instances.toml",
     "lights.toml",
     "textured.toml",
+    "box.toml",
+    "balls-glass.toml",
+    "balls-metal.toml",
+    "balls-random.toml",
+    "balls-10000.toml",
+    "product-path.toml",
+    "showroom-path.toml",
 ];
-const MAX_FOLDER_BYTES: u64 = 11_000_000;
+const MAX_FOLDER_BYTES: u64 = 11_600_000;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../models")
@@ -153,17 +160,74 @@ fn the_generator_writes_exactly_the_files_in_the_repository() {
         let is_the_same = match &file.content {
             Content::Text(text) => fs::read_to_string(&path).is_ok_and(|found| found == *text),
             Content::Picture(picture) => image::load(&path).is_ok_and(|found| found == *picture),
+            Content::Light(picture) => image::load_sky(&path)
+                .is_ok_and(|found| found.pixels == SkyPixels::Linear(picture.clone()) && !found.translucent),
         };
         assert!(is_the_same, "{} is not what the generator writes: run it again", path.display());
         assert_eq!(file.triangles > 0, file.path.ends_with(".obj"), "{}", file.path);
     }
-    // The picture next to the scenes shows one of them.
+    // The picture next to the scenes shows one of them. Most scene files are written by hand.
     let is_generated = |path: &PathBuf| {
-        path.extension().is_some_and(|e| e == "obj" || e == "mtl" || e == "png")
+        path.extension().is_some_and(|e| e == "obj" || e == "mtl" || e == "png" || e == "hdr")
             && !path.ends_with("room.png")
     };
     let files = files_below(&folder()).into_iter().filter(is_generated);
-    assert_eq!(files.count(), generated.len(), "a file in models/ that the generator does not know");
+    let scenes = generated.iter().filter(|file| file.path.ends_with(".toml"));
+    assert_eq!(
+        files.count() + scenes.count(),
+        generated.len(),
+        "a file in models/ that the generator does not know"
+    );
+}
+
+#[test]
+fn a_written_sky_is_read_as_it_was() {
+    let sky = generator::files().into_iter().find_map(|file| match file.content {
+        Content::Light(picture) => Some(picture),
+        _ => None,
+    });
+    let sky = sky.unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sky.hdr");
+    generator::save_light(&path, &sky).unwrap();
+    // The sun is the brightest part, and no path is cut by the limit of 1024.
+    let brightest = sky.pixels.iter().copied().fold(0.0, f32::max);
+    assert!(brightest > 800.0 && brightest < 1024.0, "{brightest}");
+    assert!(image::load_sky(&path).unwrap().pixels == SkyPixels::Linear(sky));
+}
+
+#[test]
+fn the_scenes_of_paths_say_so_and_have_their_balls() {
+    let balls = |name: &str| {
+        let scene = loaded(name).scene;
+        assert!(FrameView::of(&scene).integrator.path().is_some(), "{name}");
+        (scene.spheres.len(), scene.lens.aperture)
+    };
+    assert_eq!(balls("balls-10000.toml").0, 10_000);
+    let (count, aperture) = balls("balls-random.toml");
+    assert!((480..=540).contains(&count) && aperture > 0.0, "{count} balls, a lens of {aperture}");
+    for name in
+        ["box.toml", "balls-glass.toml", "balls-metal.toml", "product-path.toml", "showroom-path.toml"]
+    {
+        balls(name);
+    }
+}
+
+#[test]
+fn small_balls_do_not_overlap() {
+    let scene = loaded("balls-random.toml").scene;
+    for (i, one) in scene.spheres.iter().enumerate() {
+        for other in &scene.spheres[..i] {
+            let reach = one.radius + other.radius;
+            // Lengths in the file are rounded to thousandths.
+            assert!(
+                one.center.distance(other.center) >= reach - 0.003,
+                "{:?} and {:?}",
+                one.center,
+                other.center
+            );
+        }
+    }
 }
 
 #[test]

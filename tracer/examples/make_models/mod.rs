@@ -1,6 +1,7 @@
 //! The generator: named shapes, things built of them, and the text that is written.
 
 mod angle;
+mod balls;
 mod camera;
 mod chess;
 mod color;
@@ -12,10 +13,13 @@ mod room;
 mod shape;
 mod shapes;
 mod showroom;
+mod sky;
 mod table;
 
+use std::path::Path;
+
 use obj::{Digits, Shading, mtl_text, obj_text};
-use rayfarm_tracer::image::RgbImage;
+use rayfarm_tracer::image::{Channels, ImageError, Layer, LinearImage, RgbImage, save_layers};
 use shape::Model;
 
 /// A generated file.
@@ -28,12 +32,14 @@ pub(crate) struct GeneratedFile {
     pub(crate) triangles: usize,
 }
 
-/// A text, or a picture that becomes a PNG.
+/// A text, a picture that becomes a PNG, or one of linear light that becomes a Radiance HDR.
 pub(crate) enum Content {
-    /// OBJ or MTL.
+    /// OBJ, MTL or a scene file.
     Text(String),
     /// A texture.
     Picture(RgbImage),
+    /// A sky.
+    Light(LinearImage),
 }
 
 /// The OBJ files of one scene with their common material library.
@@ -69,7 +75,8 @@ pub(crate) fn files() -> Vec<GeneratedFile> {
         table::folder(),
         showroom::folder(),
     ];
-    let others = [globe::textured_files(), table::pictures(), showroom::pictures()];
+    let others =
+        [globe::textured_files(), table::pictures(), showroom::pictures(), sky::pictures(), balls::scenes()];
     folders.iter().flat_map(files_of).chain(others.into_iter().flatten()).collect()
 }
 
@@ -88,4 +95,10 @@ fn files_of(folder: &Folder) -> Vec<GeneratedFile> {
         GeneratedFile { path, content: Content::Text(text), triangles }
     }));
     files
+}
+
+/// Writes linear light as Radiance HDR.
+pub(crate) fn save_light(path: &Path, picture: &LinearImage) -> Result<(), ImageError> {
+    let layer = Layer { name: "", channels: Channels::Color, picture: picture.clone() };
+    save_layers(path, &[layer])
 }

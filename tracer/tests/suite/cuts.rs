@@ -16,6 +16,17 @@ const SCENES: [&str; 7] = [
     "showroom.toml",
 ];
 
+/// Scenes of the path integrator: they are rendered with few paths.
+const PATH_SCENES: [&str; 7] = [
+    "box.toml",
+    "balls-glass.toml",
+    "balls-metal.toml",
+    "balls-random.toml",
+    "balls-10000.toml",
+    "product-path.toml",
+    "showroom-path.toml",
+];
+
 /// Widths: one column, less than a tile, a tile and some columns, tiles and some columns.
 const WIDTHS: [u32; 6] = [1, 3, 15, 17, 33, 150];
 
@@ -72,6 +83,22 @@ fn a_frame_cut_into_rows_is_the_same_frame_at_any_width_and_number_of_samples() 
                 assert!(same, "{name}, {width} x {height}, grid {grid}, {quality:?}, cut at {cuts:?}");
             }
         }
+    }
+}
+
+#[test]
+fn a_frame_of_paths_cut_into_rows_is_the_same_frame() {
+    let mut state = 0x7ee1_0add;
+    for name in PATH_SCENES {
+        let scene = compiled(name);
+        let (width, height, samples) = (33 + next(&mut state) % 5, 20 + next(&mut state) % 5, 2);
+        let view = FrameView { width, height, samples, ..FrameView::of(scene.scene()) };
+        let frame = PreparedFrame::new(Arc::clone(&scene), &view).unwrap();
+        let whole = rendered(&frame, 0..height);
+        let cuts = cuts(height, &mut state);
+        let pieces = cuts.windows(2).flat_map(|cut| rendered(&frame, cut[0]..cut[1]));
+        assert!(pieces.eq(whole.iter().copied()), "{name}, {width} x {height}, cut at {cuts:?}");
+        assert!(whole.iter().any(|byte| *byte > 0), "{name} is black");
     }
 }
 
