@@ -55,7 +55,8 @@ mod tests {
     fn one_bit_changes_half_of_the_bits() {
         let flipped: u32 = (0..32)
             .flat_map(|bit| {
-                (0..64_u32).map(move |i| (mixed_one(i * 7919) ^ mixed_one(i * 7919 ^ 1 << bit)).count_ones())
+                (0..64_u32)
+                    .map(move |i| (mixed_one(i * 7919) ^ mixed_one((i * 7919) ^ (1 << bit))).count_ones())
             })
             .sum();
         let mean = f64::from(flipped) / (32.0 * 64.0);

@@ -134,7 +134,7 @@ fn widened(cells: &[f32], columns: usize) -> Vec<f32> {
 }
 
 /// Cumulative probabilities of weights; even ones if all weights are 0.
-fn cumulative(weights: impl Iterator<Item = f64> + Clone + ExactSizeIterator) -> impl Iterator<Item = f32> {
+fn cumulative(weights: impl ExactSizeIterator<Item = f64> + Clone) -> impl Iterator<Item = f32> {
     let total: f64 = weights.clone().sum();
     let (count, even) = (weights.len(), !(total > 0.0));
     let total = if even { count as f64 } else { total };

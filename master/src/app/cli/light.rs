@@ -16,7 +16,8 @@ pub(crate) struct LightArgs {
     /// Random numbers of paths: another N, another noise.
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u32>,
-    /// End the paths of a pixel when its estimated relative error is below E; 0 is never.
+    /// End the paths of a pixel when its estimated relative error is below E, or, in the window and in passes, those of the picture; 0 is
+    /// never.
     #[arg(long, value_name = "E", value_parser = noise)]
     pub(crate) max_noise: Option<f32>,
     /// Radius of the lens in world units, for paths; 0 is a pinhole.

@@ -6,6 +6,7 @@ pub(super) const STEPS: usize = 16;
 
 /// Scale s, and the terms a and b of the share that the lobe leaves.
 #[rustfmt::skip]
+#[expect(clippy::approx_constant, reason = "a number of the table is near the logarithm of 2 by chance")]
 pub(super) const TABLE: [[[f32; 3]; STEPS + 1]; STEPS + 1] = [
     [
         [1.0, 0.0, 0.0], [1.0, 0.0194, 0.0], [1.0, 0.0757, 0.0], [1.0, 0.1638, 0.0], [1.0, 0.2758, 0.0],

@@ -77,10 +77,13 @@ pub(super) fn places<S: Simd>(
     rays.bound(simd, live);
 }
 
+/// Two random numbers of a sample, by its block and lane.
+pub(super) type LensNumbers<'a> = &'a dyn Fn(usize, usize) -> [f32; 2];
+
 /// Replaces the rays of a batch by those of the samples. `lens` are two random numbers of each sample where the camera has a lens.
 pub(super) fn put_rays(
     frame: &PreparedFrame,
-    lens: Option<(&EyeLens, &dyn Fn(usize, usize) -> [f32; 2])>,
+    lens: Option<(&EyeLens, LensNumbers<'_>)>,
     samples: &TileSamples<'_>,
     batch: &mut RayBatch<'_>,
 ) {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::super::regular::lanes_of;
 use super::super::stage::{Stage, Watch};
-use super::camera::{EyeLens, places, put_rays};
+use super::camera::{EyeLens, LensNumbers, places, put_rays};
 use super::queue::Path;
 use crate::bsdf::Media;
 use crate::cancel::Cancelled;
@@ -205,7 +205,7 @@ impl<'a> Group<'a> {
         let (sampler, seeds) = (self.settings.sampler, &self.seeds);
         let numbers =
             |block: usize, lane: usize| pair_of(sampler, seeds[block].0[lane], number, Dimension::LENS);
-        let lens = self.lens.as_ref().map(|lens| (lens, &numbers as &dyn Fn(usize, usize) -> [f32; 2]));
+        let lens = self.lens.as_ref().map(|lens| (lens, &numbers as LensNumbers<'_>));
         put_rays(frame, lens, &samples, &mut self.batch);
         self.batch.neighbours = true;
         self.hits.iter_mut().for_each(|hits| *hits = HitBlock::NONE);

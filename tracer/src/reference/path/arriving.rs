@@ -79,8 +79,9 @@ impl PathOracle<'_> {
         } else {
             (aim.direction, f64::INFINITY)
         };
-        self.oracle.visit_between(&start, way, reach, |index, _| {
-            occluded |= Some(index) != aim.emitter;
+        self.oracle.visit_between(&start, way, reach, |index, primitive| {
+            let casts = self.oracle.scene.materials[primitive.material as usize].casts_shadow;
+            occluded |= casts && Some(index) != aim.emitter;
             !occluded
         });
         occluded

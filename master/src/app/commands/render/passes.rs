@@ -49,9 +49,15 @@ impl PassRules {
         let options = &args.passes;
         let view = request.rendered();
         match options.given() {
-            None if passes::error_target(&view).is_none() => return Ok(None),
+            // Workers have all samples of their rows, and end those of each pixel by its own error.
+            None => return Ok(None),
             Some(option) if !passes::has_passes(&view) => {
                 return refuse(format!("{option} is for the path integrator: render with --integrator path"));
+            }
+            Some(option) if args.denoise => {
+                return refuse(format!(
+                    "{option} adds up passes, and --denoise needs all samples at once: leave one of them out"
+                ));
             }
             Some(option) if args.frames != 1 => {
                 return refuse(format!("{option} is for one picture: leave --frames out"));

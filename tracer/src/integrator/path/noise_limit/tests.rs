@@ -131,6 +131,6 @@ proptest! {
         prop_assert!(traced.start <= top && traced.end >= bottom && traced.end <= height);
         prop_assert_eq!(traced.start / 16, top / 16);
         prop_assert!(traced.end <= (top + 1).next_multiple_of(16));
-        prop_assert!(traced.start % CELL == 0 && (traced.end % CELL == 0 || traced.end == height));
+        prop_assert!(traced.start.is_multiple_of(CELL) && (traced.end.is_multiple_of(CELL) || traced.end == height));
     }
 }
