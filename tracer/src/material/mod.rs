@@ -23,7 +23,7 @@ pub struct Material {
     /// absent.
     pub cutout: Option<u32>,
     /// Emission, linear RGB, added on the front side of triangles and planes and on the outside of spheres; a factor of the
-    /// texel where there is a texture. It illuminates no other surface.
+    /// texel where there is a texture. Only paths find it as a light of other surfaces.
     pub emission: Vec3,
     /// Emission texture, an index into [`crate::scene::Scene::textures`].
     pub emission_texture: Option<u32>,
