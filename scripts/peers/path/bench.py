@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares the path integrator with Mitsuba and Cycles: the same scenes in turn, the pictures held against each other, medians.
+"""Compares the path integrator with Mitsuba and Cycles: the same scenes in turn, the pictures compared with each other, medians.
 
 Started by `scripts/bench_peers.sh --path`, which installs the peers.
 """
