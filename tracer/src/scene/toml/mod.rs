@@ -187,7 +187,7 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
         section(top, "background", "[background]", background::BACKGROUND_KEYS, background, first);
     let light = |table: Table<'_>| light::light(table, integrator, reading);
     let lights = list(top, "light", "[[light]]", (light::LIGHT_KEYS, MAX_LIGHTS), light, first);
-    let mut materials = read_materials(top, integrator, reading, first);
+    let mut materials = read_materials(top, reading, first);
     let plane = |table: Table<'_>| objects::plane(table, &mut materials, reading);
     let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
     if *integrator == Integrator::Direct {
@@ -297,12 +297,7 @@ fn within<'t>(
 }
 
 /// Reads all materials. All names are collected first, so that a fault in one material hides none in its users.
-fn read_materials(
-    top: Table<'_>,
-    integrator: &Integrator,
-    reading: &mut Reading,
-    first: &mut FirstFault,
-) -> Materials {
+fn read_materials(top: Table<'_>, reading: &mut Reading, first: &mut FirstFault) -> Materials {
     let Some(value) = top.get("material") else { return Materials::default() };
     let Some(entries) = first.keep(material_tables(value)) else { return Materials::default() };
     let mut materials = Materials::named(entries.iter().map(|(name, _)| name.to_string()).collect());
@@ -310,7 +305,7 @@ fn read_materials(
     for (index, (name, value)) in entries.into_iter().enumerate() {
         let name = format!("[material.{}]", fault::shortened(name));
         let read = Table::open(&name, value, material::MATERIAL_KEYS)
-            .and_then(|table| material::material(table, integrator, reading));
+            .and_then(|table| material::material(table, reading));
         if let Some(mut text) = first.keep(read) {
             patterns.extend(text.checker.take().map(|pattern| (index, pattern)));
             materials.define(index, text);

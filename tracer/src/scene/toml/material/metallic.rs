@@ -2,11 +2,9 @@
 
 use super::super::Reading;
 use super::super::fault::Read;
-use super::super::knobs;
 use super::super::table::Table;
 use super::super::value::Value;
 use crate::material::{Material, MetallicRoughness};
-use crate::scene::data::Integrator;
 
 /// Keys that make a material metallic-roughness. [`TEXTURE_KEY`] is another one.
 pub(super) const SHARE_KEYS: [&str; 4] = ["metallic", "roughness", "transmission", "specular_factor"];
@@ -42,7 +40,6 @@ pub(super) fn applied(
     table: Table<'_>,
     material: Material,
     model: MetallicRoughness,
-    integrator: &Integrator,
     reading: &mut Reading,
 ) -> Material {
     for key in OTHER_MODEL {
@@ -55,8 +52,7 @@ pub(super) fn applied(
     } else if material.thin {
         reading.idle(table, "absorption", "on a thin material, which has no inside");
     }
-    if *integrator == Integrator::Direct {
-        reading.idle(table, TEXTURE_KEY, knobs::with(integrator));
-    }
+    // Neither integrator looks it up.
+    reading.idle(table, TEXTURE_KEY, "yet");
     material.with_metallic_roughness(model)
 }

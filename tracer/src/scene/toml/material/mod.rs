@@ -13,7 +13,6 @@ use super::fault::Read;
 use super::table::Table;
 use super::value::Value;
 use crate::material::{MAX_EXPONENT, Material};
-use crate::scene::data::Integrator;
 use crate::scene::validate::MAX_LIGHT;
 
 pub(in crate::scene) use texture::{TextureText, TexturesText};
@@ -52,12 +51,8 @@ pub(super) struct MaterialText {
     pub(super) checker: Option<CheckerText>,
 }
 
-/// Reads a material of a scene that is rendered by `integrator`.
-pub(super) fn material(
-    table: Table<'_>,
-    integrator: &Integrator,
-    reading: &mut Reading,
-) -> Read<MaterialText> {
+/// Reads a material.
+pub(super) fn material(table: Table<'_>, reading: &mut Reading) -> Read<MaterialText> {
     let exponent = |value: Value<'_>| {
         value.number("from 0 to 1e6", |n| (0.0..=f64::from(MAX_EXPONENT)).contains(&n)).map(|n| n as f32)
     };
@@ -92,7 +87,7 @@ pub(super) fn material(
     };
     let material = bounce::bounces(table, material)?;
     let material = match metallic::model(table)? {
-        Some(model) => metallic::applied(table, material, model, integrator, reading),
+        Some(model) => metallic::applied(table, material, model, reading),
         None => {
             bounce::warn_about_unused_keys(table, &material, reading);
             material
