@@ -67,17 +67,18 @@ fn a_noisy_picture_has_all_samples() {
 #[test]
 fn all_levels_and_cuts_have_the_same_pixels() {
     let scene = room();
-    let view = FrameView { width: 21, height: 23, ..limited(&scene, 1, 72, 1e-4) };
+    let view = FrameView { width: 12, height: 11, ..limited(&scene, 1, 68, 1e-4) };
     let mut frame = PreparedFrame::new(compiled(&scene), &view).unwrap();
-    let (expected, rays) = rendered(&frame, 0..23);
+    let (expected, rays) = rendered(&frame, 0..11);
     // The background has no noise; the walls have.
-    assert!(rays.primary > 21 * 23 * 64 && rays.primary < 21 * 23 * 72, "{rays:?}");
+    assert!(rays.primary > 12 * 11 * 64 && rays.primary < 12 * 11 * 68, "{rays:?}");
     for level in simd::all() {
         frame.level = level;
-        assert!(rendered(&frame, 0..23).0 == expected, "{}", simd::name(level));
+        assert!(rendered(&frame, 0..11).0 == expected, "{}", simd::name(level));
     }
+    frame.level = simd::best();
     let row = frame.row_bytes();
-    for (top, bottom) in [(0, 1), (1, 6), (6, 17), (17, 22), (22, 23)] {
+    for (top, bottom) in [(0, 1), (1, 6), (6, 11)] {
         let bytes = top as usize * row..bottom as usize * row;
         assert!(rendered(&frame, top..bottom).0 == expected[bytes], "rows {top} to {bottom}");
     }
