@@ -163,7 +163,8 @@ fn lenses_and_metallic_roughness_reach_the_scene() {
     let folder = folder(scene);
     picture(&folder, "rough.png", 2, 2);
     let LoadedScene { scene, textures, warnings, .. } = folder.load("s.toml");
-    assert_eq!((textures.len(), warnings), (1, Vec::new()));
+    assert_eq!((textures.len(), warnings.len()), (1, 1));
+    assert!(warnings[0].ends_with("`metallic_roughness_texture` in [material.gold] has no effect yet"));
     assert_eq!((scene.lens.aperture, scene.lens.focus_distance), (0.5, Some(3.0)));
     let view = FrameView::of(&scene);
     assert!(view.integrator.path().is_some() && view.validate().is_ok());
