@@ -183,7 +183,7 @@ fn the_table_matches_the_oracle() {
 
 #[test]
 fn the_showroom_matches_the_oracle() {
-    // Two pixels of the light that is a millionth off a surface: their shadow rays graze it, within the rounding of f32 points.
+    // Two pixels of the light that is a millionth off a surface differ. Why is not known.
     check("showroom.toml", 23, 2);
 }
 

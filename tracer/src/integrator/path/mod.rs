@@ -10,7 +10,7 @@
 //! ```
 //!
 //! w are the weights of multiple importance sampling by the power heuristic (Veach 1997): light that two strategies find counts once. The
-//! first vertex gets the light of all lights without extent, by tiles of shadow rays, and a sample of the others; later ones get a sample
+//! first vertex gets the light of all lights without extent, by tiles of shadow rays, and a sample of the others; later ones, and all in scenes with volumes, get a sample
 //! of one light.
 //!
 //! All random numbers are functions of pixel, sample and dimension (`sampler`), and the radiance of a sample is rounded to whole steps

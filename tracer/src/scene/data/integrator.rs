@@ -76,8 +76,8 @@ pub struct PathSettings {
     pub sampler: Sampler,
     /// Whether paths of little weight end early, by Russian roulette: the mean of the picture does not change.
     pub roulette: bool,
-    /// Largest radiance, in its brightest channel, that a sample has from light that was scattered more than once; 0 is no limit. A
-    /// limit darkens the picture.
+    /// Largest radiance, in its brightest channel, that one contribution adds to a sample, of light that was scattered more than once; 0 is
+    /// no limit. A limit darkens the picture.
     pub clamp_indirect: f32,
     /// Relative error at which a pixel has enough samples; 0 is never.
     pub max_noise: f32,
