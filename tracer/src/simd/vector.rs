@@ -3,7 +3,7 @@
 use fearless_simd::{Simd, SimdBase, SimdFloat, f32x16};
 
 use super::math::to_unit;
-use super::{Lanes, splat, three};
+use super::{Lanes, select, splat, three};
 
 /// Whether fused operations are emulated by hundreds of instructions: on x86 processors without AVX2.
 const fn emulates_fused<S: Simd>() -> bool {
@@ -105,5 +105,16 @@ impl<S: Simd> Vec3x16<S> {
         let [x, y, z] = self.0;
         let columns = three!(i => Self::splat(simd, columns[i]));
         columns[0].scale(x).add(columns[1].scale(y)).add(columns[2].scale(z))
+    }
+
+    /// Two unit vectors across unit vectors and each other (Duff et al., "Building an Orthonormal Basis, Revisited", 2017).
+    #[inline(always)]
+    pub(crate) fn basis(self, simd: S) -> [Self; 2] {
+        let [x, y, z] = self.0;
+        let one = splat(simd, 1.0);
+        let sign = select(z.simd_lt(splat(simd, 0.0)), -one, one);
+        let a = -one / (sign + z);
+        let b = x * y * a;
+        [Self([one + sign * x * x * a, sign * b, -(sign * x)]), Self([b, sign + y * y * a, -y])]
     }
 }

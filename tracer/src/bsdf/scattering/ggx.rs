@@ -13,7 +13,6 @@
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 
-use super::lambert::frame_of;
 use crate::simd::math::sin_cos;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{Simd, SimdBase, SimdFloat, f32x16, mask32x16, select, splat};
@@ -44,7 +43,7 @@ impl<S: Simd> Microfacets<S> {
     /// Surfaces with unit normals, on the side of the viewers.
     #[inline(always)]
     pub(super) fn new(simd: S, alpha: f32x16<S>, normals: Vec3x16<S>, to_viewer: Vec3x16<S>) -> Self {
-        let [tangent, bitangent] = frame_of(simd, normals);
+        let [tangent, bitangent] = normals.basis(simd);
         let axes = [tangent, bitangent, normals];
         Self { alpha, axes, viewer: into(axes, to_viewer) }
     }

@@ -19,7 +19,7 @@ pub(super) fn eval<S: Simd>(simd: S, diffuse: Vec3x16<S>, cosine: f32x16<S>) -> 
 pub(super) fn sample<S: Simd>(simd: S, normals: Vec3x16<S>, at: [f32x16<S>; 2]) -> (Vec3x16<S>, f32x16<S>) {
     let [x, y] = on_disk(simd, at);
     let height = (splat(simd, 1.0) - x * x - y * y).max(splat(simd, 0.0)).sqrt();
-    let [tangent, bitangent] = frame_of(simd, normals);
+    let [tangent, bitangent] = normals.basis(simd);
     let direction = tangent.scale(x).add(bitangent.scale(y)).add(normals.scale(height)).normalize(simd);
     (direction, height * splat(simd, FRAC_1_PI))
 }
@@ -36,15 +36,4 @@ pub(super) fn on_disk<S: Simd>(simd: S, [u, v]: [f32x16<S>; 2]) -> [f32x16<S>; 2
     let angle = select(wide, turn, splat(simd, FRAC_PI_2) - turn);
     let [sin, cos] = sin_cos(simd, angle);
     [radius * cos, radius * sin]
-}
-
-/// Two unit vectors across unit vectors and each other (Duff et al., "Building an orthonormal basis, revisited", 2017).
-#[inline(always)]
-pub(super) fn frame_of<S: Simd>(simd: S, normals: Vec3x16<S>) -> [Vec3x16<S>; 2] {
-    let [x, y, z] = normals.0;
-    let one = splat(simd, 1.0);
-    let sign = select(z.simd_lt(splat(simd, 0.0)), -one, one);
-    let a = -one / (sign + z);
-    let b = x * y * a;
-    [Vec3x16([one + sign * x * x * a, sign * b, -(sign * x)]), Vec3x16([b, sign + y * y * a, -y])]
 }

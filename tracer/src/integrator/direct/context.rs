@@ -167,13 +167,11 @@ impl<'a, W: Watch> TileContext<'a, W> {
     #[inline(never)]
     fn shade_batch<S: Simd>(&mut self, simd: S, batch: &RayBatch<'_>) {
         self.watch.enter(Stage::Surfaces);
+        self.surfaces.find_of_batch(simd, batch, &self.hits);
+        self.watch.enter(Stage::Shading);
         simd.vectorize(
             #[inline(always)]
-            || {
-                self.surfaces.find(simd, batch, &self.hits);
-                self.watch.enter(Stage::Shading);
-                shade(simd, batch, self);
-            },
+            || shade(simd, batch, self),
         );
     }
 }

@@ -72,7 +72,7 @@ pub(super) fn sample<'t, S: Simd>(
     let sine = (part * (one + cosine)).max(zero).sqrt();
     let [turn_sin, turn_cos] = sin_cos(simd, at[1] * splat(simd, TAU));
     let axis = way.normalize(simd);
-    let [across, along] = across(simd, axis);
+    let [across, along] = axis.basis(simd);
     let direction = across.scale(sine * turn_cos).add(along.scale(sine * turn_sin)).add(axis.scale(cosine));
     let direction = direction.normalize(simd);
     let distance = square.sqrt();
@@ -82,15 +82,4 @@ pub(super) fn sample<'t, S: Simd>(
     put(live, direction, distance * cosine - half_chord, density, samples);
     samples.live |= live;
     live
-}
-
-/// Two unit vectors across unit vectors and each other (Duff et al. 2017).
-#[inline(always)]
-fn across<S: Simd>(simd: S, axis: Vec3x16<S>) -> [Vec3x16<S>; 2] {
-    let [x, y, z] = axis.0;
-    let one = splat(simd, 1.0);
-    let sign = select(z.simd_lt(splat(simd, 0.0)), -one, one);
-    let a = -one / (sign + z);
-    let b = x * y * a;
-    [Vec3x16([one + sign * x * x * a, sign * b, -(sign * x)]), Vec3x16([b, sign + y * y * a, -y])]
 }
