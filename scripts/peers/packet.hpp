@@ -67,6 +67,8 @@ class PacketTracer {
             rays.ray.mask[i] = ~0u;
             rays.ray.time[i] = 0.0f;
             rays.ray.flags[i] = 0;
+            // Embree leaves the normal of a ray that misses, and Debian's build checks the shadow rays of such lanes too.
+            rays.hit.Ng_x[i] = 0.0f, rays.hit.Ng_y[i] = 0.0f, rays.hit.Ng_z[i] = 1.0f;
             rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
             rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
         }
