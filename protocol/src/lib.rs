@@ -48,7 +48,9 @@ pub mod envelope;
 mod error;
 #[cfg(feature = "transport")]
 pub mod handshake;
+mod hex;
 mod ids;
+mod key_hash;
 mod kind;
 pub mod limits;
 pub mod message;
@@ -59,12 +61,15 @@ pub mod session;
 #[cfg(feature = "transport")]
 pub mod tcp;
 mod token;
+#[cfg(feature = "transport")]
+pub mod transport;
 
 pub use cost::Cost;
 pub use error::{ProtocolError, Role};
 pub use ids::{AssetId, FrameId, Lease};
+pub use key_hash::{KeyHash, KeyHashError};
 pub use message::{FrameAnnounce, Hello, Reconnect, ToMaster, ToWorker, Welcome};
 pub use pixels::{Encoding, PixelFormat, PixelsHeader};
 
 /// Version of everything after the preamble. It grows with every change that an older peer would misread.
-pub const PROTOCOL_VERSION: u16 = 6;
+pub const PROTOCOL_VERSION: u16 = 7;

@@ -1,0 +1,20 @@
+//! Connections, plain and encrypted, and the keys and tokens by which their ends know each other.
+//!
+//! 1. [`PrivateKey`]: the P-256 key of a master or a worker. Its public half, hashed ([`KeyHash`]), is the identity.
+//! 2. [`JoinLine`]: address, key and token of a master as one line of text.
+//! 3. [`MasterSecurity`] and [`WorkerSecurity`]: whether an end uses TLS, and with what.
+//! 4. [`Connection`]: the stream that results from a handshake, with [`Connection::peer_key`].
+//!
+//! Names and dates of certificates are ignored, so nothing depends on a clock.
+
+mod certificate;
+mod connection;
+mod join_line;
+mod private_key;
+mod security;
+
+pub use crate::key_hash::{KeyHash, KeyHashError};
+pub use connection::Connection;
+pub use join_line::{JoinLine, JoinLineError, JoinToken};
+pub use private_key::{PrivateKey, PrivateKeyError};
+pub use security::{MasterSecurity, MasterTrust, WorkerSecurity};
