@@ -27,7 +27,11 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
 /// The master: leases two rows and returns their pixels.
 async fn request(mut stream: DuplexStream) -> Result<Bytes, Box<dyn Error>> {
-    let hello = handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await?;
+    let hello =
+        handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
+            Ok(Welcome { worker: 1 })
+        })
+        .await?;
     println!("worker '{}' with {} render threads", hello.name, hello.threads);
 
     let (sender, mut receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
@@ -42,8 +46,14 @@ async fn request(mut stream: DuplexStream) -> Result<Bytes, Box<dyn Error>> {
 
 /// The worker: answers every lease with grey rows, until the master closes the session.
 async fn serve(mut stream: DuplexStream) -> Result<(), Box<dyn Error>> {
-    let hello = Hello { name: "example".into(), threads: 1, simd: "none".into(), software: "0".into() };
-    handshake::as_worker(&mut stream, &hello).await?;
+    let hello = Hello {
+        name: "example".into(),
+        threads: 1,
+        simd: "none".into(),
+        software: "0".into(),
+        tags: Vec::new(),
+    };
+    handshake::as_worker(&mut stream, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello).await?;
 
     let (sender, mut receiver, _) = session::spawn::<_, ToMaster, ToWorker>(stream);
     while let Some(message) = receiver.recv().await.transpose()? {

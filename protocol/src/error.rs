@@ -4,9 +4,9 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
-use crate::PROTOCOL_VERSION;
 use crate::codec::CodecError;
 use crate::kind::Kind;
+use crate::{KeyHash, PROTOCOL_VERSION};
 
 /// One of the two ends of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +89,41 @@ pub enum ProtocolError {
         theirs: u16,
     },
 
+    /// One end uses TLS and the other does not.
+    #[error("{}", transport_mismatch(*.our_role, *.encrypted))]
+    Transport {
+        /// Role of this end.
+        our_role: Role,
+        /// Whether this end uses TLS.
+        encrypted: bool,
+    },
+
+    /// The master has another key than the join line.
+    #[error(
+        "the master has another key ({}) than the join line ({}): it was reinstalled, its key was rotated, or another \
+         machine answers; copy the join line that the master prints now", .theirs.short(), .expected.short()
+    )]
+    WrongKey {
+        /// Hash of the key at the other end.
+        theirs: KeyHash,
+        /// Hash in the join line.
+        expected: KeyHash,
+    },
+
+    /// The worker has not proved the farm's token.
+    #[error(
+        "the worker does not know the farm's token, which may have been rotated; \
+         start it with the join line that the master prints now"
+    )]
+    WrongToken,
+
+    /// The TLS handshake failed.
+    #[error("no encrypted connection: {why}")]
+    Tls {
+        /// Error of the TLS library.
+        why: String,
+    },
+
     /// The master refused this worker.
     #[error("refused by the {by}: {reason}")]
     Refused {
@@ -152,12 +187,15 @@ pub enum ProtocolError {
 }
 
 impl ProtocolError {
-    /// Whether every later attempt must fail as well: another release, another program, a refusal.
-    pub fn is_final(&self) -> bool {
+    /// Whether a worker must not try again: another program at the address, or a refusal.
+    ///
+    /// `encrypted`: whether the worker uses TLS. Then only a refusal is final, because only a refusal comes from an end
+    /// that has proved the master's key. Everything else may come from a false master.
+    pub fn is_final(&self, encrypted: bool) -> bool {
         match self {
-            Self::NotRayfarm { .. } | Self::SameRole { .. } | Self::Version { .. } | Self::Refused { .. } => {
-                true
-            }
+            Self::Refused { .. } => true,
+            Self::NotRayfarm { .. } | Self::SameRole { .. } | Self::Transport { .. } => !encrypted,
+            Self::Version { .. } | Self::WrongKey { .. } | Self::WrongToken | Self::Tls { .. } => false,
             Self::Io { .. } | Self::Closed { .. } | Self::Deadline { .. } | Self::NotNow { .. } => false,
             Self::UnknownKind { .. } | Self::Unexpected { .. } | Self::TooLong { .. } => false,
             Self::Malformed { .. } | Self::Codec { .. } => false,
@@ -176,4 +214,17 @@ fn version_mismatch(our_role: Role, ours: u16, theirs: u16) -> String {
         "this {our_role} has protocol version {ours}, the {peer} has version {theirs}; \
          install the same release of rayfarm on both machines (the {older}'s is the older one)"
     )
+}
+
+fn transport_mismatch(our_role: Role, encrypted: bool) -> &'static str {
+    match (our_role, encrypted) {
+        (Role::Master, true) | (Role::Worker, false) => {
+            "the master requires an encrypted connection, which the worker does not use; \
+             start the worker with the join line that the master prints: rayfarm-worker --join rf1:..."
+        }
+        (Role::Master, false) | (Role::Worker, true) => {
+            "the worker requires an encrypted connection by its join line, which the master does not use; \
+             start the master without --insecure, or the worker without a join line"
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::limits::{MAX_CHUNK_BYTES, MAX_CONTROL_BYTES, MAX_PIXELS_BYTES, MAX_VIEW_BYTES};
+use crate::limits::{MAX_CHUNK_BYTES, MAX_CONTROL_BYTES, MAX_PIXELS_BYTES, MAX_VIEW_BYTES, PROOF_BYTES};
 
 /// Number of bytes of the longest fixed-layout head between a header and the bulk bytes of a message.
 pub(crate) const MAX_HEAD_BYTES: usize = 88;
@@ -17,6 +17,8 @@ pub enum Kind {
     Welcome = 0x02,
     /// A handshake is refused. The body is the reason as plain UTF-8, in every version.
     Refused = 0x03,
+    /// A worker proves the token of the farm, before its hello and with TLS only.
+    Proof = 0x04,
     /// Announcement of a frame whose leases may follow.
     Frame = 0x10,
     /// A lease.
@@ -57,10 +59,11 @@ pub enum Kind {
 
 impl Kind {
     /// All types.
-    pub const ALL: [Kind; 21] = [
+    pub const ALL: [Kind; 22] = [
         Self::Hello,
         Self::Welcome,
         Self::Refused,
+        Self::Proof,
         Self::Frame,
         Self::Segment,
         Self::Cancel,
@@ -87,6 +90,7 @@ impl Kind {
             Self::Frame => MAX_HEAD_BYTES + MAX_VIEW_BYTES,
             Self::AssetChunk => MAX_HEAD_BYTES + MAX_CHUNK_BYTES,
             Self::Pixels => MAX_HEAD_BYTES + MAX_PIXELS_BYTES,
+            Self::Proof => PROOF_BYTES,
             Self::Hello | Self::Welcome | Self::Refused => MAX_CONTROL_BYTES,
             Self::Segment | Self::Cancel | Self::AssetBegin | Self::AssetUnknown => MAX_CONTROL_BYTES,
             Self::AssetFrom | Self::ShareKey | Self::Sharing | Self::HaveAsset => MAX_CONTROL_BYTES,

@@ -5,6 +5,18 @@ use std::time::Duration;
 /// Largest body of a control message, and of every message of a handshake, in bytes (4 KiB).
 pub const MAX_CONTROL_BYTES: usize = 4 << 10;
 
+/// Number of bytes of the proof of a token.
+pub const PROOF_BYTES: usize = 32;
+
+/// Most bytes of a connection with TLS, records included, until the peer's hello has been read (16 KiB).
+pub const MAX_UNAUTHENTICATED_BYTES: usize = 16 << 10;
+
+/// Most tags of a worker.
+pub const MAX_TAGS: usize = 16;
+
+/// Largest tag of a worker, in bytes.
+pub const MAX_TAG_BYTES: usize = 64;
+
 /// Largest size of a worker's name, of its SIMD level and of its software version, in bytes each.
 pub const MAX_NAME_BYTES: usize = 255;
 
@@ -68,6 +80,9 @@ pub const INBOX_BYTES: usize = 2 * (MAX_PIXELS_BYTES + MAX_CONTROL_BYTES);
 
 /// Time limit from the first byte of the preamble to the end of the handshake.
 pub const HANDSHAKE_DEADLINE: Duration = Duration::from_secs(5);
+
+/// Time within which a master must receive the first byte of a connection.
+pub const FIRST_BYTE_DEADLINE: Duration = Duration::from_secs(1);
 
 /// Time for which a session reads on after its writer has failed or has written a disconnect: the peer's own disconnect
 /// may be in the receive buffer.

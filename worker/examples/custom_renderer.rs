@@ -110,6 +110,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
         disk_cache: None,
         compress: None,
         share: Share::Off,
+        security: Default::default(),
     };
     let worker = tokio::spawn(run_with(Gradient, options, ShutdownHandle::new()));
     let pixels = render_frame(listener, Bytes::from_static(&[255, 160, 0])).await?;
@@ -121,7 +122,10 @@ async fn main() -> Result<(), Box<dyn Error>> {
 /// The master: takes one worker, sends it the scene that it requests, and returns the pixels of one frame.
 async fn render_frame(listener: TcpListener, scene: Bytes) -> Result<Bytes, Box<dyn Error>> {
     let (mut stream, _) = listener.accept().await?;
-    handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await?;
+    handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
+        Ok(Welcome { worker: 1 })
+    })
+    .await?;
     let (sender, mut receiver, _) = session::spawn::<_, ToWorker, ToMaster>(stream);
 
     let frame = FrameId(1);

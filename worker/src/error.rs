@@ -55,10 +55,12 @@ pub enum WorkerError {
 
 impl WorkerError {
     /// Whether a later attempt to connect can succeed.
-    pub(crate) fn is_transient(&self) -> bool {
+    ///
+    /// `encrypted`: whether the worker connects through TLS. Then only a master that has proved its key ends the worker.
+    pub(crate) fn is_transient(&self, encrypted: bool) -> bool {
         match self {
             Self::Resolve { .. } | Self::Connect { .. } | Self::Lost { .. } => true,
-            Self::Handshake { source, .. } => !source.is_final(),
+            Self::Handshake { source, .. } => !source.is_final(encrypted),
             Self::Threads { .. } => false,
         }
     }

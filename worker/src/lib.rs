@@ -27,7 +27,7 @@
 //! # let address = listener.local_addr()?;
 //! # tokio::spawn(async move {
 //! #     let (mut stream, _) = listener.accept().await.unwrap();
-//! #     handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
+//! #     handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| Ok(Welcome { worker: 1 })).await.unwrap();
 //! #     let (sender, _receiver, _) = session::spawn::<_, ToWorker, ToMaster>(stream);
 //! #     let disconnect = ToWorker::Disconnect { reason: "done".into(), reconnect: Reconnect::Never };
 //! #     sender.send(disconnect).await.unwrap();
@@ -43,6 +43,7 @@
 //!     disk_cache: None,
 //!     compress: None,
 //!     share: Share::Auto,
+//!     security: Default::default(),
 //! };
 //! run(options, ShutdownHandle::new()).await?;
 //! # Ok(())

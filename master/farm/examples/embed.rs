@@ -51,5 +51,6 @@ fn worker_options(master: SocketAddr) -> WorkerOptions {
         disk_cache: None,
         compress: None,
         share: Share::Off,
+        security: Default::default(),
     }
 }

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::sync::Arc;
 
+use rayfarm_protocol::transport::MasterSecurity;
 use rayfarm_scheduler::SegmentPolicy;
 use rayfarm_tracer::mesh::CompiledMesh;
 use rayfarm_tracer::scene::Scene;
@@ -33,6 +34,8 @@ pub struct FarmOptions {
     /// The share of the segments, in percent (0 to 100), that are rendered a second time, by another worker or the master,
     /// to find workers that send wrong pixels. They are drawn at random after their pixels have arrived.
     pub verify_percent: u8,
+    /// Whether workers connect through TLS and must prove a token.
+    pub security: MasterSecurity,
 }
 
 /// A scene with its meshes and textures.

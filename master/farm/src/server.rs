@@ -8,7 +8,8 @@ use std::time::Duration;
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
-use rayfarm_protocol::{AssetId, Hello, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
+use rayfarm_protocol::transport::Connection;
+use rayfarm_protocol::{AssetId, Hello, KeyHash, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
 use rayfarm_scheduler::{Event, WorkerId};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Semaphore, mpsc};
@@ -84,24 +85,24 @@ struct Admitted {
     worker: WorkerId,
     hello: Hello,
     identity: Identity,
-    stream: TcpStream,
+    stream: Connection<TcpStream>,
 }
 
 /// Shakes hands with a peer. Failures are logged.
-async fn shake_hands(driver: &Driver, mut stream: TcpStream, address: SocketAddr) -> Option<Admitted> {
+async fn shake_hands(driver: &Driver, stream: TcpStream, address: SocketAddr) -> Option<Admitted> {
     if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
     let mut admitted = None;
-    let decide = |hello: &Hello| {
+    let decide = |hello: &Hello, _key: Option<KeyHash>| {
         let identity = driver.tickets.identify(&hello.name, address.ip());
         match driver.refusal(&identity) {
             Some(reason) => Err(reason),
             None => Ok(Welcome { worker: admitted.insert((driver.next_worker(), identity)).0.0 }),
         }
     };
-    match handshake::as_master(&mut stream, decide).await {
-        Ok(hello) => admitted.map(|(worker, identity)| {
+    match handshake::as_master(stream, &driver.security, decide).await {
+        Ok((stream, hello)) => admitted.map(|(worker, identity)| {
             // A ticket is never displayed.
             let hello = Hello { name: identity.name(), ..hello };
             Admitted { worker, hello, identity, stream }
@@ -121,7 +122,7 @@ async fn shake_hands(driver: &Driver, mut stream: TcpStream, address: SocketAddr
 /// Runs a session to its end.
 async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     let Admitted { worker, hello, identity, stream } = admitted;
-    let Hello { name, threads, simd, software } = hello.clone();
+    let Hello { name, threads, simd, software, .. } = hello.clone();
     tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
     let (sender, receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);

@@ -1,14 +1,16 @@
-//! The first twelve bytes from either end: magic, version (little endian), role. Their layout never changes, so that any
+//! The first twelve bytes from either end: magic, version (little endian), role, transport (0 plain, 1 TLS). Their layout never changes, so that any
 //! two releases can report their mismatch.
 //!
 //! ```text
 //! 0           8         10     11
-//! | RAYFARM\n | version | role | 0 |
+//! | RAYFARM\n | version | role | transport |
 //! ```
 
 use rayfarm_text::printable;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::time::timeout;
 
+use crate::limits::FIRST_BYTE_DEADLINE;
 use crate::{PROTOCOL_VERSION, ProtocolError, Role};
 
 pub(crate) const PREAMBLE_BYTES: usize = 12;
@@ -19,17 +21,19 @@ const MAGIC: [u8; 8] = *b"RAYFARM\n";
 pub(crate) struct Preamble {
     pub(crate) version: u16,
     pub(crate) role: Role,
+    /// 0 for a plain connection, 1 for TLS. Other versions may have more.
+    pub(crate) transport: u8,
 }
 
 impl Preamble {
-    pub(crate) fn ours(role: Role) -> Self {
-        Self { version: PROTOCOL_VERSION, role }
+    pub(crate) fn ours(role: Role, encrypted: bool) -> Self {
+        Self { version: PROTOCOL_VERSION, role, transport: encrypted.into() }
     }
 
     pub(crate) fn to_bytes(self) -> [u8; PREAMBLE_BYTES] {
         let [m0, m1, m2, m3, m4, m5, m6, m7] = MAGIC;
         let [v0, v1] = self.version.to_le_bytes();
-        [m0, m1, m2, m3, m4, m5, m6, m7, v0, v1, role_byte(self.role), 0]
+        [m0, m1, m2, m3, m4, m5, m6, m7, v0, v1, role_byte(self.role), self.transport]
     }
 }
 
@@ -41,17 +45,17 @@ fn role_byte(role: Role) -> u8 {
 }
 
 /// Sends this end's preamble and reads the peer's concurrently: a pipe may hold less than one preamble.
-pub(crate) async fn exchange<S>(io: &mut S, our_role: Role) -> Result<Preamble, ProtocolError>
+pub(crate) async fn exchange<S>(io: &mut S, ours: Preamble) -> Result<Preamble, ProtocolError>
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
     let (mut reader, mut writer) = tokio::io::split(io);
     let sending = async {
-        writer.write_all(&Preamble::ours(our_role).to_bytes()).await?;
+        writer.write_all(&ours.to_bytes()).await?;
         writer.flush().await
     };
     // The peer's bytes explain more than a failed write does, so the read is finished first.
-    let (sent, theirs) = tokio::try_join!(async { Ok(sending.await) }, read(&mut reader, our_role.peer()))?;
+    let (sent, theirs) = tokio::try_join!(async { Ok(sending.await) }, read(&mut reader, ours.role.peer()))?;
     sent.map_err(|source| ProtocolError::Io { doing: "sending the preamble", source })?;
     Ok(theirs)
 }
@@ -63,7 +67,13 @@ async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Pream
     let mut filled = 0;
     while filled < PREAMBLE_BYTES {
         let room = bytes.get_mut(filled..).unwrap_or_default();
-        let read = io.read(room).await;
+        let read = io.read(room);
+        let read = if filled == 0 && expected == Role::Worker {
+            let late = ProtocolError::Deadline { what: "sending its first byte", limit: FIRST_BYTE_DEADLINE };
+            timeout(FIRST_BYTE_DEADLINE, read).await.map_err(|_| late)?
+        } else {
+            read.await
+        };
         match read.map_err(|source| ProtocolError::Io { doing: "waiting for the preamble", source })? {
             0 if filled == 0 => return Err(ProtocolError::Closed { at: "before it sent anything" }),
             0 => return Err(ProtocolError::Closed { at: "in the middle of the preamble" }),
@@ -74,7 +84,7 @@ async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Pream
             return Err(ProtocolError::NotRayfarm { expected, what: describe(so_far) });
         }
     }
-    let [_, _, _, _, _, _, _, _, v0, v1, role, _] = bytes;
+    let [_, _, _, _, _, _, _, _, v0, v1, role, transport] = bytes;
     let role = match role {
         1 => Role::Master,
         2 => Role::Worker,
@@ -83,7 +93,7 @@ async fn read(io: &mut (impl AsyncRead + Unpin), expected: Role) -> Result<Pream
             return Err(ProtocolError::NotRayfarm { expected, what });
         }
     };
-    Ok(Preamble { version: u16::from_le_bytes([v0, v1]), role })
+    Ok(Preamble { version: u16::from_le_bytes([v0, v1]), role, transport })
 }
 
 /// Describes the first bytes of another program, and names its protocol where it is a common one.
@@ -109,10 +119,10 @@ mod tests {
 
     #[test]
     fn golden_bytes() {
-        let master = Preamble { version: 0x0102, role: Role::Master };
+        let master = Preamble { version: 0x0102, role: Role::Master, transport: 0 };
         assert_eq!(master.to_bytes(), *b"RAYFARM\n\x02\x01\x01\0");
-        let worker = Preamble { version: 1, role: Role::Worker };
-        assert_eq!(worker.to_bytes(), *b"RAYFARM\n\x01\0\x02\0");
+        let worker = Preamble { version: 1, role: Role::Worker, transport: 1 };
+        assert_eq!(worker.to_bytes(), *b"RAYFARM\n\x01\0\x02\x01");
     }
 
     #[tokio::test]

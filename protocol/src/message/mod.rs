@@ -18,7 +18,7 @@ pub(crate) use body::{decode_control, decode_reason, encode_control, encode_reas
 #[cfg(feature = "transport")]
 pub(crate) use to_worker::{decode_disconnect, encode_disconnect};
 
-/// Introduction of a worker. Each text has at most [`crate::limits::MAX_NAME_BYTES`] bytes.
+/// Introduction of a worker. Each text but the tags has at most [`crate::limits::MAX_NAME_BYTES`] bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
     /// Name of the worker in logs and displays.
@@ -29,6 +29,8 @@ pub struct Hello {
     pub simd: String,
     /// Version of the worker's software.
     pub software: String,
+    /// Labels of the worker, at most [`crate::limits::MAX_TAGS`] of at most [`crate::limits::MAX_TAG_BYTES`] printable bytes.
+    pub tags: Vec<String>,
 }
 
 /// Acceptance of a worker.

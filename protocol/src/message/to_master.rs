@@ -73,7 +73,7 @@ impl Message for ToMaster {
                 true
             }
             Kind::Sharing | Kind::HaveAsset => true,
-            Kind::Hello | Kind::Welcome | Kind::Refused => false,
+            Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Proof => false,
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping => false,
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => false,
             Kind::AssetFrom | Kind::ShareKey | Kind::PeerRequest => false,
@@ -114,7 +114,7 @@ impl Message for ToMaster {
             Kind::Failed => decode_failed(body)?,
             Kind::Drain => expect_empty(kind, &body).map(|()| Self::Drain)?,
             Kind::Disconnect => Self::Disconnect { reason: decode_reason(&body) },
-            Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
+            Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Proof => return Err(unexpected(kind)),
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping => return Err(unexpected(kind)),
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => return Err(unexpected(kind)),
             Kind::AssetFrom | Kind::ShareKey | Kind::PeerRequest => return Err(unexpected(kind)),

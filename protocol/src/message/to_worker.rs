@@ -87,7 +87,7 @@ impl Message for ToWorker {
             Kind::Frame | Kind::Segment | Kind::Cancel | Kind::Ping | Kind::Drain | Kind::Disconnect => true,
             Kind::AssetBegin | Kind::AssetChunk | Kind::AssetUnknown => true,
             Kind::AssetFrom | Kind::ShareKey => true,
-            Kind::Hello | Kind::Welcome | Kind::Refused => false,
+            Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Proof => false,
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => false,
             Kind::Sharing | Kind::HaveAsset | Kind::PeerRequest => false,
         }
@@ -133,7 +133,7 @@ impl Message for ToWorker {
                 let (reason, reconnect) = decode_disconnect(body)?;
                 Self::Disconnect { reason, reconnect }
             }
-            Kind::Hello | Kind::Welcome | Kind::Refused => return Err(unexpected(kind)),
+            Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Proof => return Err(unexpected(kind)),
             Kind::NeedAsset | Kind::Pixels | Kind::Failed | Kind::Pong => return Err(unexpected(kind)),
             Kind::Sharing | Kind::HaveAsset | Kind::PeerRequest => return Err(unexpected(kind)),
         })

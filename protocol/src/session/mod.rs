@@ -108,7 +108,7 @@ async fn report<In>(
 fn is_bulk(kind: Kind) -> bool {
     match kind {
         Kind::AssetBegin | Kind::AssetChunk | Kind::Pixels | Kind::Disconnect => true,
-        Kind::Hello | Kind::Welcome | Kind::Refused => false,
+        Kind::Hello | Kind::Welcome | Kind::Refused | Kind::Proof => false,
         Kind::Frame | Kind::Segment | Kind::Cancel | Kind::AssetUnknown => false,
         Kind::AssetFrom | Kind::ShareKey | Kind::Sharing | Kind::HaveAsset | Kind::PeerRequest => false,
         Kind::NeedAsset | Kind::Failed | Kind::Ping | Kind::Pong | Kind::Drain => false,

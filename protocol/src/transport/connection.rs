@@ -7,7 +7,7 @@ use std::task::{Context, Poll};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio_rustls::TlsStream;
 
-use super::certificate;
+use super::{Bounded, certificate};
 use crate::KeyHash;
 
 /// A byte stream after its handshake, plain or through TLS 1.3.
@@ -16,7 +16,7 @@ pub enum Connection<S> {
     /// Not encrypted: the peer is unknown.
     Plain(S),
     /// Encrypted, with a peer that has proved its key.
-    Tls(Box<TlsStream<S>>),
+    Tls(Box<TlsStream<Bounded<S>>>),
 }
 
 impl<S> Connection<S> {
@@ -35,7 +35,14 @@ impl<S> Connection<S> {
     pub fn get_ref(&self) -> &S {
         match self {
             Self::Plain(stream) => stream,
-            Self::Tls(stream) => stream.get_ref().0,
+            Self::Tls(stream) => stream.get_ref().0.get_ref(),
+        }
+    }
+
+    /// Removes the bound on the bytes that are read.
+    pub(crate) fn remove_bound(&mut self) {
+        if let Self::Tls(stream) = self {
+            stream.get_mut().0.remove_bound();
         }
     }
 

@@ -7,14 +7,19 @@
 //!
 //! Names and dates of certificates are ignored, so nothing depends on a clock.
 
+mod bounded;
 mod certificate;
 mod connection;
 mod join_line;
 mod private_key;
+mod proof;
 mod security;
+pub(crate) mod tls;
 
 pub use crate::key_hash::{KeyHash, KeyHashError};
+pub use bounded::Bounded;
 pub use connection::Connection;
 pub use join_line::{JoinLine, JoinLineError, JoinToken};
 pub use private_key::{PrivateKey, PrivateKeyError};
+pub(crate) use proof::Proof;
 pub use security::{MasterSecurity, MasterTrust, WorkerSecurity};

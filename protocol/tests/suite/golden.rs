@@ -131,7 +131,8 @@ async fn a_request_of_a_worker_and_its_token() {
 
 #[test]
 fn hello_and_welcome() {
-    let hello = Hello { name: "a".into(), threads: 2, simd: "bc".into(), software: "d".into() };
+    let hello =
+        Hello { name: "a".into(), threads: 2, simd: "bc".into(), software: "d".into(), tags: Vec::new() };
     let bytes: [&[u8]; 7] = [
         &[1, 0, 0, 0, 0, 0, 0, 0, b'a'],
         &[2, 0, 0, 0],

@@ -117,15 +117,30 @@ async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();
     theirs.shutdown().await.unwrap();
-    let accept = |_: &Hello| Ok(Welcome { worker: 1 });
+    let accept = |_: &Hello, _: Option<KeyHash>| Ok(Welcome { worker: 1 });
     let limit = 2 * limits::HANDSHAKE_DEADLINE;
-    let accepted = tokio::time::timeout(limit, handshake::as_master(&mut ours, accept)).await?.ok();
+    let accepted = tokio::time::timeout(
+        limit,
+        handshake::as_master(&mut ours, &rayfarm_protocol::transport::MasterSecurity::Plain, accept),
+    )
+    .await?
+    .ok();
 
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();
     theirs.shutdown().await.unwrap();
-    let hello = Hello { name: String::new(), threads: 1, simd: String::new(), software: String::new() };
-    let _ = tokio::time::timeout(limit, handshake::as_worker(&mut ours, &hello)).await?;
+    let hello = Hello {
+        name: String::new(),
+        threads: 1,
+        simd: String::new(),
+        software: String::new(),
+        tags: Vec::new(),
+    };
+    let _ = tokio::time::timeout(
+        limit,
+        handshake::as_worker(&mut ours, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello),
+    )
+    .await?;
     Ok(accepted)
 }
 

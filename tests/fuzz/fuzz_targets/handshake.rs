@@ -23,7 +23,7 @@ fuzz_target!(|data: &[u8]| {
     };
     block_on(async {
         let bytes = from(WORKER);
-        let taken = handshake::as_master(&mut Peer(&bytes), |_| Ok(Welcome { worker: 1 })).await;
+        let taken = handshake::as_master(&mut Peer(&bytes), &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| Ok(Welcome { worker: 1 })).await;
         if let Ok(hello) = taken {
             assert!((1..=MAX_THREADS).contains(&hello.threads));
             assert!(
@@ -31,7 +31,7 @@ fuzz_target!(|data: &[u8]| {
             );
         }
         let bytes = from(MASTER);
-        let hello = Hello { name: "a".into(), threads: 1, simd: "b".into(), software: "c".into() };
-        let _ = handshake::as_worker(&mut Peer(&bytes), &hello).await;
+        let hello = Hello { name: "a".into(), threads: 1, simd: "b".into(), software: "c".into(), tags: Vec::new() };
+        let _ = handshake::as_worker(&mut Peer(&bytes), &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello).await;
     });
 });

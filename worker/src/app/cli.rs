@@ -116,6 +116,7 @@ impl WorkerArgs {
             asset_cache_bytes: self.asset_cache << 20,
             disk_cache: self.disk_cache(),
             share: self.share.unwrap_or_default(),
+            security: Default::default(),
             compress: match self.pixels {
                 PixelEncoding::Auto => None,
                 PixelEncoding::Raw => Some(false),

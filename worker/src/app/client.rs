@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayfarm_protocol::transport::Connection;
 use rayfarm_protocol::{Hello, Welcome, address, handshake, tcp};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
@@ -57,6 +58,7 @@ pub async fn run_with<R: Renderer>(
         threads: u32::try_from(threads).unwrap_or(u32::MAX),
         simd: renderer.simd(),
         software: env!("CARGO_PKG_VERSION").to_owned(),
+        tags: Vec::new(),
     };
     let disk = options.disk_cache.as_ref().and_then(open_disk);
     let builders = BuildPool::new(threads).map_err(|source| WorkerError::Threads { threads, source })?;
@@ -92,7 +94,7 @@ async fn run_sessions<R: Renderer>(
         let connected = tokio::select! {
             biased;
             () = shutdown.draining() => return Ok(()),
-            connected = connect(&options.master, hello) => connected,
+            connected = connect(options, hello) => connected,
         };
         let outage = match connected {
             Ok(stream) => {
@@ -100,7 +102,7 @@ async fn run_sessions<R: Renderer>(
                 let begun = Instant::now();
                 // Aborted when it is dropped, at the end of the session.
                 let mut peer_tasks = JoinSet::new();
-                let config = session_config(options, &stream, &mut peer_tasks).await;
+                let config = session_config(options, stream.get_ref(), &mut peer_tasks).await;
                 let end = run_session(stream, config, persistent, shutdown).await;
                 if begun.elapsed() > MIN_SESSION {
                     backoff.reset();
@@ -126,7 +128,11 @@ async fn run_sessions<R: Renderer>(
                 tracing::info!("{error}; the worker ends as requested");
                 return Ok(());
             }
-            Outage::Failed(error) if !options.reconnect || !error.is_transient() => return Err(error),
+            Outage::Failed(error)
+                if !options.reconnect || !error.is_transient(options.security.key_hash().is_some()) =>
+            {
+                return Err(error);
+            }
             outage => outage_log.log(&options.master, &outage),
         }
         tokio::select! {
@@ -191,19 +197,20 @@ fn log_end(end: &SessionEnd) {
     }
 }
 
-async fn connect(master: &str, hello: &Hello) -> Result<TcpStream, WorkerError> {
+async fn connect(options: &WorkerOptions, hello: &Hello) -> Result<Connection<TcpStream>, WorkerError> {
+    let master = options.master.as_str();
     let resolve_error = |source| WorkerError::Resolve { master: master.to_owned(), source };
     let connect_error = |source| WorkerError::Connect { master: master.to_owned(), source };
     let addresses = address::resolve(master).await.map_err(resolve_error)?;
     let connecting = tokio::time::timeout(CONNECT_TIMEOUT, TcpStream::connect(addresses.as_slice()));
-    let mut stream = match connecting.await {
+    let stream = match connecting.await {
         Ok(result) => result.map_err(connect_error)?,
         Err(_) => {
             return Err(connect_error(io::Error::new(io::ErrorKind::TimedOut, "no connection in time")));
         }
     };
     tcp::configure(&stream).map_err(connect_error)?;
-    let Welcome { worker } = handshake::as_worker(&mut stream, hello)
+    let (stream, Welcome { worker }) = handshake::as_worker(stream, &options.security, hello)
         .await
         .map_err(|source| WorkerError::Handshake { master: master.to_owned(), source })?;
     let threads = hello.threads;

@@ -3,6 +3,8 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use rayfarm_protocol::transport::WorkerSecurity;
+
 /// Options of a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WorkerOptions {
@@ -24,6 +26,8 @@ pub struct WorkerOptions {
     pub compress: Option<bool>,
     /// Whether, and where, the worker serves assets to other workers.
     pub share: Share,
+    /// Whether the worker connects through TLS, with which keys and token.
+    pub security: WorkerSecurity,
 }
 
 /// Whether, and where, a worker serves assets to other workers.

@@ -110,8 +110,10 @@ async fn a_temporary_refusal_is_retried() {
     let (listener, address) = listen().await;
     let worker = start(&address, &[]);
     let mut stream = listener.accept().await.unwrap().0;
-    let full = |_: &Hello| Err(Refusal::NotNow("the farm is full".into()));
-    handshake::as_master(&mut stream, full).await.unwrap_err();
+    let full = |_: &Hello, _: Option<rayfarm_protocol::KeyHash>| Err(Refusal::NotNow("the farm is full".into()));
+    handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, full)
+        .await
+        .unwrap_err();
     let mut link = Link::accept(&listener).await;
     link.check_frame(&Stage::new(), 0, 0.0).await;
     link.out

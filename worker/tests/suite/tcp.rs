@@ -17,6 +17,7 @@ fn options(master: &str) -> WorkerOptions {
         compress: None,
         disk_cache: None,
         share: Share::Off,
+        security: Default::default(),
     }
 }
 
@@ -90,7 +91,11 @@ async fn a_refusal_another_version_and_another_program_end_a_reconnecting_worker
     let (listener, address) = listen().await;
     let worker = tokio::spawn(run(reconnecting(&address), ShutdownHandle::new()));
     let mut stream = listener.accept().await.unwrap().0;
-    handshake::as_master(&mut stream, |_| Err("the farm is full".into())).await.unwrap_err();
+    handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
+        Err("the farm is full".into())
+    })
+    .await
+    .unwrap_err();
     let text = worker.await.unwrap().unwrap_err().to_string();
     assert!(text.contains("the farm is full") && text.contains(&address), "{text}");
 

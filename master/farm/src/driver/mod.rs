@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
+use rayfarm_protocol::transport::MasterSecurity;
 use rayfarm_protocol::{FrameAnnounce, FrameId, codec};
 use rayfarm_scheduler::{Event, Scheduler};
 use rayfarm_tracer::scene::FrameView;
@@ -61,6 +62,8 @@ pub(crate) struct Driver {
     arbiter_queue: mpsc::UnboundedSender<Dispute>,
     /// The key from which the workers' own keys are derived; without it, no assets are passed from worker to worker.
     secret: Option<[u8; 32]>,
+    /// Whether workers connect through TLS, and what they must prove.
+    pub(crate) security: MasterSecurity,
     /// The secret names of local workers.
     pub(crate) tickets: Tickets,
 }
@@ -155,6 +158,7 @@ impl Driver {
             finished: Notify::new(),
             verified: Notify::new(),
             arbiter_queue,
+            security: options.security.clone(),
             tickets: Tickets::new(secret.as_ref(), options.local_workers),
             secret,
         })

@@ -74,8 +74,11 @@ pub async fn connect(address: SocketAddr, threads: u32) -> TcpStream {
 
 async fn connect_named(address: SocketAddr, name: &str, threads: u32) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.unwrap();
-    let hello = Hello { name: name.into(), threads, simd: "none".into(), software: "test".into() };
-    handshake::as_worker(&mut stream, &hello).await.unwrap();
+    let hello =
+        Hello { name: name.into(), threads, simd: "none".into(), software: "test".into(), tags: Vec::new() };
+    handshake::as_worker(&mut stream, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello)
+        .await
+        .unwrap();
     stream
 }
 

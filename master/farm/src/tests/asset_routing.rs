@@ -36,6 +36,7 @@ fn options(master: SocketAddr, share: Share) -> WorkerOptions {
         disk_cache: None,
         compress: None,
         share,
+        security: Default::default(),
     }
 }
 

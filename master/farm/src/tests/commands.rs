@@ -49,8 +49,18 @@ async fn a_banned_worker_is_refused_until_it_is_allowed() {
     assert_eq!(names, ["fake"]);
 
     let mut stream = TcpStream::connect(farm.address()).await.unwrap();
-    let hello = Hello { name: "fake".into(), threads: 1, simd: "none".into(), software: "test".into() };
-    let refused = handshake::as_worker(&mut stream, &hello).await.unwrap_err().to_string();
+    let hello = Hello {
+        name: "fake".into(),
+        threads: 1,
+        simd: "none".into(),
+        software: "test".into(),
+        tags: Vec::new(),
+    };
+    let refused =
+        handshake::as_worker(&mut stream, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello)
+            .await
+            .unwrap_err()
+            .to_string();
     assert!(refused.contains("is banned"), "{refused}");
     assert_eq!((farm.control().allow("fake"), farm.control().allow("fake")), (1, 0));
     fake_worker::start(farm.address(), Script::Correct).await;

@@ -35,6 +35,7 @@ async fn farm_of_workers(policy: SegmentPolicy, compress: bool, verify_percent: 
             disk_cache: None,
             compress: Some(compress),
             share: Share::Off,
+            security: Default::default(),
         };
         tokio::spawn(rayfarm_worker::run(worker, ShutdownHandle::new()));
     }

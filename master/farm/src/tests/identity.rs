@@ -4,8 +4,17 @@ use super::*;
 
 async fn refusal(farm: &Farm, name: &str) -> String {
     let mut stream = TcpStream::connect(farm.address()).await.unwrap();
-    let hello = Hello { name: name.into(), threads: 1, simd: "none".into(), software: "test".into() };
-    handshake::as_worker(&mut stream, &hello).await.unwrap_err().to_string()
+    let hello = Hello {
+        name: name.into(),
+        threads: 1,
+        simd: "none".into(),
+        software: "test".into(),
+        tags: Vec::new(),
+    };
+    handshake::as_worker(&mut stream, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello)
+        .await
+        .unwrap_err()
+        .to_string()
 }
 
 #[tokio::test]

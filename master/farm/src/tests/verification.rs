@@ -76,9 +76,18 @@ async fn a_worker_that_sends_wrong_pixels_is_banned() {
             let banned = farm.status().banned;
             assert_eq!(banned.iter().map(|banned| banned.name.as_str()).collect::<Vec<_>>(), ["wrong"]);
             let mut again = TcpStream::connect(farm.address()).await.unwrap();
-            let hello =
-                Hello { name: "wrong".into(), threads: 1, simd: String::new(), software: String::new() };
-            let refusal = handshake::as_worker(&mut again, &hello).await.unwrap_err().to_string();
+            let hello = Hello {
+                name: "wrong".into(),
+                threads: 1,
+                simd: String::new(),
+                software: String::new(),
+                tags: Vec::new(),
+            };
+            let refusal =
+                handshake::as_worker(&mut again, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello)
+                    .await
+                    .unwrap_err()
+                    .to_string();
             assert!(refusal.contains("is banned"), "{refusal}");
             farm.shut_down().await;
         }

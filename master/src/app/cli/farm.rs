@@ -50,6 +50,7 @@ impl FarmArgs {
             policy: self.segment,
             sequential: self.pipeline == 0,
             verify_percent: self.verify,
+            security: Default::default(),
         }
     }
 }

@@ -34,6 +34,7 @@ fn start_worker(master: SocketAddr) {
         disk_cache: None,
         compress: None,
         share: Share::Off,
+        security: Default::default(),
     };
     tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) });
 }

@@ -162,7 +162,12 @@ pub(crate) struct Link {
 impl Link {
     pub(crate) async fn accept(listener: &TcpListener) -> Self {
         let mut stream: TcpStream = listener.accept().await.unwrap().0;
-        let hello = handshake::as_master(&mut stream, |_| Ok(Welcome { worker: 1 })).await.unwrap();
+        let hello =
+            handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
+                Ok(Welcome { worker: 1 })
+            })
+            .await
+            .unwrap();
         let (out, inbox, _) = session::spawn(stream);
         Self { hello, out, inbox, requests: 0, compressed: 0 }
     }

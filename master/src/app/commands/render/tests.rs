@@ -97,6 +97,7 @@ impl Renders {
             disk_cache: None,
             compress: None,
             share: Share::Off,
+            security: Default::default(),
         };
         tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) })
     }
