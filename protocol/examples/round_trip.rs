@@ -27,7 +27,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
 /// The master: leases two rows and returns their pixels.
 async fn request(mut stream: DuplexStream) -> Result<Bytes, Box<dyn Error>> {
-    let hello =
+    let (_, hello) =
         handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
             Ok(Welcome { worker: 1 })
         })

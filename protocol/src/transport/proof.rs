@@ -61,3 +61,37 @@ impl Proof {
         Ok(mac)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn proof() -> Proof {
+        Proof {
+            exported: [1; 32],
+            preambles: [[2; 12], [3; 12]],
+            worker: KeyHash([4; 32]),
+            master: KeyHash([5; 32]),
+        }
+    }
+
+    #[test]
+    fn a_proof_is_valid_for_its_own_session_keys_and_token_only() {
+        let token = JoinToken([9; 16]);
+        let bytes = proof().bytes(&token).unwrap();
+        proof().verify(&token, &bytes).unwrap();
+        let others = [
+            Proof { exported: [0; 32], ..proof() },
+            Proof { preambles: [[3; 12], [2; 12]], ..proof() },
+            Proof { worker: KeyHash([0; 32]), ..proof() },
+            Proof { master: KeyHash([0; 32]), ..proof() },
+        ];
+        for other in others {
+            assert!(matches!(other.verify(&token, &bytes), Err(ProtocolError::WrongToken)));
+        }
+        assert!(proof().verify(&JoinToken([8; 16]), &bytes).is_err());
+        for length in 0..PROOF_BYTES {
+            assert!(proof().verify(&token, &bytes[..length]).is_err());
+        }
+    }
+}

@@ -131,8 +131,13 @@ async fn a_request_of_a_worker_and_its_token() {
 
 #[test]
 fn hello_and_welcome() {
-    let hello =
-        Hello { name: "a".into(), threads: 2, simd: "bc".into(), software: "d".into(), tags: Vec::new() };
+    let hello = Hello {
+        name: "a".into(),
+        threads: 2,
+        simd: "bc".into(),
+        software: "d".into(),
+        tags: vec!["t".into()],
+    };
     let bytes: [&[u8]; 7] = [
         &[1, 0, 0, 0, 0, 0, 0, 0, b'a'],
         &[2, 0, 0, 0],
@@ -140,7 +145,7 @@ fn hello_and_welcome() {
         b"bc",
         &[1, 0, 0, 0, 0, 0, 0, 0],
         b"d",
-        &[],
+        &[1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, b't'],
     ];
     assert_eq!(codec::encode(&hello).unwrap(), bytes.concat());
     assert_eq!(codec::decode::<Hello>(&bytes.concat(), limits::MAX_CONTROL_BYTES).unwrap(), hello);

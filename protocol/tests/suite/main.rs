@@ -10,3 +10,4 @@ mod hostile;
 mod peer;
 mod properties;
 mod sessions;
+mod trust;

@@ -108,6 +108,7 @@ fn hellos() -> impl Strategy<Value = Hello> {
         threads,
         simd,
         software,
+        tags: Vec::new(),
     })
 }
 
@@ -117,14 +118,15 @@ async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();
     theirs.shutdown().await.unwrap();
-    let accept = |_: &Hello, _: Option<KeyHash>| Ok(Welcome { worker: 1 });
+    let accept = |_: &Hello, _: Option<rayfarm_protocol::KeyHash>| Ok(Welcome { worker: 1 });
     let limit = 2 * limits::HANDSHAKE_DEADLINE;
     let accepted = tokio::time::timeout(
         limit,
         handshake::as_master(&mut ours, &rayfarm_protocol::transport::MasterSecurity::Plain, accept),
     )
     .await?
-    .ok();
+    .ok()
+    .map(|(_, hello)| hello);
 
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();

@@ -24,7 +24,7 @@ fuzz_target!(|data: &[u8]| {
     block_on(async {
         let bytes = from(WORKER);
         let taken = handshake::as_master(&mut Peer(&bytes), &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| Ok(Welcome { worker: 1 })).await;
-        if let Ok(hello) = taken {
+        if let Ok((_, hello)) = taken {
             assert!((1..=MAX_THREADS).contains(&hello.threads));
             assert!(
                 [&hello.name, &hello.simd, &hello.software].iter().all(|text| text.len() <= MAX_NAME_BYTES)

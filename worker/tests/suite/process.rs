@@ -110,7 +110,8 @@ async fn a_temporary_refusal_is_retried() {
     let (listener, address) = listen().await;
     let worker = start(&address, &[]);
     let mut stream = listener.accept().await.unwrap().0;
-    let full = |_: &Hello, _: Option<rayfarm_protocol::KeyHash>| Err(Refusal::NotNow("the farm is full".into()));
+    let full =
+        |_: &Hello, _: Option<rayfarm_protocol::KeyHash>| Err(Refusal::NotNow("the farm is full".into()));
     handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, full)
         .await
         .unwrap_err();

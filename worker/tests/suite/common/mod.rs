@@ -162,7 +162,7 @@ pub(crate) struct Link {
 impl Link {
     pub(crate) async fn accept(listener: &TcpListener) -> Self {
         let mut stream: TcpStream = listener.accept().await.unwrap().0;
-        let hello =
+        let (_, hello) =
             handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
                 Ok(Welcome { worker: 1 })
             })
