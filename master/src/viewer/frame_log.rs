@@ -14,6 +14,9 @@ use super::frame_counts::{BytesPerFrame, RaysPerFrame};
 const CSV_HEADER: &str =
     "frame,seconds,ms,fps,workers,threads,primary_rays,shadow_rays,secondary_rays,sent_bytes,received_bytes";
 
+/// Last line of a log that has reached its limit.
+const LIMIT_LINE: &str = "# limit reached: later frames are left out";
+
 /// Failure of the frame log.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum FrameLogError {
@@ -88,27 +91,32 @@ impl FrameLine {
 pub(crate) struct FrameLog<W: Write> {
     out: W,
     name: String,
+    /// Bytes that may still be written.
+    left: u64,
+    /// Whether the line that names the limit is written.
+    is_full: bool,
 }
 
 /// A frame log in a file.
 pub(crate) type FrameLogFile = FrameLog<BufWriter<File>>;
 
 impl FrameLogFile {
-    /// Creates the file and writes the names of the columns.
+    /// Creates the file and writes the names of the columns. A line that would exceed `max_bytes` bytes, and all later ones,
+    /// are replaced by one line that names the limit.
     ///
     /// # Errors
     /// A file that cannot be created or written.
-    pub(crate) fn create(path: &Path) -> Result<Self, FrameLogError> {
+    pub(crate) fn create(path: &Path, max_bytes: u64) -> Result<Self, FrameLogError> {
         let name = path.display().to_string();
         let file =
             File::create(path).map_err(|source| FrameLogError::Create { name: name.clone(), source })?;
-        Self::new(BufWriter::new(file), name)
+        Self::new(BufWriter::new(file), name, max_bytes)
     }
 }
 
 impl<W: Write> FrameLog<W> {
-    fn new(out: W, name: String) -> Result<Self, FrameLogError> {
-        let mut log = Self { out, name };
+    fn new(out: W, name: String, max_bytes: u64) -> Result<Self, FrameLogError> {
+        let mut log = Self { out, name, left: max_bytes, is_full: false };
         let parts: String = PART_NAMES.iter().map(|part| format!(",{part}_percent")).collect();
         log.write_line(&format!("{CSV_HEADER}{parts},latency_ms"))?;
         Ok(log)
@@ -135,6 +143,18 @@ impl<W: Write> FrameLog<W> {
     }
 
     fn write_line(&mut self, line: &str) -> Result<(), FrameLogError> {
+        if self.is_full {
+            return Ok(());
+        }
+        let bytes = line.len() as u64 + 1;
+        self.is_full = bytes > self.left;
+        self.left = self.left.saturating_sub(bytes);
+        let line = if self.is_full {
+            tracing::warn!("{}: the frame log has reached its limit; later frames are left out", self.name);
+            LIMIT_LINE
+        } else {
+            line
+        };
         writeln!(self.out, "{line}")
             .and_then(|()| self.out.flush())
             .map_err(|source| FrameLogError::Write { name: self.name.clone(), source })
@@ -146,8 +166,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_log_ends_at_its_limit_with_one_line_that_names_it() {
+        let mut log = FrameLog::new(Vec::new(), "log".to_owned(), 1_000).unwrap();
+        (0..100).for_each(|frame| log.add(&FrameLine { frame, ..FrameLine::default() }).unwrap());
+        let text = String::from_utf8(log.out).unwrap();
+        assert!(text.len() <= 1_000 + LIMIT_LINE.len() + 1, "{} bytes", text.len());
+        assert_eq!(text.lines().last(), Some(LIMIT_LINE));
+        assert!(text.lines().count() > 3);
+        assert_eq!(text.matches(LIMIT_LINE).count(), 1);
+    }
+
+    #[test]
     fn each_line_has_the_columns_of_the_header() {
-        let mut log = FrameLog::new(Vec::new(), "log".to_owned()).unwrap();
+        let mut log = FrameLog::new(Vec::new(), "log".to_owned(), u64::MAX).unwrap();
         let line =
             FrameLine { frame: 3, elapsed: Duration::from_micros(12_345), fps: 80.0, ..FrameLine::default() };
         log.add(&line).unwrap();

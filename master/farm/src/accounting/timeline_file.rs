@@ -83,18 +83,19 @@ enum Message {
 }
 
 impl TimelineFile {
-    /// Creates a file with an empty timeline, and starts its writing thread.
+    /// Creates a file with an empty timeline, and starts its writing thread. The file ends with a last event near
+    /// `max_bytes` bytes; later marks are counted and not written.
     ///
     /// # Errors
     /// The file cannot be written, or is not a regular file.
-    pub fn create(path: &Path) -> Result<Self, TimelineError> {
+    pub fn create(path: &Path, max_bytes: u64) -> Result<Self, TimelineError> {
         let name = path.display().to_string();
         let failed = |source| TimelineError::Create { name: name.clone(), source };
         let file = File::create(path).map_err(failed)?;
         if !file.metadata().is_ok_and(|metadata| metadata.is_file()) {
             return Err(TimelineError::NotSeekable { name });
         }
-        let mut events = Events::begin(file).map_err(failed)?;
+        let mut events = Events::begin(file, max_bytes).map_err(failed)?;
         let (queue, marks) = sync_channel(QUEUE);
         let sink = TimelineSink { queue, lost: Arc::default() };
         let lost = Arc::clone(&sink.lost);
@@ -142,11 +143,16 @@ struct Events<W> {
     end: u64,
     chunk: Vec<u8>,
     empty: bool,
+    /// Size of the file from which no more marks are written.
+    max_bytes: u64,
+    /// Marks that are not written because the file has reached that size.
+    beyond: u64,
 }
 
 impl<W: Write + Seek> Events<W> {
-    fn begin(out: W) -> io::Result<Self> {
-        let mut events = Self { out, end: 0, chunk: OPENING.to_vec(), empty: true };
+    fn begin(out: W, max_bytes: u64) -> io::Result<Self> {
+        let chunk = OPENING.to_vec();
+        let mut events = Self { out, end: 0, chunk, empty: true, max_bytes, beyond: 0 };
         events.add(&metadata("process_name", MASTER_TRACK, json!({ "name": "rayfarm" })));
         events.add(&metadata("thread_name", MASTER_TRACK, json!({ "name": "master: frames" })));
         events.put()?;
@@ -161,7 +167,7 @@ impl<W: Write + Seek> Events<W> {
                 match message {
                     Message::Mark(mark) => self.add_mark(&mark),
                     Message::End => {
-                        self.add_lost(lost.load(Relaxed));
+                        self.add_lost(lost.load(Relaxed).saturating_add(self.beyond));
                         return self.put();
                     }
                 }
@@ -176,7 +182,19 @@ impl<W: Write + Seek> Events<W> {
         Ok(())
     }
 
+    /// Adds a mark, or counts it once the file has its largest size.
     fn add_mark(&mut self, mark: &Mark) {
+        if self.end + self.chunk.len() as u64 >= self.max_bytes {
+            if self.beyond == 0 {
+                let bytes = self.max_bytes;
+                tracing::warn!(
+                    "the timeline has reached its limit of {bytes} bytes; later events are left out"
+                );
+                self.add(&metadata("limit_reached", MASTER_TRACK, json!({ "bytes": bytes })));
+            }
+            self.beyond += 1;
+            return;
+        }
         match mark {
             Mark::Named { worker, name, threads } => {
                 let label = format!("{worker}: {name}, {threads} threads");
@@ -272,7 +290,7 @@ mod tests {
     fn a_timeline_is_always_valid() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("timeline.json");
-        let timeline = TimelineFile::create(&path).unwrap();
+        let timeline = TimelineFile::create(&path, u64::MAX).unwrap();
         assert_eq!(parsed(&path).len(), 2);
         let sink = timeline.sink();
         let name = "a \"quoted\"\nname".to_owned();
@@ -288,7 +306,7 @@ mod tests {
 
     #[test]
     fn each_write_leaves_a_valid_array() {
-        let mut events = Events::begin(io::Cursor::new(Vec::new())).unwrap();
+        let mut events = Events::begin(io::Cursor::new(Vec::new()), u64::MAX).unwrap();
         for number in 0..20 {
             (0..number % 4).for_each(|_| events.add_mark(&frame(number)));
             events.put().unwrap();
@@ -298,11 +316,28 @@ mod tests {
     }
 
     #[test]
+    fn a_timeline_ends_at_its_limit_and_counts_the_rest() {
+        let mut events = Events::begin(io::Cursor::new(Vec::new()), 2_000).unwrap();
+        let (sender, marks) = sync_channel(2_000);
+        (0..1_000).for_each(|number| sender.send(Message::Mark(frame(number))).unwrap());
+        sender.send(Message::End).unwrap();
+        events.write_all(&marks, &AtomicU64::new(0)).unwrap();
+        let bytes = events.out.get_ref();
+        assert!(bytes.len() < 2_600, "{} bytes", bytes.len());
+        let array: Vec<Value> = serde_json::from_slice(bytes).unwrap();
+        let frames = array.iter().filter(|event| event["cat"] == "frame").count() as u64;
+        assert!(frames > 0);
+        let named = |name: &str| array.iter().filter(|event| event["name"] == name).collect::<Vec<_>>();
+        assert_eq!(named("limit_reached").len(), 1);
+        assert_eq!(named("left_out")[0]["args"]["events"], 1_000 - frames);
+    }
+
+    #[test]
     fn only_regular_files_are_accepted() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(TimelineFile::create(folder.path()).is_err());
+        assert!(TimelineFile::create(folder.path(), u64::MAX).is_err());
         if cfg!(unix) {
-            let error = TimelineFile::create(Path::new("/dev/null")).err().unwrap().to_string();
+            let error = TimelineFile::create(Path::new("/dev/null"), u64::MAX).err().unwrap().to_string();
             assert!(error.contains("/dev/null"), "{error}");
         }
     }

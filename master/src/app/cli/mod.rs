@@ -300,10 +300,20 @@ pub(crate) struct ObservabilityArgs {
     /// Write a timeline of what every worker did, for ui.perfetto.dev or chrome://tracing.
     #[arg(long, alias = "trace", value_name = "FILE")]
     pub(crate) timeline: Option<PathBuf>,
+    /// Largest size of the files of --timeline and --fps-log, each, in MiB; later events are left out, and the file says so.
+    #[arg(long, value_name = "MIB", default_value = "1024", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) record_limit: u32,
     /// Accept commands, one per line: on standard input (-), at a port of this machine (127.0.0.1:PORT; the log names the
     /// token) or at a Unix socket (a path with a slash in it). The command help lists them.
     #[arg(long, value_name = "PLACE", value_parser = Place::parse, allow_hyphen_values = true)]
     pub(crate) control: Option<Place>,
+}
+
+impl ObservabilityArgs {
+    /// Largest size of a timeline and of a frame log, in bytes.
+    pub(crate) fn record_bytes(&self) -> u64 {
+        u64::from(self.record_limit) << 20
+    }
 }
 
 /// Verbosity of the log on standard error. RUST_LOG has priority.

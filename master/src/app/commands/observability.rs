@@ -23,8 +23,8 @@ impl Observability {
     /// # Errors
     /// A file that cannot be created.
     pub(super) fn new(args: &ObservabilityArgs) -> Result<Self, CommandError> {
-        let timeline =
-            args.timeline.as_deref().map(TimelineFile::create).transpose().map_err(command_error)?;
+        let create = |path| TimelineFile::create(path, args.record_bytes());
+        let timeline = args.timeline.as_deref().map(create).transpose().map_err(command_error)?;
         Ok(Self { timeline, control: args.control.clone(), over: CancellationToken::new() })
     }
 

@@ -44,7 +44,8 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     };
     let camera = CameraControl::new(view.camera, compiled.bounds());
     drop(compiled);
-    let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
+    let record_bytes = args.observability.record_bytes();
+    let log = args.fps_log.as_deref().map(|path| FrameLogFile::create(path, record_bytes)).transpose()?;
     let mut observability = Observability::new(&args.observability)?;
     let display =
         WindowDisplay::open(info, view.width, view.height).map_err(|problem| no_window(&problem, &path))?;

@@ -106,7 +106,8 @@ impl ColumnIndices {
 fn read_table(path: &Path, columns: &Columns, rows: &mut Vec<Row>) -> Result<(), String> {
     let text = read_within(path, MAX_BYTES).map_err(|error| error.to_string())?;
     let text = text.ok_or_else(|| format!("has more than {MAX_BYTES} bytes, the limit"))?;
-    let mut reader = csv::Reader::from_reader(&text[..]);
+    // A frame log that has reached its limit ends with a comment.
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(&text[..]);
     let places = ColumnIndices::find(columns, reader.headers().map_err(|error| error.to_string())?)?;
     for record in reader.records() {
         let record = record.map_err(|error| error.to_string())?;

@@ -56,7 +56,8 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let (request, denoised) = denoised_of(&args, request)?;
     let plan = plan(&args, &pattern, &request)?;
     let triangles = source.compiled()?.triangle_count();
-    let log = args.fps_log.as_deref().map(FrameLogFile::create).transpose()?;
+    let record_bytes = args.observability.record_bytes();
+    let log = args.fps_log.as_deref().map(|path| FrameLogFile::create(path, record_bytes)).transpose()?;
     let observability = Observability::new(&args.observability)?;
     let totals = Totals::new(triangles, log);
     let aov = if args.denoise { with_guides(&args.aov) } else { args.aov };
