@@ -2,11 +2,13 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
 use rayfarm_farm::{FarmStatus, FinishedFrame};
 use tokio::sync::{mpsc, watch};
 
+use super::displays::DisplayId;
 use super::film::FilmProgress;
 use super::input_action::InputAction;
 use super::knob_change::KnobChange;
@@ -40,11 +42,22 @@ pub(crate) struct ViewerHandle {
     frames: watch::Receiver<Option<Arc<PresentedFrame>>>,
     status: watch::Receiver<Arc<FarmStatus>>,
     stats: watch::Receiver<Arc<Statistics>>,
-    input: mpsc::Sender<InputAction>,
+    input: mpsc::Sender<(DisplayId, InputAction)>,
     address: SocketAddr,
+    display: DisplayId,
+    /// Number of the next display.
+    next_display: Arc<AtomicU32>,
 }
 
 impl ViewerHandle {
+    /// A handle for a further display. It has not returned any frame, and its picture is scaled: the first display decides the size.
+    pub(crate) fn further_display(&self) -> Self {
+        let mut handle = self.clone();
+        handle.display = DisplayId(self.next_display.fetch_add(1, Ordering::Relaxed));
+        handle.frames.mark_changed();
+        handle
+    }
+
     /// The newest frame, if this handle has not returned it before.
     pub(crate) fn new_frame(&mut self) -> Option<Arc<PresentedFrame>> {
         let newest = self.frames.borrow_and_update();
@@ -81,12 +94,12 @@ impl ViewerHandle {
         KnobSender(self.input.downgrade())
     }
 
-    /// Sends actions of one moment together, without waiting. Returns `false` where the viewer has ended or is too far
+    /// Sends actions of one moment together, without waiting. The size is ignored unless this display is the first. Returns `false` where the viewer has ended or is too far
     /// behind; then none of the actions is sent.
     pub(crate) fn send(&self, actions: Vec<InputAction>) -> bool {
         match self.input.try_reserve_many(actions.len()) {
             Ok(permits) => {
-                permits.zip(actions).for_each(|(permit, action)| permit.send(action));
+                permits.zip(actions).for_each(|(permit, action)| permit.send((self.display, action)));
                 true
             }
             Err(_) => false,
@@ -96,7 +109,7 @@ impl ViewerHandle {
 
 /// Sender of knob changes to a viewer, which ends regardless of it.
 #[derive(Clone, Debug)]
-pub(crate) struct KnobSender(mpsc::WeakSender<InputAction>);
+pub(crate) struct KnobSender(mpsc::WeakSender<(DisplayId, InputAction)>);
 
 impl KnobSender {
     /// Sends a change, without waiting.
@@ -105,7 +118,7 @@ impl KnobSender {
     /// A viewer that has ended, or that has too many actions to apply.
     pub(crate) fn send(&self, change: KnobChange) -> Result<(), String> {
         let input = self.0.upgrade().ok_or("the view has ended")?;
-        input.try_send(InputAction::Set(change)).map_err(|error| match error {
+        input.try_send((DisplayId::FIRST, InputAction::Set(change))).map_err(|error| match error {
             mpsc::error::TrySendError::Full(_) => {
                 "the view has too many actions to apply; try again".to_owned()
             }
@@ -118,7 +131,7 @@ impl KnobSender {
 #[derive(Debug)]
 pub(super) struct Channels {
     /// Input of all displays; closed when the last handle is dropped.
-    pub(super) input: mpsc::Receiver<InputAction>,
+    pub(super) input: mpsc::Receiver<(DisplayId, InputAction)>,
     frames: watch::Sender<Option<Arc<PresentedFrame>>>,
     status: watch::Sender<Arc<FarmStatus>>,
     stats: watch::Sender<Arc<Statistics>>,
@@ -137,6 +150,8 @@ impl Channels {
             stats: stats_out,
             input: input_in,
             address,
+            display: DisplayId::FIRST,
+            next_display: Arc::new(AtomicU32::new(DisplayId::FIRST.0 + 1)),
         };
         (Self { input, frames, status, stats }, handle)
     }
@@ -176,8 +191,8 @@ mod tests {
         let (mut channels, handle) = channels();
         assert!(handle.send(vec![InputAction::ResetCamera, InputAction::Quit]));
         assert!(handle.send(Vec::new()));
-        assert_eq!(channels.input.try_recv(), Ok(InputAction::ResetCamera));
-        assert_eq!(channels.input.try_recv(), Ok(InputAction::Quit));
+        assert_eq!(channels.input.try_recv(), Ok((DisplayId::FIRST, InputAction::ResetCamera)));
+        assert_eq!(channels.input.try_recv(), Ok((DisplayId::FIRST, InputAction::Quit)));
         assert!(channels.input.try_recv().is_err());
     }
 
@@ -188,7 +203,7 @@ mod tests {
         assert!(!handle.send(vec![InputAction::Quit; 2]));
         assert!(handle.send(vec![InputAction::Quit]));
         let mut actions = Vec::new();
-        while let Ok(action) = channels.input.try_recv() {
+        while let Ok((_, action)) = channels.input.try_recv() {
             actions.push(action);
         }
         assert_eq!(actions.len(), MAX_WAITING_ACTIONS);

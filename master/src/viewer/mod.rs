@@ -4,6 +4,7 @@
 //! Nothing in here knows a window, a terminal or a command line.
 
 mod camera_control;
+mod displays;
 mod error;
 pub(crate) mod film;
 pub(crate) mod frame_counts;
@@ -28,7 +29,6 @@ pub(crate) use frame_log::{FrameLine, FrameLogError, FrameLogFile};
 pub(crate) use frame_loop::{Viewer, ViewerConfig};
 pub(crate) use frame_rate::FrameRate;
 pub(crate) use handle::{KnobSender, PresentedFrame, ViewerHandle};
-#[cfg(feature = "window")]
 pub(crate) use input_action::InputAction;
 pub(crate) use knob_change::KnobChange;
 pub(crate) use open_requests::OPEN_REQUESTS;

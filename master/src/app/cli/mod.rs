@@ -16,6 +16,7 @@ pub(crate) use values::Size;
 use values::{frame_count, frame_index, ray_count, size, thread_count, worker_count};
 
 mod aov;
+mod display;
 mod farm;
 mod knobs;
 mod light;
@@ -30,6 +31,7 @@ mod tradeoff;
 mod values;
 
 pub(crate) use aov::Aov;
+pub(crate) use display::{DisplayArgs, DisplayKind};
 pub(crate) use farm::FarmArgs;
 pub(crate) use knobs::QualityArgs;
 pub(crate) use light::LightArgs;
@@ -135,6 +137,8 @@ pub(crate) struct ViewArgs {
     pub(crate) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) models: ModelArgs,
+    #[command(flatten)]
+    pub(crate) display: DisplayArgs,
     #[command(flatten)]
     pub(crate) farm: FarmArgs,
     #[command(flatten)]

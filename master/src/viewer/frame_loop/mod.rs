@@ -15,6 +15,7 @@ use rayfarm_tracer::scene::{FrameView, Shading};
 use tokio_util::sync::CancellationToken;
 
 use super::camera_control::CameraControl;
+use super::displays::{DisplayId, Visibility};
 use super::error::ViewerError;
 use super::film::FilmProgress;
 use super::film::still::{Pass, StillFilm, alone};
@@ -54,6 +55,7 @@ pub(crate) struct ViewerConfig {
 pub(crate) struct Viewer {
     farm: Farm,
     state: ViewState,
+    visibility: Visibility,
     camera: CameraControl,
     requests: Requests,
     film: StillFilm,
@@ -71,6 +73,7 @@ impl Viewer {
         let viewer = Self {
             farm,
             state: ViewState { request, hidden: false },
+            visibility: Visibility::default(),
             camera,
             requests: Requests::new(policy, controller),
             film: StillFilm::new(),
@@ -95,6 +98,7 @@ impl Viewer {
         let viewer = Self {
             farm,
             state: ViewState { request, hidden: false },
+            visibility: Visibility::default(),
             camera: CameraControl::new(request.view.camera, None),
             requests: Requests::of_sequence(animation, plan),
             film: StillFilm::new(),
@@ -240,13 +244,19 @@ impl Viewer {
     }
 
     /// Applies actions in order, then replaces the last request if they changed the view. Breaks at [`InputAction::Quit`].
-    fn apply_all(&mut self, actions: impl Iterator<Item = InputAction>) -> ControlFlow<()> {
+    fn apply_all(&mut self, actions: impl Iterator<Item = (DisplayId, InputAction)>) -> ControlFlow<()> {
         let mut state = self.state;
-        for action in actions {
+        for (display, action) in actions {
+            match action {
+                InputAction::SetVisible(visible) => self.visibility.report(display, visible),
+                InputAction::Resize { .. } if display != DisplayId::FIRST => continue,
+                _ => {}
+            }
             if apply(action, &mut self.camera, &mut state, &mut self.figures, &self.farm).is_break() {
                 return ControlFlow::Break(());
             }
         }
+        state.hidden = self.visibility.is_hidden();
         state.request.view = FrameView { camera: self.camera.camera(), ..state.request.view };
         if self.state != state {
             self.state = state;
@@ -277,7 +287,8 @@ fn apply(
             let view = state.request.view;
             state.request.view = FrameView { width: side(width), height: side(height), ..view };
         }
-        InputAction::SetVisible(visible) => state.hidden = !visible,
+        // Applied before, with the visibility of the other displays.
+        InputAction::SetVisible(_) => {}
         InputAction::Presented { latency } => figures.presented(latency),
         InputAction::Set(change) => {
             let request = change.applied(state.request);

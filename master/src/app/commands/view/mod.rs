@@ -1,6 +1,7 @@
-//! `view`: a window on the main thread over a viewer on the runtime.
+//! `view`: displays on their threads over a viewer on the runtime.
 
-use std::path::Path;
+mod displays;
+
 use std::sync::Arc;
 
 use rayfarm_farm::as_text;
@@ -8,12 +9,14 @@ use rayfarm_farm::{Farm, FarmControl, FarmScene};
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
+use displays::OpenDisplays;
+
 use super::interrupt::cancelled_by_signals;
 use super::observability::Observability;
 use super::quality::view_quality;
 use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
-use crate::display::{Display, SceneInfo, WindowDisplay};
+use crate::display::SceneInfo;
 use crate::error::CommandError;
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
@@ -29,7 +32,8 @@ const FRAMES_PER_ORBIT: u32 = 360;
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
     // Before the scene is compiled, which can take minutes.
-    WindowDisplay::check_build().map_err(|problem| no_window(&problem, &path))?;
+    let kinds = &args.display.display;
+    OpenDisplays::check_build(kinds, &path)?;
     let source = Source::load(&path, args.models, args.picture.size)?;
     let requested = source.request(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
@@ -47,8 +51,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let record_bytes = args.observability.record_bytes();
     let log = args.fps_log.as_deref().map(|path| FrameLogFile::create(path, record_bytes)).transpose()?;
     let mut observability = Observability::new(&args.observability)?;
-    let display =
-        WindowDisplay::open(info, view.width, view.height).map_err(|problem| no_window(&problem, &path))?;
+    let displays = OpenDisplays::open(kinds, &info, (view.width, view.height), &path)?;
 
     let limit = args.frames.map(u64::from);
     // A number of frames is for measuring: they are rendered although nothing changes.
@@ -64,19 +67,11 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
         farm.shut_down().await;
         result
     });
-    let shown = display.run(handle).map_err(CommandError::from);
+    let shown = displays.run(handle).map_err(CommandError::from);
     let rendered = runtime.block_on(rendering).map_err(CommandError::failed)?;
     rendered.map_err(CommandError::from).and(shown).and(observability.end())?;
     check_frames(&control)?;
     check_count(&args, &statistics, &interrupted)
-}
-
-/// Reports that there is no window, with the command that needs none.
-fn no_window(problem: &str, scene: &Path) -> CommandError {
-    CommandError::Failed(format!(
-        "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
-        scene.display()
-    ))
 }
 
 /// Starts the farm and a viewer over it.

@@ -1,0 +1,105 @@
+//! The displays of one run of `view`.
+
+use std::path::Path;
+use std::thread;
+
+use crate::app::cli::DisplayKind;
+use crate::display::{Display, DisplayError, SceneInfo, WindowDisplay};
+use crate::error::CommandError;
+use crate::viewer::{InputAction, ViewerHandle};
+
+/// A display that runs on a thread of its own until its user quits or the viewer ends.
+type RunDisplay = Box<dyn FnOnce(ViewerHandle) -> Result<(), DisplayError> + Send>;
+
+/// Open displays of a view, in the order of the command line: the first one decides the size of the picture.
+pub(super) struct OpenDisplays {
+    displays: Vec<OpenDisplay>,
+}
+
+/// An open display.
+enum OpenDisplay {
+    /// The window, which must run on the main thread.
+    Window(WindowDisplay),
+    /// Any other display, with its name.
+    Other(&'static str, RunDisplay),
+}
+
+impl OpenDisplays {
+    /// Checks that this build has the displays, before a scene is compiled.
+    ///
+    /// # Errors
+    /// A display that this build does not have.
+    pub(super) fn check_build(kinds: &[DisplayKind], scene: &Path) -> Result<(), CommandError> {
+        for kind in kinds {
+            match kind {
+                DisplayKind::Window => {
+                    WindowDisplay::check_build().map_err(|problem| no_window(&problem, scene))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Opens the displays.
+    ///
+    /// # Errors
+    /// A display that cannot be opened, with the reason and the alternatives.
+    pub(super) fn open(
+        kinds: &[DisplayKind],
+        info: &SceneInfo,
+        (width, height): (u32, u32),
+        scene: &Path,
+    ) -> Result<Self, CommandError> {
+        let open = |kind: &DisplayKind| match kind {
+            DisplayKind::Window => WindowDisplay::open(info.clone(), width, height)
+                .map(OpenDisplay::Window)
+                .map_err(|problem| no_window(&problem, scene)),
+        };
+        let displays = kinds.iter().map(open).collect::<Result<_, _>>()?;
+        Ok(Self { displays })
+    }
+
+    /// Runs all displays until one of them ends, and then ends the others. Blocks the calling thread, which must be the main
+    /// thread where there is a window.
+    ///
+    /// # Errors
+    /// The first display that cannot go on.
+    pub(super) fn run(self, first: ViewerHandle) -> Result<(), DisplayError> {
+        let mut window = None;
+        let mut threads = Vec::new();
+        let mut unused = Some(first.clone());
+        for display in self.displays {
+            let handle = unused.take().unwrap_or_else(|| first.further_display());
+            match display {
+                OpenDisplay::Window(display) => window = Some((display, handle)),
+                OpenDisplay::Other(name, run) => {
+                    let end = first.clone();
+                    let run = move || {
+                        let result = run(handle);
+                        // The viewer may have ended already.
+                        end.send(vec![InputAction::Quit]);
+                        result
+                    };
+                    let spawned = thread::Builder::new().name(name.to_owned()).spawn(run);
+                    let failed = |error| DisplayError::Failed(format!("no thread for the {name}: {error}"));
+                    threads.push(spawned.map_err(failed)?);
+                }
+            }
+        }
+        // The viewer ends when the last handle is dropped.
+        drop(first);
+        let shown = window.map_or(Ok(()), |(display, handle)| display.run(handle));
+        threads.into_iter().fold(shown, |result, thread| {
+            let ended = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            result.and(ended)
+        })
+    }
+}
+
+/// Reports that there is no window, with the command that needs none.
+fn no_window(problem: &str, scene: &Path) -> CommandError {
+    CommandError::Failed(format!(
+        "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
+        scene.display()
+    ))
+}
