@@ -9,6 +9,7 @@ mod display;
 mod error;
 mod in_process;
 mod log_bar;
+mod log_lines;
 mod measure;
 mod quantile;
 #[cfg_attr(

@@ -5,6 +5,8 @@ use std::sync::{Mutex, PoisonError};
 
 use indicatif::ProgressBar;
 
+use crate::log_lines;
+
 /// The bar on the terminal, if there is one. Lines of the log are written above it.
 static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
@@ -26,6 +28,9 @@ pub(crate) struct LogWriter;
 
 impl Write for LogWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if !log_lines::record(bytes) {
+            return Ok(bytes.len());
+        }
         let bar = BAR.lock().unwrap_or_else(PoisonError::into_inner).clone();
         match bar {
             Some(bar) => bar.suspend(|| io::stderr().write(bytes)),

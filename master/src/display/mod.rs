@@ -15,6 +15,8 @@ pub(crate) mod numbers;
 mod overlay;
 #[cfg(feature = "window")]
 mod screen;
+#[cfg(feature = "terminal")]
+pub(crate) mod terminal;
 #[cfg(feature = "window")]
 mod tint;
 #[cfg(feature = "window")]
@@ -34,6 +36,13 @@ pub(crate) use absent::WindowDisplay;
 pub(crate) use window::WindowDisplay;
 
 use crate::viewer::ViewerHandle;
+
+/// Restores the terminal if a display has taken it over, before the process ends at once.
+pub(crate) fn restore_terminal() {
+    #[cfg(feature = "terminal")]
+    terminal::restore();
+    crate::log_lines::release();
+}
 
 /// Facts about the scene and its farm that a display shows.
 #[derive(Clone, Debug)]

@@ -36,5 +36,5 @@ pub(crate) use requests::RequestPolicy;
 pub(crate) use sequence::{FrameSequence, SequenceFrame, Slot};
 pub(crate) use statistics::Statistics;
 pub(crate) use worker_command::KICK_REASON;
-#[cfg(feature = "window")]
+#[cfg(any(feature = "terminal", feature = "window"))]
 pub(crate) use worker_command::WorkerCommand;

@@ -31,6 +31,8 @@ mod tradeoff;
 mod values;
 
 pub(crate) use aov::Aov;
+#[cfg(feature = "terminal")]
+pub(crate) use display::Cells;
 pub(crate) use display::{DisplayArgs, DisplayKind};
 pub(crate) use farm::FarmArgs;
 pub(crate) use knobs::QualityArgs;

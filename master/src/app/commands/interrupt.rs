@@ -10,6 +10,7 @@ pub(super) fn cancelled_by_signals() -> CancellationToken {
         signal().await;
         token.cancel();
         signal().await;
+        crate::display::restore_terminal();
         // No orderly end after a second signal: local workers end too, because their standard input is closed.
         std::process::exit(1);
     });

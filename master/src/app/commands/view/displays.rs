@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::thread;
 
-use crate::app::cli::DisplayKind;
+use crate::app::cli::{DisplayArgs, DisplayKind};
 use crate::display::{Display, DisplayError, SceneInfo, WindowDisplay};
 use crate::error::CommandError;
 use crate::viewer::{InputAction, ViewerHandle};
@@ -29,12 +29,14 @@ impl OpenDisplays {
     ///
     /// # Errors
     /// A display that this build does not have.
-    pub(super) fn check_build(kinds: &[DisplayKind], scene: &Path) -> Result<(), CommandError> {
-        for kind in kinds {
+    pub(super) fn check_build(args: &DisplayArgs, scene: &Path) -> Result<(), CommandError> {
+        for kind in &args.display {
             match kind {
                 DisplayKind::Window => {
                     WindowDisplay::check_build().map_err(|problem| no_window(&problem, scene))?;
                 }
+                #[cfg(feature = "terminal")]
+                DisplayKind::Terminal => {}
             }
         }
         Ok(())
@@ -45,7 +47,7 @@ impl OpenDisplays {
     /// # Errors
     /// A display that cannot be opened, with the reason and the alternatives.
     pub(super) fn open(
-        kinds: &[DisplayKind],
+        args: &DisplayArgs,
         info: &SceneInfo,
         (width, height): (u32, u32),
         scene: &Path,
@@ -54,8 +56,10 @@ impl OpenDisplays {
             DisplayKind::Window => WindowDisplay::open(info.clone(), width, height)
                 .map(OpenDisplay::Window)
                 .map_err(|problem| no_window(&problem, scene)),
+            #[cfg(feature = "terminal")]
+            DisplayKind::Terminal => terminal(args),
         };
-        let displays = kinds.iter().map(open).collect::<Result<_, _>>()?;
+        let displays = args.display.iter().map(open).collect::<Result<_, _>>()?;
         Ok(Self { displays })
     }
 
@@ -96,10 +100,32 @@ impl OpenDisplays {
     }
 }
 
+/// Opens the terminal.
+#[cfg(feature = "terminal")]
+fn terminal(args: &DisplayArgs) -> Result<OpenDisplay, CommandError> {
+    use crate::app::cli::Cells;
+    use crate::display::terminal::{CellChoice, CellKind, Protocol, TerminalDisplay};
+
+    let choice = args.cells.map(|cells| match cells {
+        Cells::Half => CellChoice::Cells(CellKind::Half),
+        Cells::Quadrant => CellChoice::Cells(CellKind::Quadrant),
+        Cells::Sextant => CellChoice::Cells(CellKind::Sextant),
+        Cells::Octant => CellChoice::Cells(CellKind::Octant),
+        Cells::Kitty => CellChoice::Graphics(Protocol::Kitty),
+        Cells::Iterm => CellChoice::Graphics(Protocol::Iterm),
+        Cells::Sixel => CellChoice::Graphics(Protocol::Sixel),
+    });
+    let display = TerminalDisplay::open(choice).map_err(|problem| {
+        CommandError::Failed(format!("cannot show the view in the terminal: {problem}"))
+    })?;
+    Ok(OpenDisplay::Other("terminal", Box::new(move |viewer| display.run(viewer))))
+}
+
 /// Reports that there is no window, with the command that needs none.
 fn no_window(problem: &str, scene: &Path) -> CommandError {
     CommandError::Failed(format!(
-        "cannot open a window: {problem}; without a display, run: rayfarm-master render {} -o picture.png",
-        scene.display()
+        "cannot open a window: {problem}; without a display, run: rayfarm-master view {scene} --display terminal, or \
+         rayfarm-master render {scene} -o picture.png",
+        scene = scene.display()
     ))
 }

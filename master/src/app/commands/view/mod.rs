@@ -32,8 +32,7 @@ const FRAMES_PER_ORBIT: u32 = 360;
 pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let path = args.scene.clone().map_or_else(default_scene, Ok)?;
     // Before the scene is compiled, which can take minutes.
-    let kinds = &args.display.display;
-    OpenDisplays::check_build(kinds, &path)?;
+    OpenDisplays::check_build(&args.display, &path)?;
     let source = Source::load(&path, args.models, args.picture.size)?;
     let requested = source.request(&args.picture)?;
     let animation = animation(&args.picture, args.frames.unwrap_or(FRAMES_PER_ORBIT));
@@ -51,7 +50,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let record_bytes = args.observability.record_bytes();
     let log = args.fps_log.as_deref().map(|path| FrameLogFile::create(path, record_bytes)).transpose()?;
     let mut observability = Observability::new(&args.observability)?;
-    let displays = OpenDisplays::open(kinds, &info, (view.width, view.height), &path)?;
+    let displays = OpenDisplays::open(&args.display, &info, (view.width, view.height), &path)?;
 
     let limit = args.frames.map(u64::from);
     // A number of frames is for measuring: they are rendered although nothing changes.
