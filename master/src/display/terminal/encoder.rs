@@ -191,7 +191,8 @@ mod tests {
                 let shown = emulator.screen().cell(row, column).unwrap();
                 let rgb = |[r, g, b]: Rgb| vt100::Color::Rgb(r, g, b);
                 prop_assert_eq!(shown.bgcolor(), rgb(cell.background));
-                prop_assert_eq!(shown.contents().trim(), cell.glyph.to_string().trim());
+                let glyph = cell.glyph.to_string();
+                prop_assert_eq!(shown.contents().trim(), glyph.trim());
                 if cell.glyph != ' ' {
                     prop_assert_eq!(shown.fgcolor(), rgb(cell.foreground));
                 }

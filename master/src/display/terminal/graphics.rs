@@ -6,6 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 use super::encoder::place;
+use super::sixel;
 
 /// Most base64 characters in one part of a picture of kitty's protocol.
 const KITTY_PART: usize = 4096;
@@ -47,7 +48,7 @@ pub(super) fn show(protocol: Protocol, picture: Placed<'_>, out: &mut Vec<u8>) -
     match protocol {
         Protocol::Kitty => kitty(picture, out),
         Protocol::Iterm => return iterm(picture, out),
-        Protocol::Sixel => return sixel(picture, out),
+        Protocol::Sixel => sixel::encode(picture.width, picture.rgb, out),
     }
     Ok(())
 }
@@ -103,16 +104,6 @@ fn jpeg(picture: Placed<'_>) -> Result<Vec<u8>, String> {
     Ok(jpeg)
 }
 
-fn sixel(picture: Placed<'_>, out: &mut Vec<u8>) -> Result<(), String> {
-    let rgba: Vec<u8> =
-        picture.rgb.chunks_exact(3).flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
-    let text =
-        icy_sixel::sixel_encode(&rgba, picture.width, picture.height, &icy_sixel::EncodeOptions::default())
-            .map_err(|error| error.to_string())?;
-    out.extend_from_slice(text.as_bytes());
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,11 +134,5 @@ mod tests {
         let jpeg = STANDARD.decode(tail.trim_end_matches('\x07')).unwrap();
         assert!(head.contains(&format!("size={};width=10;height=3;", jpeg.len())));
         assert_eq!(jpeg[..2], [0xFF, 0xD8]);
-    }
-
-    #[test]
-    fn sixel_is_a_device_control_string() {
-        let text = shown(Protocol::Sixel);
-        assert!(text.contains("\x1bP") && text.ends_with("\x1b\\"));
     }
 }

@@ -15,6 +15,7 @@ mod guard;
 mod input;
 mod panel;
 mod raster;
+mod sixel;
 
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
