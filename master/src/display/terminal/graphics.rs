@@ -123,7 +123,7 @@ mod tests {
         let parts: Vec<&str> = text.split("\x1b\\").filter(|part| !part.is_empty()).collect();
         assert!(parts[0].contains("s=100,v=50") && parts[0].contains("c=10,r=3,m=1;"));
         assert!(parts.last().unwrap().contains("m=0"));
-        let base64: String = parts.iter().map(|part| part.split_once(';').unwrap().1).collect();
+        let base64: String = parts.iter().map(|part| part.rsplit_once(';').unwrap().1).collect();
         assert_eq!(STANDARD.decode(base64).unwrap(), RGB);
     }
 
