@@ -23,7 +23,7 @@ use crate::error::FarmError;
 use crate::finished::FinishedFrame;
 use crate::options::{DEFAULT_PORT, FarmOptions, FarmScene};
 use crate::server;
-use crate::sessions::addresses::Reachable;
+use crate::sessions::addresses::{Entrance, Reachable};
 use crate::status::FarmStatus;
 use crate::supervisor::{LocalSlots, LocalWorkers};
 use crate::verification::arbiter::{self, RowRenderer};
@@ -84,7 +84,7 @@ impl Farm {
             command: options.local_worker.clone(),
             count: options.local_workers,
             threads: options.threads,
-            listening: address,
+            entrance: Entrance { address, security: options.security.clone() },
         };
         let reporter = driver.clone();
         let stop_processes = stop.child_token();
@@ -99,6 +99,11 @@ impl Farm {
     /// The address where workers connect.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Where and how workers connect.
+    pub fn entrance(&self) -> Entrance {
+        Entrance { address: self.address, security: self.driver.security.clone() }
     }
 
     /// Requests a frame. It may replace an earlier request: at most two are open, and the oldest frame is always finished.

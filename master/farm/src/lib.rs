@@ -70,7 +70,7 @@ pub use framebuffer::FramePixels;
 pub use options::{DEFAULT_PORT, FarmOptions, FarmScene};
 pub use rayfarm_protocol::FrameId;
 pub use rayfarm_scheduler::{SegmentPolicy, Verification, WorkerState};
-pub use sessions::addresses::Reachable;
+pub use sessions::addresses::{Entrance, Reachable};
 pub use sessions::lease_book::{LeaseBook, LeaseStatus};
 pub use status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
 pub use supervisor::LocalWorkerCommand;

@@ -10,3 +10,4 @@ pub(crate) mod picture;
 mod plan;
 pub(crate) mod progress;
 pub(crate) mod reports;
+pub(crate) mod trust;

@@ -1,12 +1,11 @@
 //! Progress of a `render` run: a bar where standard error is a terminal, a line of the log now and then where it is not.
 
 use std::io::{self, IsTerminal};
-use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use rayfarm_farm::Entrance;
 use rayfarm_farm::FarmStatus;
-use rayfarm_farm::Reachable;
 use rayfarm_farm::accounting::duration_text;
 
 use crate::log_bar::{show_below_log, show_nothing_below_log};
@@ -27,7 +26,7 @@ pub(crate) struct Progress {
     left: Option<Duration>,
     /// Progress of the picture, if it is rendered in passes.
     film: Option<FilmProgress>,
-    address: SocketAddr,
+    entrance: Entrance,
     local_workers: u32,
     alone_since: Option<Instant>,
     next_reminder: Duration,
@@ -36,8 +35,8 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Progress of a run of `frames` frames, rendered by workers that connect to `address`.
-    pub(crate) fn new(frames: u64, address: SocketAddr, local_workers: u32) -> Self {
+    /// Progress of a run of `frames` frames, rendered by workers that connect at `entrance`.
+    pub(crate) fn new(frames: u64, entrance: Entrance, local_workers: u32) -> Self {
         let quiet = !tracing::enabled!(tracing::Level::INFO);
         let target = match io::stderr().is_terminal() && !quiet {
             true => ProgressDrawTarget::stderr(),
@@ -53,7 +52,7 @@ impl Progress {
             fps: 0.0,
             left: None,
             film: None,
-            address,
+            entrance,
             local_workers,
             alone_since: None,
             next_reminder: startup_time(local_workers),
@@ -109,7 +108,7 @@ impl Progress {
         if since.elapsed() >= self.next_reminder {
             self.next_reminder += REMIND_EVERY;
             let worker = if self.local_workers == 0 { "a worker" } else { "this machine's worker" };
-            tracing::warn!("waiting for {worker}; {}", Reachable::of(self.address).for_log());
+            tracing::warn!("waiting for {worker}; {}", self.entrance.reachable().for_log());
         }
     }
 

@@ -255,7 +255,7 @@ impl WindowDisplay {
     ) -> Option<Vec<String>> {
         if status.workers.is_empty() {
             return Some(overlay::waiting_for_workers(
-                viewer.address(),
+                &viewer.entrance().reachable(),
                 self.info.local_workers,
                 statistics.problem.as_deref(),
                 &status.banned,

@@ -1,11 +1,10 @@
 //! The displays' end of a viewer: snapshots to read and a channel for input.
 
-use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 
-use rayfarm_farm::{FarmStatus, FinishedFrame};
+use rayfarm_farm::{Entrance, FarmStatus, FinishedFrame};
 use tokio::sync::{mpsc, watch};
 
 use super::displays::DisplayId;
@@ -43,7 +42,7 @@ pub(crate) struct ViewerHandle {
     status: watch::Receiver<Arc<FarmStatus>>,
     stats: watch::Receiver<Arc<Statistics>>,
     input: mpsc::Sender<(DisplayId, InputAction)>,
-    address: SocketAddr,
+    entrance: Entrance,
     display: DisplayId,
     /// Number of the next display.
     next_display: Arc<AtomicU32>,
@@ -79,9 +78,9 @@ impl ViewerHandle {
         self.stats.clone()
     }
 
-    /// Address at which workers connect.
-    pub(crate) fn address(&self) -> SocketAddr {
-        self.address
+    /// Where and how workers connect.
+    pub(crate) fn entrance(&self) -> &Entrance {
+        &self.entrance
     }
 
     /// Whether the viewer still takes input.
@@ -138,8 +137,8 @@ pub(super) struct Channels {
 }
 
 impl Channels {
-    /// Both ends, for a farm of this status whose workers connect to `address`.
-    pub(super) fn new(address: SocketAddr, status: FarmStatus) -> (Self, ViewerHandle) {
+    /// Both ends, for a farm of this status whose workers connect at `entrance`.
+    pub(super) fn new(entrance: Entrance, status: FarmStatus) -> (Self, ViewerHandle) {
         let (frames, frames_out) = watch::channel(None);
         let (status, status_out) = watch::channel(Arc::new(status));
         let (stats, stats_out) = watch::channel(Arc::default());
@@ -149,7 +148,7 @@ impl Channels {
             status: status_out,
             stats: stats_out,
             input: input_in,
-            address,
+            entrance,
             display: DisplayId::FIRST,
             next_display: Arc::new(AtomicU32::new(DisplayId::FIRST.0 + 1)),
         };
@@ -183,7 +182,8 @@ mod tests {
     use super::*;
 
     fn channels() -> (Channels, ViewerHandle) {
-        Channels::new(SocketAddr::from(([127, 0, 0, 1], 9)), FarmStatus::default())
+        let entrance = Entrance { address: ([127, 0, 0, 1], 9).into(), security: Default::default() };
+        Channels::new(entrance, FarmStatus::default())
     }
 
     #[test]

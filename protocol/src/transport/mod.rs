@@ -3,7 +3,8 @@
 //! 1. [`PrivateKey`]: the P-256 key of a master or a worker. Its public half, hashed ([`KeyHash`]), is the identity.
 //! 2. [`JoinLine`]: address, key and token of a master as one line of text.
 //! 3. [`MasterSecurity`] and [`WorkerSecurity`]: whether an end uses TLS, and with what.
-//! 4. [`Connection`]: the stream that results from a handshake, with [`Connection::peer_key`].
+//! 4. [`read_private`], [`write_private`]: small files of mode 0600.
+//! 5. [`Connection`]: the stream that results from a handshake, with [`Connection::peer_key`].
 //!
 //! Names and dates of certificates are ignored, so nothing depends on a clock.
 
@@ -11,6 +12,7 @@ mod bounded;
 mod certificate;
 mod connection;
 mod join_line;
+mod private_file;
 mod private_key;
 mod proof;
 mod security;
@@ -20,6 +22,7 @@ pub use crate::key_hash::{KeyHash, KeyHashError};
 pub use bounded::Bounded;
 pub use connection::Connection;
 pub use join_line::{JoinLine, JoinLineError, JoinToken};
+pub use private_file::{read_private, write_private};
 pub use private_key::{PrivateKey, PrivateKeyError};
 pub(crate) use proof::Proof;
 pub use security::{MasterSecurity, MasterTrust, WorkerSecurity};

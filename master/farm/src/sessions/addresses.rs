@@ -3,9 +3,29 @@
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV6, UdpSocket};
 
 use rayfarm_protocol::address::{self, Interface};
+use rayfarm_protocol::transport::MasterSecurity;
 
 /// Addresses that the window shows.
 const SHOWN: usize = 2;
+
+/// Longest part of a command in the window, in characters.
+const WINDOW_COLUMNS: usize = 64;
+
+/// Where and how workers connect to a master.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entrance {
+    /// The address at which the master listens.
+    pub address: SocketAddr,
+    /// Whether connections use TLS, with which key and token.
+    pub security: MasterSecurity,
+}
+
+impl Entrance {
+    /// The addresses under which workers may connect now, with the command that starts one.
+    pub fn reachable(&self) -> Reachable {
+        Reachable { security: self.security.clone(), ..Reachable::of(self.address) }
+    }
+}
 
 /// The addresses under which workers may connect, best first.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,6 +36,8 @@ pub struct Reachable {
     pub from_outside: bool,
     /// Whether the listening address is meant for other machines.
     pub meant_for_outside: bool,
+    /// Whether workers need a join line.
+    security: MasterSecurity,
 }
 
 impl Reachable {
@@ -35,7 +57,8 @@ impl Reachable {
         if !ip.is_unspecified() {
             let outside = !ip.is_loopback();
             let addresses = vec![address::show(listening, interfaces)];
-            return Self { addresses, from_outside: outside, meant_for_outside: outside };
+            let security = MasterSecurity::Plain;
+            return Self { addresses, from_outside: outside, meant_for_outside: outside, security };
         }
         let fits = |interface: &&Interface| {
             let is_here_only = interface.ip.is_loopback() || interface.ip.is_unspecified();
@@ -54,27 +77,56 @@ impl Reachable {
                 if ip.is_ipv6() { Ipv6Addr::LOCALHOST.into() } else { Ipv4Addr::LOCALHOST.into() };
             addresses.push(SocketAddr::new(loopback, listening.port()).to_string());
         }
-        Self { addresses, from_outside, meant_for_outside: true }
+        Self { addresses, from_outside, meant_for_outside: true, security: MasterSecurity::Plain }
     }
 
-    /// The command line that starts a worker.
+    /// The command line that starts a worker. With TLS it contains the farm's token: it belongs in no log.
     pub fn command(&self) -> String {
-        command(self.addresses.first().map_or("", String::as_str))
+        self.command_at(self.addresses.first().map_or("", String::as_str))
     }
 
-    /// Lines for the window that say how to start a worker, with at most two addresses.
+    /// The command lines that start a worker, one for each address: see [`Self::command`].
+    pub fn commands(&self) -> Vec<String> {
+        self.addresses.iter().map(|address| self.command_at(address)).collect()
+    }
+
+    fn command_at(&self, address: &str) -> String {
+        match &self.security {
+            MasterSecurity::Plain => format!("rayfarm-worker --master {address}"),
+            MasterSecurity::Tls(trust) => format!("rayfarm-worker --join {}", trust.join_line(address)),
+        }
+    }
+
+    /// Whether workers need a join line, which is a secret.
+    pub fn is_secret(&self) -> bool {
+        matches!(self.security, MasterSecurity::Tls(_))
+    }
+
+    /// Lines for the window that say how to start a worker, with at most two addresses. Long commands are divided.
     pub fn for_window(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if self.meant_for_outside && !self.from_outside {
             lines.push("This machine has no address that others can reach.".to_owned());
         }
         lines.push(format!("To start one {}:", self.place()));
-        lines.extend(self.addresses.iter().take(SHOWN).map(|address| command(address)));
+        let shown = if self.is_secret() { 1 } else { SHOWN };
+        for command in self.commands().into_iter().take(shown) {
+            let letters: Vec<char> = command.chars().collect();
+            lines.extend(letters.chunks(WINDOW_COLUMNS).map(|part| part.iter().collect::<String>()));
+        }
         lines
     }
 
-    /// One line for the log that says how to start a worker, with all addresses.
+    /// One line for the log that says how to start a worker, with all addresses. It contains no secret.
     pub fn for_log(&self) -> String {
+        if self.is_secret() {
+            let addresses = self.addresses.join(", ");
+            let (place, warning) = (self.place(), self.warning());
+            return format!(
+                "to start one {place}, paste the line that `rayfarm-master trust show` prints; \
+                 it connects to {addresses}{warning}"
+            );
+        }
         let others = match self.addresses.get(1..) {
             None | Some([]) => String::new(),
             Some(others) => format!(" (or at {})", others.join(", ")),
@@ -98,10 +150,6 @@ impl Reachable {
             false => "",
         }
     }
-}
-
-fn command(address: &str) -> String {
-    format!("rayfarm-worker --master {address}")
 }
 
 /// Adds the interface to a link-local address, which is ambiguous without it.
@@ -231,7 +279,10 @@ mod tests {
             assert_eq!(reachable.addresses, [loopback]);
             let window = reachable.for_window();
             assert_eq!(window[0], "This machine has no address that others can reach.");
-            assert_eq!(window[1..], ["To start one on this machine:".to_owned(), command(loopback)]);
+            assert_eq!(
+                window[1..],
+                ["To start one on this machine:".to_owned(), format!("rayfarm-worker --master {loopback}")]
+            );
             assert!(reachable.for_log().contains("no address that others can reach"));
             assert!(reachable.announcement().unwrap().contains("no address that others can reach"));
         }
@@ -259,5 +310,23 @@ mod tests {
             let loopback = |address: &String| address.starts_with("127.") || address.starts_with("[::1]");
             assert_eq!(reachable.addresses.iter().any(loopback), !reachable.from_outside, "{reachable:?}");
         }
+    }
+
+    #[test]
+    fn the_token_is_in_the_command_and_in_no_line_of_the_log() {
+        use std::sync::Arc;
+
+        use rayfarm_protocol::transport::{JoinToken, MasterTrust, PrivateKey};
+        let token = JoinToken([0xA5; 16]);
+        let trust = Arc::new(MasterTrust::new(PrivateKey::generate().unwrap(), token));
+        let listening = "192.0.2.7:7117".parse().unwrap();
+        let entrance = Entrance { address: listening, security: MasterSecurity::Tls(trust.clone()) };
+        let reachable = entrance.reachable();
+        assert!(reachable.is_secret());
+        let line = trust.join_line("192.0.2.7:7117").to_string();
+        assert_eq!(reachable.commands(), [format!("rayfarm-worker --join {line}")]);
+        assert_eq!(reachable.for_window()[1..].concat(), reachable.command(), "divided, and complete");
+        assert!(!reachable.for_log().contains(&token.to_string()));
+        assert!(!reachable.announcement().unwrap().contains(&token.to_string()));
     }
 }

@@ -11,6 +11,9 @@ use tokio_util::task::TaskTracker;
 mod process;
 mod slots;
 
+use rayfarm_protocol::transport::MasterSecurity;
+
+use crate::sessions::addresses::Entrance;
 use crate::sessions::identity::{Tickets, local_name};
 use process::Supervisor;
 
@@ -34,8 +37,8 @@ pub(crate) struct LocalWorkers {
     pub(crate) count: u32,
     /// Render threads of each; `None` divides the cores.
     pub(crate) threads: Option<usize>,
-    /// The address at which the master listens.
-    pub(crate) listening: SocketAddr,
+    /// Where and how they connect.
+    pub(crate) entrance: Entrance,
 }
 
 impl LocalWorkers {
@@ -53,7 +56,12 @@ impl LocalWorkers {
         for number in 1..=self.count {
             let (slots, on_all_exited, stop) = (slots.clone(), on_all_exited.clone(), stop.clone());
             let name = tickets.of(number).unwrap_or_else(|| local_name(number));
-            let supervisor = Supervisor { number, name, command: self.command(number - 1) };
+            let supervisor = Supervisor {
+                number,
+                name,
+                command: self.command(number - 1),
+                entrance: self.entrance.clone(),
+            };
             tasks.spawn(async move {
                 while let Some(reason) = supervisor.run(&stop).await {
                     let Some(slot) = slots.get(number) else { return };
@@ -72,8 +80,14 @@ impl LocalWorkers {
 
     /// The command line of the worker with this index, from 0.
     fn command(&self, index: u32) -> LocalWorkerCommand {
-        let master = reachable(self.listening).to_string();
-        let mut args = vec!["--master".to_owned(), master, "--exit-with-stdin".into()];
+        let mut args = match self.entrance.security {
+            MasterSecurity::Plain => {
+                vec!["--master".to_owned(), reachable(self.entrance.address).to_string()]
+            }
+            // The line itself comes over standard input: the process list is readable for all users.
+            MasterSecurity::Tls(_) => vec!["--join".to_owned(), "-".to_owned(), "--no-remember".to_owned()],
+        };
+        args.push("--exit-with-stdin".into());
         // The master logs its joining and leaving; the worker itself logs only errors.
         args.extend(["--once".into(), "--quiet".into()]);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -83,6 +97,16 @@ impl LocalWorkers {
         let mut command = self.command.clone();
         command.args.extend(args.into_iter().map(OsString::from));
         command
+    }
+}
+
+/// The line with which a process of this machine joins; `None` where connections are plain.
+fn join_line(entrance: &Entrance) -> Option<String> {
+    match &entrance.security {
+        MasterSecurity::Plain => None,
+        MasterSecurity::Tls(trust) => {
+            Some(trust.join_line(reachable(entrance.address).to_string()).to_string())
+        }
     }
 }
 

@@ -1,15 +1,17 @@
 //! The supervisor of one local worker process.
 //!
-//! The master holds the other end of the process's standard input and never writes to it. When the master ends, however
+//! The master holds the other end of the process's standard input. It writes the join line to it, if the farm has one, and nothing else. When the master ends, however
 //! it ends, the pipe closes and the worker exits.
 
 use std::process::{ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use tokio::io::AsyncWriteExt;
 use tokio::process::{Child, Command};
 use tokio_util::sync::CancellationToken;
 
-use super::LocalWorkerCommand;
+use super::{LocalWorkerCommand, join_line};
+use crate::sessions::addresses::Entrance;
 
 /// A worker that exits sooner counts as a failed start.
 const MIN_UPTIME: Duration = Duration::from_secs(30);
@@ -26,6 +28,7 @@ pub(super) struct Supervisor {
     /// The name that the worker sends in its handshake: its ticket, where there are tickets.
     pub(super) name: String,
     pub(super) command: LocalWorkerCommand,
+    pub(super) entrance: Entrance,
 }
 
 impl Supervisor {
@@ -37,7 +40,11 @@ impl Supervisor {
             let failure = match self.spawn() {
                 Ok(mut child) => {
                     // `Child::wait` closes the standard input, which would end the worker: keep it open here.
-                    let stdin = child.stdin.take();
+                    let mut stdin = child.stdin.take();
+                    if let Some((stdin, line)) = stdin.as_mut().zip(join_line(&self.entrance)) {
+                        // A process that ends before it reads reports its failure itself.
+                        let _ = stdin.write_all(format!("{line}\n").as_bytes()).await;
+                    }
                     tokio::select! {
                         biased;
                         () = stop.cancelled() => {
@@ -107,6 +114,7 @@ fn described(status: std::io::Result<ExitStatus>) -> String {
 mod tests {
     use std::ffi::OsString;
 
+    use rayfarm_protocol::transport::MasterSecurity;
     use tokio_util::task::TaskTracker;
 
     use super::*;
@@ -114,7 +122,8 @@ mod tests {
 
     fn supervisor(program: &str, args: Vec<OsString>) -> Supervisor {
         let command = LocalWorkerCommand { program: program.into(), args, name_variable: "NAME".to_owned() };
-        Supervisor { number: 1, name: local_name(1), command }
+        let entrance = Entrance { address: ([127, 0, 0, 1], 9).into(), security: MasterSecurity::Plain };
+        Supervisor { number: 1, name: local_name(1), command, entrance }
     }
 
     #[tokio::test]

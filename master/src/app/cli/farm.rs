@@ -1,9 +1,12 @@
 //! Options of the farm: workers, and how frames are divided among them.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 
 use clap::Args;
 use rayfarm_farm::{FarmOptions, LocalWorkerCommand, SegmentPolicy};
+
+use rayfarm_protocol::transport::MasterSecurity;
 
 use super::LOCAL_WORKER;
 use super::values::{listen_address, thread_count, worker_count};
@@ -14,6 +17,16 @@ pub(crate) struct FarmArgs {
     /// Address at which workers connect, for workers on other machines [default: 127.0.0.1:7117].
     #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address)]
     pub(super) listen: Option<SocketAddr>,
+    /// Secure the connections of workers on this machine too: TLS, and only with the join line. Where other machines can connect, that
+    /// is the default.
+    #[arg(long, conflicts_with = "insecure")]
+    pub(crate) secure: bool,
+    /// Connections without TLS: every machine that reaches the port can join, see the scene and alter pictures.
+    #[arg(long)]
+    pub(crate) insecure: bool,
+    /// Folder with the key and the token of this master; without it, in the user's state folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
     /// Number of worker processes that the master starts on this machine.
     #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
     pub(super) local_workers: u32,
@@ -22,7 +35,7 @@ pub(crate) struct FarmArgs {
     pub(super) no_local_workers: bool,
     /// Render threads of each local worker; without it, the workers share all cores.
     #[arg(long, value_name = "N", value_parser = thread_count)]
-    pub(super) threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     /// Policy for the size of segments: static:ROWS, smart:ROWS or adaptive.
     #[arg(long, value_name = "POLICY", default_value = "adaptive")]
     pub(super) segment: SegmentPolicy,
@@ -40,8 +53,13 @@ impl FarmArgs {
         if self.no_local_workers { 0 } else { self.local_workers }
     }
 
+    /// Whether other machines can connect.
+    pub(crate) fn listens_beyond_this_machine(&self) -> bool {
+        self.listen.is_some_and(|address| !address.ip().to_canonical().is_loopback())
+    }
+
     /// Options of the farm.
-    pub(crate) fn options(&self) -> FarmOptions {
+    pub(crate) fn options(&self, security: MasterSecurity) -> FarmOptions {
         FarmOptions {
             listen: self.listen,
             local_workers: self.local_workers(),
@@ -50,7 +68,7 @@ impl FarmArgs {
             policy: self.segment,
             sequential: self.pipeline == 0,
             verify_percent: self.verify,
-            security: Default::default(),
+            security,
         }
     }
 }

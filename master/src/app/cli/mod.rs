@@ -28,6 +28,7 @@ mod quality_control;
 mod shell;
 mod simulate;
 mod tradeoff;
+mod trust;
 mod values;
 
 pub(crate) use aov::Aov;
@@ -45,6 +46,7 @@ pub(crate) use quality_control::{ErrorArgs, QualityControlArgs};
 pub(crate) use shell::{CompletionsArgs, ManArgs, Program};
 pub(crate) use simulate::{Profile, SimulateArgs};
 pub(crate) use tradeoff::TradeoffArgs;
+pub(crate) use trust::{TrustAction, TrustArgs};
 
 /// The command that turns the master into a worker.
 pub(crate) const LOCAL_WORKER: &str = "local-worker";
@@ -126,6 +128,8 @@ pub(crate) enum Command {
     CheckNumerics(CheckNumericsArgs),
     /// Measure the time and the error of each setting of the tracer; write a table, plots and pictures.
     Tradeoff(TradeoffArgs),
+    /// Show or change the secret line with which workers on other machines join.
+    Trust(TrustArgs),
     /// Print a script that completes the options of a program in a shell.
     Completions(CompletionsArgs),
     /// Write manual pages of both programs.

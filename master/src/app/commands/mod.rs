@@ -36,6 +36,7 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
         Command::Explain(args) => explain::run(&args),
         Command::CheckNumerics(args) => check_numerics::run(&args),
         Command::Tradeoff(args) => tradeoff::run(&args),
+        Command::Trust(args) => crate::app::trust::run(&args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(&args),
     }
@@ -44,8 +45,8 @@ pub(crate) fn run(command: Command) -> Result<(), CommandError> {
 /// Value of `--threads`.
 fn threads(command: &Command) -> Option<usize> {
     match command {
-        Command::View(args) => args.farm.options().threads,
-        Command::Render(args) => args.farm.options().threads,
+        Command::View(args) => args.farm.threads,
+        Command::Render(args) => args.farm.threads,
         Command::Bench(args) => args.threads,
         Command::Tradeoff(args) => args.threads,
         _ => None,

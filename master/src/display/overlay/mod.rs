@@ -1,7 +1,6 @@
 //! Overlay of the picture: figures, panels, the list of keys, and messages.
 
 use std::borrow::Cow;
-use std::net::SocketAddr;
 use std::time::Duration;
 
 use accounts::AccountPanel;
@@ -171,7 +170,7 @@ fn draw_help(canvas: &mut Canvas) {
 
 /// Message while no worker is connected. `problem` is the reason for which the local ones have ended.
 pub(super) fn waiting_for_workers(
-    address: SocketAddr,
+    reachable: &Reachable,
     local_workers: u32,
     problem: Option<&str>,
     kicked: &[BannedWorker],
@@ -185,7 +184,7 @@ pub(super) fn waiting_for_workers(
     let mut lines = vec![first];
     lines.extend(kicked::remedies(kicked, problem.is_some() && local_workers > 0));
     lines.push(String::new());
-    lines.extend(Reachable::of(address).for_window());
+    lines.extend(reachable.for_window());
     lines
 }
 

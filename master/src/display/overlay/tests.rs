@@ -95,8 +95,8 @@ fn at_rest_the_time_of_the_last_frame_replaces_the_rate() {
 #[test]
 fn the_message_about_a_kicked_worker_says_how_to_bring_it_back() {
     let kicked = [kicked("local-1")];
-    let address = SocketAddr::from(([127, 0, 0, 1], 7117));
-    let message = waiting_for_workers(address, 1, Some("local worker 1 has left in order"), &kicked);
+    let reachable = Reachable::of(([127, 0, 0, 1], 7117).into());
+    let message = waiting_for_workers(&reachable, 1, Some("local worker 1 has left in order"), &kicked);
     let expected = [
         "Waiting for a worker: local worker 1 has left in order.",
         "Kicked: local-1",
@@ -170,7 +170,7 @@ fn text_is_legible_on_any_picture_and_below_messages() {
 #[test]
 fn every_window_size_can_be_drawn_on() {
     let message = waiting_for_workers(
-        SocketAddr::from(([127, 0, 0, 1], 7117)),
+        &Reachable::of(([127, 0, 0, 1], 7117).into()),
         1,
         Some("it ended, 5 times in a row"),
         &[],
@@ -223,7 +223,7 @@ fn long_lines_are_broken_at_spaces_and_long_words_are_cut() {
 
 #[test]
 fn the_waiting_message_says_how_to_start_a_worker() {
-    let local = waiting_for_workers(SocketAddr::from(([127, 0, 0, 1], 7117)), 0, None, &[]);
+    let local = waiting_for_workers(&Reachable::of(([127, 0, 0, 1], 7117).into()), 0, None, &[]);
     assert_eq!(
         local,
         [
@@ -233,7 +233,7 @@ fn the_waiting_message_says_how_to_start_a_worker() {
             "rayfarm-worker --master 127.0.0.1:7117"
         ]
     );
-    let elsewhere = waiting_for_workers(SocketAddr::from(([192, 0, 2, 7], 9)), 2, None, &[]);
+    let elsewhere = waiting_for_workers(&Reachable::of(([192, 0, 2, 7], 9).into()), 2, None, &[]);
     assert_eq!(elsewhere[2], "To start one on any machine:");
     assert_eq!(elsewhere[3], "rayfarm-worker --master 192.0.2.7:9");
 }

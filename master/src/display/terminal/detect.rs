@@ -43,7 +43,7 @@ impl Abilities {
         Self::of_replies(&exchange())
     }
 
-    /// The abilities that replies tell. Unknown replies are skipped.
+    /// The abilities that replies report. Unknown replies are skipped.
     fn of_replies(replies: &[u8]) -> Self {
         let mut abilities = Self::default();
         let text = String::from_utf8_lossy(replies);

@@ -60,7 +60,7 @@ pub(crate) fn restore() {
         return;
     }
     let mut out = io::stdout().lock();
-    // The program ends or stops: there is no one to report a failure to.
+    // The program ends or stops: no output is left for a failure.
     let _ = execute!(out, DisableMouseCapture, EnableLineWrap, cursor::Show, LeaveAlternateScreen);
     let _ = out.flush();
     let _ = disable_raw_mode();

@@ -4,7 +4,7 @@
 //! frame -> raster (pixels of the cells) -> cells (glyph and two colours each) -> encoder (changed cells as bytes) -> terminal
 //! ```
 //!
-//! After each frame the terminal is asked for the place of its cursor, and the next frame waits for the reply: a slow connection shows
+//! After each frame the display requests the place of its cursor, and the next frame waits for the reply: a slow connection shows
 //! fewer frames and no old ones. Lines of the log go to the panel, because standard error is the same screen.
 
 mod cells;
@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crossterm::{cursor, event, terminal};
-use rayfarm_farm::{Reachable, WorkerState};
+use rayfarm_farm::WorkerState;
 
 use self::cells::{Cell, cells_of};
 use self::detect::{Abilities, Mode};
@@ -46,7 +46,7 @@ const WAIT: Duration = Duration::from_millis(4);
 const RESTING_WAIT: Duration = Duration::from_millis(60);
 /// Interval at which figures and log are compared with those on the screen.
 const PANEL_EVERY: Duration = Duration::from_millis(250);
-/// Size of a cell in pixels where the terminal does not tell it.
+/// Size of a cell in pixels where the terminal does not report it.
 const USUAL_CELL: (u32, u32) = (9, 18);
 /// Terminals of fewer rows have no panel.
 const MIN_ROWS_WITH_PANEL: usize = 8;
@@ -337,7 +337,7 @@ fn of_frame(picture: &PresentedFrame) -> Picture<'_> {
 fn waiting(viewer: &ViewerHandle) -> Vec<String> {
     let mut lines = vec!["Waiting for a worker.".to_owned(), String::new()];
     lines.extend(viewer.statistics().problem.clone());
-    lines.extend(Reachable::of(viewer.address()).for_window());
+    lines.extend(viewer.entrance().reachable().for_window());
     lines
 }
 

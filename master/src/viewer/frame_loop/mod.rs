@@ -69,7 +69,7 @@ impl Viewer {
     /// A viewer of a view that input changes, and the handle for its displays.
     pub(crate) fn interactive(farm: Farm, config: ViewerConfig) -> (Self, ViewerHandle) {
         let ViewerConfig { request, camera, policy, log, controller } = config;
-        let (channels, handle) = Channels::new(farm.address(), farm.status());
+        let (channels, handle) = Channels::new(farm.entrance(), farm.status());
         let viewer = Self {
             farm,
             state: ViewState { request, hidden: false },
@@ -94,7 +94,7 @@ impl Viewer {
         auxiliary: &[Shading],
     ) -> (Self, ViewerHandle, FrameSequence) {
         let (plan, sender, sequence) = SequencePlan::new(numbers, auxiliary);
-        let (channels, handle) = Channels::new(farm.address(), farm.status());
+        let (channels, handle) = Channels::new(farm.entrance(), farm.status());
         let viewer = Self {
             farm,
             state: ViewState { request, hidden: false },

@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use denoised::{Denoised, with_guides};
 use files::{FileDisplay, FrameFiles};
 use passes::PassRules;
-use rayfarm_farm::{Farm, FarmOptions, FarmScene, ViewRequest};
+use rayfarm_farm::{Farm, FarmScene, ViewRequest};
 use repair::named;
 use totals::Totals;
 
@@ -17,12 +17,13 @@ use super::interrupt::cancelled_by_signals;
 use super::observability::Observability;
 use super::quality::within_error;
 use super::source::{Source, animation};
-use crate::app::cli::RenderArgs;
+use crate::app::cli::{FarmArgs, RenderArgs};
 use crate::app::output::{FrameWriter, OutputPattern, check_writable};
 use crate::app::picture::{BEAUTY, DENOISED};
 use crate::app::plan::{Existing, Plan};
 use crate::app::progress::Progress;
 use crate::app::reports::{RenderReport, print_json};
+use crate::app::trust;
 use crate::display::Display;
 use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
@@ -72,7 +73,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let report = match run.files.plan.frames.is_empty() {
         true => run.nothing_to_do()?,
-        false => run.carry_out(&super::runtime()?, args.farm.options(), scene)?,
+        false => run.carry_out(&super::runtime()?, &args.farm, scene)?,
     };
     if args.json {
         print_json(&report)?;
@@ -166,13 +167,13 @@ impl Run {
     fn carry_out(
         mut self,
         runtime: &Runtime,
-        options: FarmOptions,
+        args: &FarmArgs,
         scene: FarmScene,
     ) -> Result<RenderReport, CommandError> {
         let interrupted = runtime.block_on(async { cancelled_by_signals() });
-        let local_workers = options.local_workers;
-        let mut farm = runtime.block_on(self.start(options, scene, &interrupted))?;
-        let mut progress = Progress::new(self.files.count(), farm.address(), local_workers);
+        let local_workers = args.local_workers();
+        let mut farm = runtime.block_on(self.start(args, scene, &interrupted))?;
+        let mut progress = Progress::new(self.files.count(), farm.entrance(), local_workers);
         runtime.block_on(self.await_workers(&farm, local_workers, &mut progress, &interrupted));
         let (farm, rendered) = match self.passes.take() {
             None => self.render(runtime, farm, &mut progress, &interrupted)?,
@@ -187,11 +188,13 @@ impl Run {
 
     async fn start(
         &self,
-        options: FarmOptions,
+        args: &FarmArgs,
         scene: FarmScene,
         interrupted: &CancellationToken,
     ) -> Result<Farm, CommandError> {
+        let options = args.options(trust::security(args)?);
         let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
+        trust::announce(args, &farm.entrance(), interrupted);
         if let Err(error) = self.observability.begin(&farm, None, interrupted) {
             farm.shut_down().await;
             return Err(error);

@@ -16,6 +16,7 @@ use super::observability::Observability;
 use super::quality::view_quality;
 use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
+use crate::app::trust;
 use crate::display::SceneInfo;
 use crate::error::CommandError;
 use crate::viewer::{
@@ -82,7 +83,9 @@ async fn start(
     stop: &CancellationToken,
 ) -> Result<(Viewer, ViewerHandle, FarmControl), CommandError> {
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
-    let farm = Farm::start(args.farm.options(), scene).await.map_err(CommandError::failed)?;
+    let security = trust::security(&args.farm)?;
+    let farm = Farm::start(args.farm.options(security), scene).await.map_err(CommandError::failed)?;
+    trust::announce(&args.farm, &farm.entrance(), stop);
     if let Some(frames) = args.frames {
         farm.expect_frames(frames.into());
     }

@@ -1,0 +1,37 @@
+//! Options of `trust`.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use rayfarm_farm::DEFAULT_PORT;
+
+use super::values::listen_address;
+
+/// Options of `trust`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct TrustArgs {
+    #[command(subcommand)]
+    pub(crate) action: TrustAction,
+    /// Address at which the master listens or will listen.
+    #[arg(long, global = true, value_name = "ADDR:PORT", value_parser = listen_address,
+          default_value_t = SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_PORT)))]
+    pub(crate) listen: SocketAddr,
+    /// Folder with the key and the token of this master; without it, in the user's state folder.
+    #[arg(long, global = true, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
+}
+
+/// Actions of `trust`.
+#[derive(Clone, Copy, Debug, Subcommand)]
+pub(crate) enum TrustAction {
+    /// Print the command that starts a worker on another machine, one line for each address of this machine. The line contains a
+    /// secret.
+    Show,
+    /// Make a new token: connected workers stay, and the old join line is refused.
+    Rotate {
+        /// Make a new key as well: no worker that has joined before trusts this master any more.
+        #[arg(long)]
+        key: bool,
+    },
+}

@@ -1,0 +1,76 @@
+//! Trust between this master and the workers of other machines: key, token and join line.
+//!
+//! The key and the token are made at the first start that needs them, and stay in the state folder, so that a worker that has joined
+//! once joins again. Their files have mode 0600.
+
+mod state;
+
+use rayfarm_farm::Entrance;
+use rayfarm_protocol::transport::MasterSecurity;
+use tokio_util::sync::CancellationToken;
+
+use crate::app::cli::{FarmArgs, TrustAction, TrustArgs};
+use crate::error::CommandError;
+
+use state::MasterState;
+
+/// Whether and how the connections of a farm are secured: with TLS where other machines can connect, unless the user refuses it.
+///
+/// # Errors
+/// A state folder or a file in it that cannot be used.
+pub(crate) fn security(args: &FarmArgs) -> Result<MasterSecurity, CommandError> {
+    let is_open = args.listens_beyond_this_machine();
+    if !args.secure && (args.insecure || !is_open) {
+        if is_open {
+            tracing::warn!(
+                "--insecure: every machine that reaches this port can join, see the scene and send wrong pixels"
+            );
+        }
+        return Ok(MasterSecurity::Plain);
+    }
+    MasterState::at(args.state.as_deref())?.trust().map(MasterSecurity::Tls)
+}
+
+/// Says how to start workers on other machines, and follows changes of the token. The join line is a secret: it is written to a
+/// terminal and into no file. Call it inside a runtime.
+pub(crate) fn announce(args: &FarmArgs, entrance: &Entrance, stop: &CancellationToken) {
+    let MasterSecurity::Tls(trust) = &entrance.security else { return };
+    if let Ok(state) = MasterState::at(args.state.as_deref()) {
+        tokio::spawn(state.follow(trust.clone(), stop.clone()));
+    }
+    let reachable = entrance.reachable();
+    if std::io::IsTerminal::is_terminal(&std::io::stderr()) {
+        tracing::info!("only machines with this line can join: {}", reachable.command());
+    } else {
+        tracing::info!("only machines with the join line can join; {}", reachable.for_log());
+    }
+}
+
+/// Executes `trust`.
+///
+/// # Errors
+/// A state folder or a file in it that cannot be used.
+pub(crate) fn run(args: &TrustArgs) -> Result<(), CommandError> {
+    let state = MasterState::at(args.state.as_deref())?;
+    match args.action {
+        TrustAction::Show => {}
+        TrustAction::Rotate { key } => {
+            state.rotate(key)?;
+            let effect = if key {
+                "the key and the token are new: masters that run keep the old key until they end"
+            } else {
+                "the token is new: connected workers stay, and the old join line is refused"
+            };
+            tracing::info!("{effect}");
+        }
+    }
+    let security = MasterSecurity::Tls(state.trust()?);
+    let reachable = Entrance { address: args.listen, security }.reachable();
+    for command in reachable.commands() {
+        println!("{command}");
+    }
+    if !reachable.from_outside {
+        tracing::warn!("this machine has no address that others can reach: is it connected to a network?");
+    }
+    Ok(())
+}
