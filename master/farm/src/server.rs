@@ -94,8 +94,8 @@ async fn shake_hands(driver: &Driver, stream: TcpStream, address: SocketAddr) ->
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
     let mut admitted = None;
-    let decide = |hello: &Hello, _key: Option<KeyHash>| {
-        let identity = driver.tickets.identify(&hello.name, address.ip());
+    let decide = |hello: &Hello, key: Option<KeyHash>| {
+        let identity = driver.tickets.identify(&hello.name, address.ip(), key);
         match driver.refusal(&identity) {
             Some(reason) => Err(reason),
             None => Ok(Welcome { worker: admitted.insert((driver.next_worker(), identity)).0.0 }),

@@ -1,16 +1,17 @@
 //! The identity of a worker across sessions. Names are not unique: any worker may choose any name.
 //!
 //! A local worker proves its identity with a *ticket*: a secret that the master passes to that process only, and that it
-//! sends as its name. All other workers are identified by name and address. The address also groups workers by host,
-//! so that a verification is assigned to a worker of another host.
+//! sends as its name. A worker that connects through TLS is identified by its key: a ban holds under each name and at each address.
+//! All other workers are identified by name and address. The address also groups workers by host, so that a verification is assigned to a worker of another host.
 
 use std::net::IpAddr;
 
 use blake3::Hash;
+use rayfarm_protocol::transport::KeyHash;
 use rayfarm_scheduler::HostId;
 
 /// Identity by which a worker is recognised when it reconnects.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Identity {
     /// A process that this master has started: the number of its slot, from 1.
     Local(u32),
@@ -20,8 +21,26 @@ pub(crate) enum Identity {
         name: String,
         /// The address from which it connects, in canonical form.
         address: IpAddr,
+        /// Hash of its public key, where connections use TLS.
+        key: Option<KeyHash>,
     },
 }
+
+impl PartialEq for Identity {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Local(number), Self::Local(other)) => number == other,
+            (Self::Remote { key: Some(key), .. }, Self::Remote { key: Some(other), .. }) => key == other,
+            (
+                Self::Remote { name, address, key: None },
+                Self::Remote { name: other_name, address: other_address, key: None },
+            ) => name == other_name && address == other_address,
+            _ => false,
+        }
+    }
+}
+
+impl Eq for Identity {}
 
 impl Identity {
     /// Whether this master has started the worker.
@@ -64,13 +83,13 @@ impl Tickets {
         Some(hash.to_hex().to_string())
     }
 
-    /// The identity of a worker that sends this name from this address. Tickets are compared in constant time.
-    pub(crate) fn identify(&self, name: &str, address: IpAddr) -> Identity {
+    /// The identity of a worker that sends this name from this address, with this key. Tickets are compared in constant time.
+    pub(crate) fn identify(&self, name: &str, address: IpAddr, key: Option<KeyHash>) -> Identity {
         let sent = Hash::from_hex(name).ok();
         let slot = sent.and_then(|sent| (1..).zip(&self.0).find(|(_, ticket)| **ticket == sent));
         match slot {
             Some((number, _)) => Identity::Local(number),
-            None => Identity::Remote { name: name.to_owned(), address: address.to_canonical() },
+            None => Identity::Remote { name: name.to_owned(), address: address.to_canonical(), key },
         }
     }
 }
@@ -96,15 +115,28 @@ mod tests {
         let tickets = Tickets::new(Some(&[7; 32]), 2);
         for number in [1, 2] {
             let ticket = tickets.of(number).unwrap();
-            assert_eq!(tickets.identify(&ticket, here), Identity::Local(number));
+            assert_eq!(tickets.identify(&ticket, here, None), Identity::Local(number));
             assert_eq!(Identity::Local(number).name(), format!("local-{number}"));
-            let remote = Identity::Remote { name: ticket.clone(), address: here };
-            assert_eq!(Tickets::new(Some(&[8; 32]), 2).identify(&ticket, here), remote);
+            let remote = Identity::Remote { name: ticket.clone(), address: here, key: None };
+            assert_eq!(Tickets::new(Some(&[8; 32]), 2).identify(&ticket, here, None), remote);
         }
         assert_eq!((tickets.of(0), tickets.of(3), Tickets::new(None, 2).of(1)), (None, None, None));
         let mapped = "::ffff:127.0.0.1".parse().unwrap();
-        let named = Identity::Remote { name: "local-1".into(), address: here };
-        assert_eq!(tickets.identify("local-1", mapped), named);
+        let named = Identity::Remote { name: "local-1".into(), address: here, key: None };
+        assert_eq!(tickets.identify("local-1", mapped, None), named);
+    }
+
+    #[test]
+    fn a_key_is_an_identity_under_each_name_and_address() {
+        let of = |name: &str, host: u8, key: Option<u8>| {
+            let key = key.map(|byte| KeyHash([byte; 32]));
+            Tickets::default().identify(name, IpAddr::from([10, 0, 0, host]), key)
+        };
+        assert_eq!(of("a", 1, Some(1)), of("b", 2, Some(1)));
+        assert_ne!(of("a", 1, Some(1)), of("a", 1, Some(2)), "two workers of one name on one machine");
+        assert_ne!(of("a", 1, Some(1)), of("a", 1, None));
+        assert_eq!(of("a", 1, None), of("a", 1, None));
+        assert_ne!(of("a", 1, None), of("a", 2, None));
     }
 
     #[test]

@@ -48,7 +48,7 @@ impl MasterState {
         Ok(Arc::new(MasterTrust::new(key, token)))
     }
 
-    /// Makes a new token, and a new key if that is wanted.
+    /// Makes a new token, and a new key if requested.
     ///
     /// # Errors
     /// Files that cannot be written.
