@@ -39,6 +39,7 @@ pub mod accounting;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
+mod admission;
 mod assets;
 mod control;
 mod driver;

@@ -6,22 +6,22 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
+use rayfarm_protocol::limits::{FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES};
 use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
 use rayfarm_protocol::transport::Connection;
 use rayfarm_protocol::{AssetId, Hello, KeyHash, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
 use rayfarm_scheduler::{Event, WorkerId};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::mpsc;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
+use crate::admission::{Admission, Place};
 use crate::driver::{AnswerError, Driver};
 use crate::sessions::Session;
 use crate::sessions::identity::Identity;
 
-/// Connections in their handshake; more wait in the operating system's queue.
-const MAX_HANDSHAKES: usize = 64;
 /// Asset requests of a worker that wait to be served.
 const MAX_ASSET_REQUESTS: usize = 4096;
 /// Delay after a failed accept, which usually means that file descriptors have run out.
@@ -47,22 +47,26 @@ pub(crate) async fn accept(
     sessions: TaskTracker,
     stop: CancellationToken,
 ) {
-    let handshakes = Arc::new(Semaphore::new(MAX_HANDSHAKES));
+    let admission = Admission::default();
     loop {
         let accepted = tokio::select! {
             () = stop.cancelled() => return,
-            accepted = async {
-                let permit = handshakes.clone().acquire_owned().await;
-                (listener.accept().await, permit)
-            } => accepted,
+            accepted = listener.accept() => accepted,
         };
         match accepted {
-            (Ok((stream, address)), permit) => {
+            Ok((stream, address)) => {
+                // Without a place the connection is closed: its host has as many that are not silent.
+                let Some(place) = admission.enter(address.ip()) else { continue };
                 let (driver, stop) = (driver.clone(), stop.clone());
                 sessions.spawn(async move {
                     let session = async {
-                        if let Some(admitted) = shake_hands(&driver, stream, address).await {
-                            drop(permit);
+                        let admitted = tokio::select! {
+                            biased;
+                            () = place.closed() => None,
+                            admitted = shake_hands(&driver, stream, address, &place) => admitted,
+                        };
+                        drop(place);
+                        if let Some(admitted) = admitted {
                             run_session(&driver, admitted, address).await;
                         }
                     };
@@ -72,7 +76,7 @@ pub(crate) async fn accept(
                     }
                 });
             }
-            (Err(error), _) => {
+            Err(error) => {
                 tracing::warn!("cannot accept a connection: {error}; retrying");
                 tokio::time::sleep(ACCEPT_RETRY_DELAY).await;
             }
@@ -89,10 +93,21 @@ struct Admitted {
 }
 
 /// Shakes hands with a peer. Failures are logged.
-async fn shake_hands(driver: &Driver, stream: TcpStream, address: SocketAddr) -> Option<Admitted> {
+async fn shake_hands(
+    driver: &Driver,
+    stream: TcpStream,
+    address: SocketAddr,
+    place: &Place,
+) -> Option<Admitted> {
     if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
+    // A connection that never sends is no news: port scanners and health checks do that.
+    if !matches!(timeout(FIRST_BYTE_DEADLINE, stream.readable()).await, Ok(Ok(()))) {
+        tracing::debug!("{address} sends nothing and is closed");
+        return None;
+    }
+    place.has_sent();
     let mut admitted = None;
     let decide = |hello: &Hello, key: Option<KeyHash>| {
         let identity = driver.tickets.identify(&hello.name, address.ip(), key);

@@ -14,6 +14,16 @@ use crate::status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
 
 /// Workers that are admitted.
 const MAX_WORKERS: usize = 1024;
+/// Most workers of one other host that have delivered nothing yet.
+const MAX_UNPROVEN_OF_HOST: usize = 128;
+
+/// Workers that this master has not started and that have delivered nothing, in the order in which they connected.
+fn unproven(inner: &Inner) -> impl Iterator<Item = (WorkerId, &Session)> {
+    inner.scheduler.workers().filter(|record| record.segments_done == 0).filter_map(|record| {
+        let session = inner.sessions.get(record.worker)?;
+        (!session.identity.is_local()).then_some((record.worker, session))
+    })
+}
 
 impl Driver {
     /// Number of connected workers.
@@ -73,19 +83,36 @@ impl Driver {
 
     /// The reason to refuse a worker in its handshake; `None`: it is admitted.
     pub(crate) fn refusal(&self, identity: &Identity) -> Option<Refusal> {
-        let inner = self.lock();
+        let mut inner = self.lock();
         if inner.is_ending {
             return Some(Refusal::NotNow("the master ends".to_owned()));
         }
-        let count = inner.sessions.len();
         if inner.sessions.is_banned(identity) {
             return Some(Refusal::Final(format!(
                 "worker {} is banned from this master; the ban ends when the master allows the worker or exits",
                 identity.name()
             )));
         }
-        let full = || Refusal::NotNow(format!("it has {count} workers, its limit"));
-        (count >= MAX_WORKERS).then(full)
+        // One host must not take all places: they are for workers that deliver. A refusal for lack of room passes.
+        let of_host = unproven(&inner).filter(|(_, session)| identity.is_of_host(session.address.ip()));
+        if of_host.count() >= MAX_UNPROVEN_OF_HOST {
+            return Some(Refusal::NotNow(format!(
+                "{MAX_UNPROVEN_OF_HOST} workers of this host have delivered nothing yet"
+            )));
+        }
+        let count = inner.sessions.len();
+        if count < MAX_WORKERS {
+            return None;
+        }
+        let oldest = unproven(&inner).map(|(worker, _)| worker).next();
+        let Some(worker) = oldest else {
+            return Some(Refusal::NotNow(format!("it has {count} workers, its limit")));
+        };
+        let reason = "another worker needs the place, and this one has delivered nothing";
+        inner.sessions.log_disconnect(worker, reason);
+        inner.sessions.disconnect(worker, reason, Reconnect::Now);
+        self.drive(&mut inner, Event::WorkerLeft { worker });
+        None
     }
 
     /// Removes a session that has ended. The reason is sent to the worker if its connection still works.

@@ -48,6 +48,14 @@ impl Identity {
         matches!(self, Self::Local(_))
     }
 
+    /// Whether the worker was not started by this master and connects from the host of that address.
+    pub(crate) fn is_of_host(&self, of: IpAddr) -> bool {
+        match self {
+            Self::Local(_) => false,
+            Self::Remote { address, .. } => host(*address) == host(of),
+        }
+    }
+
     /// The name to display.
     pub(crate) fn name(&self) -> String {
         match self {

@@ -35,3 +35,18 @@ async fn a_worker_of_another_version_gets_a_message() {
     fake_worker::start(farm.address(), Script::Correct).await;
     render(&mut farm, view()).await;
 }
+
+#[tokio::test]
+async fn hundreds_of_silent_connections_keep_no_worker_out() {
+    let mut farm = farm(SegmentPolicy::Adaptive).await;
+    let mut silent = Vec::new();
+    for _ in 0..300 {
+        silent.push(TcpStream::connect(farm.address()).await.unwrap());
+    }
+    let begun = std::time::Instant::now();
+    fake_worker::start(farm.address(), Script::Correct).await;
+    until_workers(&farm, 1).await;
+    // Without places that newcomers take over, it waits for several deadlines of one second.
+    assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
+    render(&mut farm, view()).await;
+}
