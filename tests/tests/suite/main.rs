@@ -15,5 +15,6 @@ mod launch;
 mod resume;
 mod same_picture;
 mod tradeoff;
+mod trust;
 mod window;
 mod window_controls;

@@ -5,6 +5,7 @@
 use std::net::SocketAddr;
 
 use rayfarm_protocol::peer::{ShareKey, Token};
+use rayfarm_protocol::transport::MasterSecurity;
 use rayfarm_protocol::{AssetId, ToWorker};
 use rayfarm_scheduler::{Event, WorkerId};
 
@@ -16,6 +17,10 @@ impl Driver {
     /// Registers a worker's peer server, by its port, and sends the worker its key.
     pub(crate) fn add_peer_server(&self, worker: WorkerId, port: u16) {
         let Some(secret) = &self.secret else { return };
+        // Connections between workers are plain: a farm that uses TLS sends each asset itself.
+        if self.security != MasterSecurity::Plain {
+            return;
+        }
         let mut inner = self.lock();
         let key = ShareKey(blake3::keyed_hash(secret, &worker.0.to_le_bytes()).into());
         let Some(session) = inner.sessions.get_mut(worker) else { return };
