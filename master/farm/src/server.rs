@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::{FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES};
-use rayfarm_protocol::session::{self, Receiver, SendError, Sender};
+use rayfarm_protocol::session::{self, BodyLimit, Receiver, SendError, Sender};
 use rayfarm_protocol::transport::Connection;
 use rayfarm_protocol::{AssetId, Hello, KeyHash, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
 use rayfarm_scheduler::{Event, WorkerId};
@@ -139,9 +139,10 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     let Admitted { worker, hello, identity, stream } = admitted;
     let Hello { name, threads, simd, software, .. } = hello.clone();
     tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
-    let (sender, receiver, traffic) = session::spawn::<_, ToWorker, ToMaster>(stream);
+    let limit = BodyLimit::closed();
+    let (sender, receiver, traffic) = session::spawn_limited::<_, ToWorker, ToMaster>(stream, limit.clone());
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
-    driver.join(worker, Session::new(hello, identity, address, sender.clone(), traffic));
+    driver.join(worker, Session::new(hello, identity, address, sender.clone(), traffic, limit));
     let ended = tokio::select! {
         ended = receive(driver, worker, receiver, request) => ended,
         () = send_assets(driver, worker, &sender, requests) => Err(SessionError::Closed),

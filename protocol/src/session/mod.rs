@@ -13,6 +13,7 @@
 //!        --bulk queue----->
 //! ```
 
+mod body_limit;
 mod reader;
 mod sender;
 mod traffic;
@@ -30,6 +31,7 @@ use crate::envelope::Kind;
 use crate::limits::{BULK_QUEUE, CLOSE_GRACE, CONTROL_QUEUE, INBOX_QUEUE};
 use crate::message::Message;
 
+pub use body_limit::BodyLimit;
 pub use reader::Receiver;
 pub use sender::{SendError, Sender, TrySendError};
 pub use traffic::Traffic;
@@ -46,6 +48,16 @@ where
     Out: Message,
     In: Message,
 {
+    spawn_limited(io, BodyLimit::unlimited())
+}
+
+/// As [`spawn`], with a limit of received pixels, which the caller raises with each lease. A longer message ends the session.
+pub fn spawn_limited<S, Out, In>(io: S, pixels: BodyLimit) -> (Sender<Out>, Receiver<In>, Arc<Traffic>)
+where
+    S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
+    Out: Message,
+    In: Message,
+{
     let (read_half, write_half) = tokio::io::split(io);
     let (control, control_queue) = mpsc::channel(CONTROL_QUEUE);
     let (bulk, bulk_queue) = mpsc::channel(BULK_QUEUE);
@@ -57,8 +69,13 @@ where
     // Weak, because the inbox must end with the reader while the writer waits for messages.
     let failures = inbox.downgrade();
     let reader_guard = reader_ended.clone().drop_guard();
-    let reader =
-        reader::Reader { io: read_half, inbox, traffic: traffic.clone(), inbox_closed: inbox_closed.clone() };
+    let reader = reader::Reader {
+        io: read_half,
+        inbox,
+        traffic: traffic.clone(),
+        pixels,
+        inbox_closed: inbox_closed.clone(),
+    };
     let reader_abort = abort.clone();
     tokio::spawn(async move {
         let _reader_guard = reader_guard;

@@ -6,9 +6,9 @@ use tokio::io::{AsyncRead, BufReader, ReadHalf};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio_util::sync::CancellationToken;
 
-use super::Traffic;
+use super::{BodyLimit, Traffic};
 use crate::ProtocolError;
-use crate::envelope::{HEADER_BYTES, read_body_counted, read_header};
+use crate::envelope::{HEADER_BYTES, Kind, read_body_counted, read_header};
 use crate::limits::INBOX_BYTES;
 use crate::message::Message;
 
@@ -48,6 +48,8 @@ pub(super) struct Reader<S, In> {
     pub(super) io: ReadHalf<S>,
     pub(super) inbox: mpsc::Sender<Delivery<In>>,
     pub(super) traffic: Arc<Traffic>,
+    /// Limit of received pixels.
+    pub(super) pixels: BodyLimit,
     /// Cancelled when the [`Receiver`] is closed or dropped.
     pub(super) inbox_closed: CancellationToken,
 }
@@ -60,7 +62,7 @@ impl<S: AsyncRead, In: Message> Reader<S, In> {
         let room = Arc::new(Semaphore::new(INBOX_BYTES));
         let delivering = async {
             loop {
-                let delivery = match read_message(&mut io, &room, &self.traffic).await {
+                let delivery = match read_message(&mut io, &room, &self.traffic, &self.pixels).await {
                     Ok(None) => return,
                     Ok(Some(delivery)) => delivery,
                     Err(error) => Delivery { message: Err(error), _room: None },
@@ -86,10 +88,16 @@ async fn read_message<In: Message>(
     io: &mut (impl AsyncRead + Unpin),
     room: &Arc<Semaphore>,
     traffic: &Traffic,
+    pixels: &BodyLimit,
 ) -> Result<Option<Delivery<In>>, ProtocolError> {
     let Some(header) = read_header(io).await? else { return Ok(None) };
     if !In::carries(header.kind) {
         return Err(ProtocolError::Unexpected { kind: header.kind, expected: In::EXPECTED });
+    }
+    let limit = pixels.bytes();
+    if header.kind == Kind::Pixels && header.body_bytes > limit {
+        let (announced, limit) = (header.body_bytes as u64, limit as u64);
+        return Err(ProtocolError::TooLong { kind: header.kind, announced, limit });
     }
     // Every body fits: INBOX_BYTES is above the limit of every type, and a u32 can count it.
     let permits = u32::try_from(header.body_bytes).unwrap_or(u32::MAX);

@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use rayfarm_protocol::{FrameId, ToWorker};
+use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
+use rayfarm_protocol::{FrameId, Lease, ToWorker};
 use rayfarm_scheduler::{Action, Cost, Event, Reconnect, WorkerId};
 
 use super::{Driver, Inner, Request};
@@ -39,7 +40,9 @@ impl Driver {
                 }
             }
             Action::Grant { worker, lease } => {
+                let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
+                    session.pixels.allow(bytes);
                     session.leases.grant(lease);
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
@@ -65,7 +68,9 @@ impl Driver {
             }
             Action::RecordDigest { worker, lease } => self.open_segment(inner, worker, lease),
             Action::Verify { worker, lease } => {
+                let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
+                    session.pixels.allow(bytes);
                     session.leases.verify(lease);
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
@@ -106,6 +111,14 @@ impl Driver {
         };
         self.deliver(inner, Ok(finished));
     }
+}
+
+/// Bytes of the pixels of a lease, as far as its frame is known.
+fn pixel_bytes(inner: &Inner, lease: &Lease) -> usize {
+    let requested = inner.requests.get(&lease.frame).map(|request| &request.announce);
+    let announce = requested.or_else(|| inner.open_segments.announce(lease.frame));
+    let bytes = announce.and_then(|it| it.format.segment_bytes(it.width, lease.row_count));
+    bytes.unwrap_or(MAX_PIXELS_BYTES)
 }
 
 /// Queues a message. Returns the event that follows when the worker is disconnected because its queue is full.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use rayfarm_protocol::peer::ShareKey;
-use rayfarm_protocol::session::{Sender, Traffic};
+use rayfarm_protocol::session::{BodyLimit, Sender, Traffic};
 use rayfarm_protocol::{Hello, Reconnect, ToWorker};
 use tokio::task::JoinHandle;
 
@@ -31,6 +31,8 @@ pub(crate) struct Session {
     pub(crate) transfers: Transfers,
     pub(super) sender: Sender<ToWorker>,
     pub(super) traffic: Arc<Traffic>,
+    /// Limit of the pixels that it may send.
+    pub(crate) pixels: BodyLimit,
     /// Numbers of bytes that had arrived at the last two pings, the earlier one first.
     received_at_pings: [u64; 2],
 }
@@ -43,6 +45,7 @@ impl Session {
         address: SocketAddr,
         sender: Sender<ToWorker>,
         traffic: Arc<Traffic>,
+        pixels: BodyLimit,
     ) -> Self {
         Self {
             hello,
@@ -54,6 +57,7 @@ impl Session {
             transfers: Transfers::default(),
             sender,
             traffic,
+            pixels,
             received_at_pings: [0; 2],
         }
     }

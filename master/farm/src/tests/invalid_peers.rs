@@ -50,3 +50,17 @@ async fn hundreds_of_silent_connections_keep_no_worker_out() {
     assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
     render(&mut farm, view()).await;
 }
+
+#[tokio::test]
+async fn a_worker_without_leases_may_announce_no_pixels() {
+    let farm = farm(SegmentPolicy::Adaptive).await;
+    let mut stream = fake_worker::connect(farm.address(), 1).await;
+    until_workers(&farm, 1).await;
+    // The header of 8 MiB of pixels: length, type, flags, stream.
+    let mut header = (8_u32 << 20).to_le_bytes().to_vec();
+    header.extend([0x21, 0, 0, 0]);
+    stream.write_all(&header).await.unwrap();
+    until_workers(&farm, 0).await;
+    let mut rest = Vec::new();
+    let _ = stream.read_to_end(&mut rest).await;
+}
