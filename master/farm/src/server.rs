@@ -3,7 +3,7 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::{FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES};
@@ -20,6 +20,7 @@ use tokio_util::task::TaskTracker;
 use crate::admission::{Admission, Place};
 use crate::driver::{AnswerError, Driver};
 use crate::sessions::Session;
+use crate::sessions::budget::{Budget, OverBudget};
 use crate::sessions::identity::Identity;
 
 /// Asset requests of a worker that wait to be served.
@@ -34,6 +35,8 @@ enum SessionError {
     Protocol(#[from] ProtocolError),
     #[error(transparent)]
     Answer(#[from] AnswerError),
+    #[error(transparent)]
+    OverBudget(#[from] OverBudget),
     #[error("it closed the connection without a disconnect message")]
     Closed,
     #[error("it requests more than {MAX_ASSET_REQUESTS} assets at once")]
@@ -172,8 +175,11 @@ async fn receive(
     mut receiver: Receiver<ToMaster>,
     request: mpsc::Sender<(AssetId, u64)>,
 ) -> Result<String, SessionError> {
+    let mut budget = Budget::new(Instant::now());
     while let Some(message) = receiver.recv().await {
-        match message? {
+        let message = message?;
+        budget.count(&message, Instant::now())?;
+        match message {
             ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
             ToMaster::NeedAsset { id, offset, again } => {
                 if !driver.asset_requested(worker, id, offset, again) {

@@ -98,7 +98,13 @@ impl Driver {
         let mut inner = self.lock();
         if let Some(session) = inner.sessions.get_mut(worker) {
             session.leases.fail(frame);
-            tracing::warn!("{worker} ({}) cannot render frame {frame}: {reason}", session.hello.name);
+            let name = &session.hello.name;
+            // The same reason for each frame of a moving camera is one line.
+            if session.last_failure.as_ref() == Some(&reason) {
+                tracing::debug!("{worker} ({name}) cannot render frame {frame} for the same reason");
+            } else {
+                tracing::warn!("{worker} ({name}) cannot render frame {frame}: {reason}");
+            }
             session.last_failure = Some(reason);
         }
         self.drive(&mut inner, Event::WorkerFailed { worker, frame });

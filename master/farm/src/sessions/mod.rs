@@ -11,6 +11,7 @@ use tokio::task::JoinHandle;
 
 pub(crate) mod addresses;
 mod bans;
+pub(crate) mod budget;
 mod byte_count;
 pub(crate) mod identity;
 pub(crate) mod lease_book;
