@@ -106,7 +106,7 @@ async fn shake_hands(
         tracing::debug!("{address}: cannot send small messages at once: {error}");
     }
     // A connection that never sends is no news: port scanners and health checks do that.
-    if !matches!(timeout(FIRST_BYTE_DEADLINE, stream.readable()).await, Ok(Ok(()))) {
+    if !matches!(timeout(FIRST_BYTE_DEADLINE, stream.peek(&mut [0])).await, Ok(Ok(1))) {
         tracing::debug!("{address} sends nothing and is closed");
         return None;
     }
