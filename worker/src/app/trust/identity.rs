@@ -20,7 +20,9 @@ pub(in crate::app) fn load_identity(folder: Option<&Path>) -> Result<Arc<Private
         Some(Err(error)) => error.to_string(),
         None => "the environment names no home folder".to_owned(),
     };
-    tracing::warn!("this run has a key of its own, by which no master recognises this worker later: {problem}");
+    tracing::warn!(
+        "this run has a key of its own, by which no master recognises this worker later: {problem}"
+    );
     PrivateKey::generate().map(Arc::new)
 }
 

@@ -6,8 +6,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use rayfarm_protocol::printable_within;
 use rayfarm_protocol::transport::JoinLine;
+use rayfarm_text::printable_within;
 
 use super::private_file;
 
@@ -120,12 +120,15 @@ impl MasterList {
 fn parse(text: &str) -> io::Result<Vec<RememberedMaster>> {
     let mut lines = text.lines();
     if lines.next() != Some(HEADER) {
-        return Err(io::Error::other(format!("its first line is not {HEADER:?}; delete the file to start anew")));
+        return Err(io::Error::other(format!(
+            "its first line is not {HEADER:?}; delete the file to start anew"
+        )));
     }
     let lines = lines.filter(|line| !line.trim().is_empty()).take(MAX_MASTERS);
     let masters = lines.enumerate().map(|(number, entry)| {
         let (line, name) = entry.split_once(' ').unwrap_or((entry, ""));
-        let line = line.parse().map_err(|error| io::Error::other(format!("entry {}: {error}", number + 1)))?;
+        let line =
+            line.parse().map_err(|error| io::Error::other(format!("entry {}: {error}", number + 1)))?;
         Ok(RememberedMaster::new(line, Some(name)))
     });
     masters.collect()

@@ -7,6 +7,6 @@ mod private_file;
 mod state_folder;
 
 pub(super) use identity::load_identity;
-pub(super) use join_input::{JOIN_VARIABLE, JoinInput};
+pub(super) use join_input::{JOIN_VARIABLE, JoinInput, read_line};
 pub(super) use masters::{MasterList, RememberedMaster};
 pub(super) use state_folder::state_folder;
