@@ -1,9 +1,11 @@
 //! A master that answered a search, with its texts checked.
 
 use std::fmt;
+#[cfg(any(test, feature = "discovery"))]
 use std::net::IpAddr;
 
 use rayfarm_protocol::transport::KeyHash;
+#[cfg(any(test, feature = "discovery"))]
 use rayfarm_text::printable_within;
 
 /// Version of the announcement in its TXT record.
