@@ -6,7 +6,8 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 
 usage() {
     cat <<'TEXT'
-usage: scripts/workers.sh start  HOSTS --master HOST:PORT [OPTION ...] [-- WORKER-OPTION ...]
+usage: scripts/workers.sh start  HOSTS --join -|FILE [OPTION ...] [-- WORKER-OPTION ...]
+       scripts/workers.sh start  HOSTS --master HOST:PORT [OPTION ...] [-- WORKER-OPTION ...]
        scripts/workers.sh status HOSTS [OPTION ...]
        scripts/workers.sh stop   HOSTS [OPTION ...]
 
@@ -22,7 +23,10 @@ symbols (where strip exists here), and compressed (where gzip exists here and th
 it ended. Workers survive this script, the connection and their master: they wait for the next master at that address.
 They end by stop, or with their master where "-- --once" is added.
 
-  --master HOST:PORT  start: where the master listens, as the machines see it (it needs --listen 0.0.0.0:PORT)
+  --join -|FILE       start: the join line that the master prints, from standard input (-) or the first line of a file. It goes
+                      to the machines through ssh's standard input, and is in no argument of a process here or there
+  --master HOST:PORT  start: where a master without encryption listens, as the machines see it (it needs --insecure and
+                      --listen 0.0.0.0:PORT)
   --worker FILE       start: the program to run there (default: target/release/rayfarm-worker of this folder)
   --jobs N            number of machines at a time (default 16)
   --timeout SECONDS   longest time without an answer of a machine or progress of a copy (default 60)
@@ -43,7 +47,7 @@ wrong() { fail "$1; see --help" 2; }
 
 # --- options ----------------------------------------------------------------------------------------------------------
 
-action="" hosts_file="" master="" worker="" jobs=16 timeout_seconds=60 dry_run=no
+action="" hosts_file="" master="" join_from="" join_line="" worker="" jobs=16 timeout_seconds=60 dry_run=no
 read -ra ssh_words <<<"ssh -o BatchMode=yes -o ConnectTimeout=10 -o ServerAliveInterval=5"
 worker_options=()
 
@@ -54,7 +58,7 @@ while [ $# -gt 0 ]; do
         --help) usage; exit 0 ;;
         --dry-run) dry_run=yes; shift; continue ;;
         --) shift; worker_options=("$@"); break ;;
-        --master | --worker | --jobs | --timeout | --ssh) [ $# -ge 2 ] || wrong "$1: a value is expected" ;;
+        --join | --master | --worker | --jobs | --timeout | --ssh) [ $# -ge 2 ] || wrong "$1: a value is expected" ;;
         -*) wrong "unknown option \"$1\"" ;;
         *)
             if [ -z "$action" ]; then action=$1; elif [ -z "$hosts_file" ]; then hosts_file=$1
@@ -64,6 +68,7 @@ while [ $# -gt 0 ]; do
             ;;
     esac
     case $1 in
+        --join) join_from=$2 ;;
         --master) master=$2 ;;
         --worker) worker=$2 ;;
         --jobs) whole_number "$1" "$2"; jobs=$2 ;;
@@ -74,14 +79,41 @@ while [ $# -gt 0 ]; do
 done
 
 case $action in
-    start) [[ $master =~ ^[^[:space:]]+:[0-9]+$ ]] || wrong "start: --master HOST:PORT is expected" ;;
-    status | stop) [ -z "$master$worker${worker_options[*]}" ] || wrong "$action takes no --master, --worker or worker options" ;;
+    start)
+        [ -z "$master" ] || [ -z "$join_from" ] || wrong "start: either --join or --master is expected"
+        [ -n "$join_from" ] || [[ $master =~ ^[^[:space:]]+:[0-9]+$ ]] || wrong "start: --join - or --master HOST:PORT is expected"
+        [[ $join_from != rf1:* ]] || wrong "--join: other users can read the arguments of a process; pass the line on standard input, with --join -"
+        ;;
+    status | stop) [ -z "$master$join_from$worker${worker_options[*]}" ] || wrong "$action takes no --join, --master, --worker or worker options" ;;
     "") usage >&2; exit 2 ;;
     *) wrong "unknown command \"$action\": start, status or stop is expected" ;;
 esac
 [ -n "$hosts_file" ] || wrong "$action: a file of hosts is expected"
 if [ ! -r "$hosts_file" ] || [ -d "$hosts_file" ]; then fail "$hosts_file: cannot be read" 2; fi
 [ ${#ssh_words[@]} -gt 0 ] || wrong "--ssh: a command is expected"
+
+# read_join_line: sets join_line. The line may be the end of a command that was pasted: rayfarm-worker --join rf1:...
+read_join_line() {
+    local text=""
+    if [ "$join_from" = - ]; then
+        # Typed and pasted characters are not displayed.
+        if [ -t 0 ]; then
+            say "paste the join line that the master prints:"
+            read -rs -n 1024 text || true
+        else
+            read -r -n 1024 text || true
+        fi
+    else
+        [ -r "$join_from" ] && [ ! -d "$join_from" ] || fail "$join_from: cannot be read" 2
+        read -r -n 1024 text <"$join_from" || true
+    fi
+    text=${text%$'\r'}
+    join_line=${text##*[[:space:]]}
+    [[ $join_line =~ ^rf1:[][A-Za-z0-9_.:%-]+:[0-9]+:[0-9A-Fa-f]{64}:[0-9A-Fa-f]{32}$ ]] ||
+        fail "no join line in $([ "$join_from" = - ] && echo "standard input" || echo "$join_from"): rf1:HOST:PORT:KEY:TOKEN is expected" 2
+}
+
+[ -z "$join_from" ] || read_join_line
 
 # --- the hosts --------------------------------------------------------------------------------------------------------
 
@@ -199,7 +231,9 @@ quote() {
 
 # options_of INDEX: the worker's options, as words for a shell.
 options_of() {
-    local words=(--master "$master" --name "${names[$1]}")
+    local words=(--master "$master")
+    [ -z "$join_line" ] || words=(--join -)
+    words+=(--name "${names[$1]}")
     [ "${threads[$1]}" = - ] || words+=(--threads "${threads[$1]}")
     quote "${words[@]}" "${worker_options[@]}"
 }
@@ -208,6 +242,8 @@ options_of() {
 script_for() {
     printf 'action=%s name=%s hash=%s\n' "$action" "$(quote "${names[$1]}")" "$(quote "$hash")"
     printf 'machine=%s plain_size=%s packed_size=%s\n' "$(quote "$machine")" "$plain_size" "$packed_size"
+    # printf is built in: the line is in no list of processes.
+    printf 'join_line=%s\n' "$(quote "$join_line")"
     printf 'set -- %s\n' "$(options_of "$1")"
     cat "$root/scripts/workers/remote.sh"
 }

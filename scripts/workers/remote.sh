@@ -1,7 +1,8 @@
 # shellcheck shell=sh
 # The part of scripts/workers.sh that sh runs on each machine. Lines in front of it set action, name, hash, machine, plain_size,
-# packed_size and the worker's options ("$@"). Prints one line with the result. Exit status: 0 success; 9 the program, or the
-# rest of it, must be copied first, and the line has the encoding and the first byte; 1 any failure.
+# packed_size, join_line (empty without encryption) and the worker's options ("$@"). Prints one line with the result. Exit
+# status: 0 success; 9 the program, or the rest of it, must be copied first, and the line has the encoding and the first byte;
+# 1 any failure.
 # shellcheck disable=SC2154 # set in front of this text
 
 folder=$HOME/.rayfarm
@@ -88,18 +89,27 @@ start() {
     tidy
     [ -x "$program" ] && [ "$(hash_of "$program")" = "$hash" ] || install
     version=$("$program" --version 2>&1) || refuse "the program does not run here: $version"
-    options=$*
+    # With the master's address and key, and without the token, which is in no file here but the worker's own.
+    options="$*${join_line:+ ${join_line%:*}}"
     if pid=$(running); then
         [ "$(sed -n 2p "$pid_file")" = "$hash $options" ] && { echo "runs already, process $pid"; return; }
         refuse "another one runs, process $pid: stop it first"
     fi
     [ ! -f "$log" ] || mv -f "$log" "$log.old"
-    # In a session of its own where setsid exists, so that the worker survives its terminal.
-    detach=$(command -v setsid) || detach=
-    # shellcheck disable=SC2086 # nothing, or one word
-    nohup $detach "$program" "$@" </dev/null >"$log" 2>&1 &
+    start_program "$@"
     printf '%s\n%s\n' "$!" "$hash $options" >"$pid_file" || refuse "cannot write $pid_file"
     await_connection "$!"
+}
+
+# start_program OPTION ...: starts the worker in the background; its id is in $!. In a session of its own where setsid exists,
+# so that the worker survives its terminal. The join line goes through a here-document, which is a pipe or an unnamed file
+# for this user only, and thus is in no list of processes.
+start_program() {
+    detach=$(command -v setsid) || detach=
+    # shellcheck disable=SC2086 # nothing, or one word
+    nohup $detach "$program" "$@" >"$log" 2>&1 <<LINE &
+$join_line
+LINE
 }
 
 # await_connection ID: waits up to 5 s for the connection. A worker without a master is no failure: it keeps trying.

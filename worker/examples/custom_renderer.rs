@@ -104,6 +104,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
         master: listener.local_addr()?.to_string(),
         threads: Some(2),
         name: "gradient".to_owned(),
+        tags: Vec::new(),
+        max_segment_bytes: None,
         reconnect: false,
         once: true,
         asset_cache_bytes: 1 << 20,

@@ -37,6 +37,8 @@
 //!     master: address.to_string(),
 //!     threads: None,                // one per core
 //!     name: "embedded".to_owned(),
+//!     tags: Vec::new(),
+//!     max_segment_bytes: None,
 //!     reconnect: false,
 //!     once: true,
 //!     asset_cache_bytes: 1 << 30,

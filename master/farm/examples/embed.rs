@@ -45,6 +45,8 @@ fn worker_options(master: SocketAddr) -> WorkerOptions {
         master: master.to_string(),
         threads: None,
         name: "embedded".to_owned(),
+        tags: Vec::new(),
+        max_segment_bytes: None,
         reconnect: false,
         once: true,
         asset_cache_bytes: 1 << 30,

@@ -20,7 +20,7 @@
 //! # let worker = WorkerOptions {
 //! #     master: farm.address().to_string(), threads: Some(1), name: "embedded".to_owned(), reconnect: false, once: true,
 //! #     asset_cache_bytes: 1 << 20, disk_cache: None, compress: None, share: Share::Off,
-//! #     security: Default::default(),
+//! #     security: Default::default(), tags: Vec::new(), max_segment_bytes: None,
 //! # };
 //! # tokio::spawn(rayfarm_worker::run(worker, ShutdownHandle::new()));
 //!

@@ -357,6 +357,53 @@ fn a_dry_run_prints_the_commands_and_runs_none() {
     assert_eq!(std::fs::read_dir(room.path("there")).unwrap().count(), 0);
 }
 
+/// A program that records its arguments and its first line of standard input, and then runs like a worker.
+const RECORDER: &str = "#!/bin/sh\n[ \"$1\" = --version ] && exit\necho \"$@\" >\"$HOME/arguments\"\n\
+                        IFS= read -r line && printf '%s' \"$line\" >\"$HOME/line\"\n\
+                        echo connected to the master\nwhile :; do sleep 0.1; done\n";
+
+#[test]
+fn a_join_line_reaches_workers_by_standard_input_only() {
+    let room = Room::new(&["there"], "there\n");
+    let program = room.program("rayfarm-worker", RECORDER);
+    let token = "0123456789abcdef0123456789abcdef";
+    let line = format!("rf1:farm.local:7117:{}:{token}", "ab".repeat(32));
+    // The end of the pasted command is enough.
+    room.scenes.write("join", format!("rayfarm-worker --join {line}\n"));
+    let file = room.path("join");
+    let arguments = ["--join", file.to_str().unwrap(), "--worker", program.to_str().unwrap()];
+    let outcome = room.workers("start", &arguments);
+    assert_eq!(result(&outcome, "there"), OK, "{outcome:#?}");
+    assert_eq!(std::fs::read_to_string(room.path("there/line")).unwrap(), line);
+    let recorded = std::fs::read_to_string(room.path("there/arguments")).unwrap();
+    assert!(recorded.contains("--join -") && !recorded.contains(token), "{recorded}");
+    assert!(!outcome.stdout.contains(token) && !outcome.stderr.contains(token), "{outcome:#?}");
+    for name in room.files_there() {
+        let bytes = std::fs::read(room.path("there/.rayfarm").join(&name)).unwrap();
+        assert!(!String::from_utf8_lossy(&bytes).contains(token), "the token is in {name}");
+    }
+    let again = room.workers("start", &arguments);
+    assert!(line_of(&again).contains("runs already"), "{again:#?}");
+    let dry = room.workers("start", &[&arguments[..], &["--dry-run"]].concat());
+    assert!(!dry.stdout.contains(token), "{dry:#?}");
+}
+
+fn line_of(outcome: &Outcome) -> &str {
+    line(outcome, "there")
+}
+
+#[test]
+fn a_join_line_on_the_command_line_of_the_script_is_refused() {
+    let room = Room::new(&["there"], "there\n");
+    let line = format!("rf1:farm.local:7117:{}:{}", "ab".repeat(32), "cd".repeat(16));
+    room.workers("start", &["--join", &line]).expect_failure(2, &["--join -"]);
+    room.workers("start", &["--join", "-", "--master", "a:1"]).expect_failure(2, &["either"]);
+    room.scenes.write("other", "not a line\n");
+    let other = room.path("other");
+    room.workers("start", &["--join", other.to_str().unwrap()]).expect_failure(2, &["rf1:HOST:PORT"]);
+    room.workers("stop", &["--join", "-"]).expect_failure(2, &["stop takes no"]);
+}
+
 #[test]
 fn a_wrong_command_line_is_refused_before_any_connection() {
     for (hosts, word) in [

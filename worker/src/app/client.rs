@@ -13,6 +13,7 @@ use tokio::task::JoinSet;
 use super::backoff::Backoff;
 use super::options::{DiskCacheOptions, Share, WorkerOptions};
 use super::outage_log::{Outage, OutageLog};
+use super::target::Target;
 use crate::error::WorkerError;
 use crate::peer::{PeerCache, PeerServer, serve_peers};
 use crate::render_pool::RenderPool;
@@ -48,6 +49,21 @@ pub async fn run_with<R: Renderer>(
     options: WorkerOptions,
     shutdown: ShutdownHandle,
 ) -> Result<(), WorkerError> {
+    let target = Target::of(&options);
+    run_targets(renderer, options, vec![target], shutdown).await
+}
+
+/// Renders for the first of several masters that answers: see [`run`]. Address and security of `options` are not used.
+/// A master that refuses the worker for good is not tried again.
+///
+/// # Errors
+/// The errors of [`run`], of the last master that is left.
+pub(super) async fn run_targets<R: Renderer>(
+    renderer: R,
+    options: WorkerOptions,
+    targets: Vec<Target>,
+    shutdown: ShutdownHandle,
+) -> Result<(), WorkerError> {
     let renderer = Arc::new(renderer);
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = options.threads.unwrap_or_else(cores).max(1);
@@ -58,13 +74,13 @@ pub async fn run_with<R: Renderer>(
         threads: u32::try_from(threads).unwrap_or(u32::MAX),
         simd: renderer.simd(),
         software: env!("CARGO_PKG_VERSION").to_owned(),
-        tags: Vec::new(),
+        tags: options.tags.clone(),
     };
     let disk = options.disk_cache.as_ref().and_then(open_disk);
     let builders = BuildPool::new(threads).map_err(|source| WorkerError::Threads { threads, source })?;
     let loader = SceneLoader::new(options.asset_cache_bytes);
     let mut persistent = PersistentState { renderer, pool, builders, loader, disk };
-    let result = run_sessions(&options, &hello, &mut persistent, &shutdown).await;
+    let result = run_sessions(&options, targets, &hello, &mut persistent, &shutdown).await;
     if let Some(disk) = persistent.disk {
         disk.finish().await;
     }
@@ -82,23 +98,29 @@ fn open_disk(options: &DiskCacheOptions) -> Option<DiskWriter> {
     }
 }
 
-/// Connects and runs one session after another.
+/// Connects and runs one session after another. After a failure the next master is tried, and after the last one the
+/// first again, with a delay.
 async fn run_sessions<R: Renderer>(
     options: &WorkerOptions,
+    mut targets: Vec<Target>,
     hello: &Hello,
     persistent: &mut PersistentState<R>,
     shutdown: &ShutdownHandle,
 ) -> Result<(), WorkerError> {
     let (mut backoff, mut outage_log) = (Backoff::new(), OutageLog::default());
+    let mut index = 0;
     loop {
+        let count = targets.len();
+        let Some(target) = targets.get_mut(index) else { return Ok(()) };
         let connected = tokio::select! {
             biased;
             () = shutdown.draining() => return Ok(()),
-            connected = connect(options, hello) => connected,
+            connected = connect(target, hello) => connected,
         };
         let outage = match connected {
             Ok(stream) => {
                 outage_log.end();
+                target.record_join();
                 let begun = Instant::now();
                 // Aborted when it is dropped, at the end of the session.
                 let mut peer_tasks = JoinSet::new();
@@ -109,7 +131,7 @@ async fn run_sessions<R: Renderer>(
                 }
                 match end {
                     SessionEnd::Lost(why) => {
-                        Outage::Failed(WorkerError::Lost { master: options.master.clone(), why })
+                        Outage::Failed(WorkerError::Lost { master: target.master.clone(), why })
                     }
                     SessionEnd::MasterEnded(reason) if options.reconnect && !options.once => {
                         backoff.reset();
@@ -128,13 +150,23 @@ async fn run_sessions<R: Renderer>(
                 tracing::info!("{error}; the worker ends as requested");
                 return Ok(());
             }
-            Outage::Failed(error)
-                if !options.reconnect || !error.is_transient(options.security.key_hash().is_some()) =>
-            {
-                return Err(error);
+            Outage::Failed(error) if !error.is_transient(target.security.key_hash().is_some()) => {
+                if count == 1 {
+                    return Err(error);
+                }
+                tracing::warn!("{error}; this master is not tried again");
+                targets.remove(index);
             }
-            outage => outage_log.log(&options.master, &outage),
+            Outage::Failed(error) if !options.reconnect && index + 1 == count => return Err(error),
+            outage => {
+                outage_log.log(&target.master, &outage);
+                index += 1;
+            }
         }
+        if index < targets.len() {
+            continue;
+        }
+        index = 0;
         tokio::select! {
             biased;
             () = shutdown.draining() => return Ok(()),
@@ -165,7 +197,12 @@ async fn session_config(
         Some(at) => start_peer_server(at, tasks).await,
         None => None,
     };
-    SessionConfig { compress: options.compress.unwrap_or(!within_machine), uses_disk, peer_server }
+    SessionConfig {
+        compress: options.compress.unwrap_or(!within_machine),
+        uses_disk,
+        peer_server,
+        max_segment_bytes: options.max_segment_bytes,
+    }
 }
 
 /// Starts to serve assets to other workers. A failure is logged and only makes their transfers slower.
@@ -197,8 +234,8 @@ fn log_end(end: &SessionEnd) {
     }
 }
 
-async fn connect(options: &WorkerOptions, hello: &Hello) -> Result<Connection<TcpStream>, WorkerError> {
-    let master = options.master.as_str();
+async fn connect(target: &Target, hello: &Hello) -> Result<Connection<TcpStream>, WorkerError> {
+    let master = target.master.as_str();
     let resolve_error = |source| WorkerError::Resolve { master: master.to_owned(), source };
     let connect_error = |source| WorkerError::Connect { master: master.to_owned(), source };
     let addresses = address::resolve(master).await.map_err(resolve_error)?;
@@ -210,7 +247,7 @@ async fn connect(options: &WorkerOptions, hello: &Hello) -> Result<Connection<Tc
         }
     };
     tcp::configure(&stream).map_err(connect_error)?;
-    let (stream, Welcome { worker }) = handshake::as_worker(stream, &options.security, hello)
+    let (stream, Welcome { worker }) = handshake::as_worker(stream, &target.security, hello)
         .await
         .map_err(|source| WorkerError::Handshake { master: master.to_owned(), source })?;
     let threads = hello.threads;

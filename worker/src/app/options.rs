@@ -14,12 +14,16 @@ pub struct WorkerOptions {
     pub threads: Option<usize>,
     /// Name of the worker in the master's logs and displays.
     pub name: String,
+    /// Labels of the worker, which the master can select workers by.
+    pub tags: Vec<String>,
     /// Whether to connect again, with exponential backoff, after a failed connection.
     pub reconnect: bool,
     /// Whether to end with the first master that ends in order, instead of waiting for the next one.
     pub once: bool,
     /// Largest size of the scenes and meshes that are kept in memory, in bytes.
     pub asset_cache_bytes: u64,
+    /// Largest pixels of a segment that are rendered, in bytes; `None` for the bound of the protocol.
+    pub max_segment_bytes: Option<usize>,
     /// Cache of assets on the disk, if any.
     pub disk_cache: Option<DiskCacheOptions>,
     /// Whether pixels are compressed; `None` for compression on connections to another machine only.

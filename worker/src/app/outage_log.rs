@@ -1,5 +1,7 @@
 //! The log of a worker without a master: one line for each change of state, not one for each attempt.
 
+use std::collections::BTreeMap;
+
 use crate::error::WorkerError;
 
 /// Reason why a worker has no master.
@@ -22,21 +24,21 @@ enum State {
     Rejected,
 }
 
-/// Record of the last state that was logged since the last session.
+/// Record of the last state of each master that was logged since the last session.
 #[derive(Debug, Default)]
 pub(super) struct OutageLog {
-    logged: Option<State>,
+    logged: BTreeMap<String, State>,
 }
 
 impl OutageLog {
     /// Ends the outage: a session has begun.
     pub(super) fn end(&mut self) {
-        self.logged = None;
+        self.logged.clear();
     }
 
     /// Logs an outage, unless its state is the last one that was logged.
     pub(super) fn log(&mut self, master: &str, outage: &Outage) {
-        let is_new = self.update(outage);
+        let is_new = self.update(master, outage);
         match outage {
             Outage::MasterEnded(reason) if is_new => {
                 tracing::info!(
@@ -51,13 +53,13 @@ impl OutageLog {
     }
 
     /// Records the state of an outage. Returns whether it is a new one.
-    fn update(&mut self, outage: &Outage) -> bool {
+    fn update(&mut self, master: &str, outage: &Outage) -> bool {
         let state = match outage {
             Outage::Failed(WorkerError::Resolve { .. }) => State::Unresolved,
             Outage::Failed(WorkerError::Handshake { .. }) => State::Rejected,
             Outage::MasterEnded(_) | Outage::Failed(_) => State::Unreachable,
         };
-        self.logged.replace(state) != Some(state)
+        self.logged.insert(master.to_owned(), state) != Some(state)
     }
 }
 
@@ -81,11 +83,14 @@ mod tests {
     fn each_change_of_state_is_logged_once() {
         let mut log = OutageLog::default();
         let ended = Outage::MasterEnded("end of the run".into());
-        assert!(log.update(&ended));
-        assert!((0..5).all(|_| !log.update(&refused())));
-        assert!(log.update(&unresolved()) && !log.update(&unresolved()));
-        assert!(log.update(&refused()));
+        assert!(log.update("farm:1", &ended));
+        assert!((0..5).all(|_| !log.update("farm:1", &refused())));
+        assert!(log.update("farm:1", &unresolved()) && !log.update("farm:1", &unresolved()));
+        assert!(log.update("farm:1", &refused()));
+        // Another master has a state of its own.
+        assert!(log.update("farm:2", &unresolved()));
+        assert!(!log.update("farm:1", &refused()) && !log.update("farm:2", &unresolved()));
         log.end();
-        assert!(log.update(&refused()));
+        assert!(log.update("farm:1", &refused()));
     }
 }

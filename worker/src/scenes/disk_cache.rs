@@ -56,6 +56,8 @@ impl DiskCache {
     /// so that the asset is fetched again.
     pub(crate) fn read(&self, id: AssetId, size: u64) -> Option<Vec<u8>> {
         let path = self.path(id);
+        // A link is not followed, wherever it leads.
+        self.find(id)?;
         let mut file = open_regular(&path).ok()?;
         match read_exactly(&mut file, size) {
             Ok(bytes) if AssetId::of(&bytes) == id => {
@@ -308,6 +310,27 @@ mod tests {
         cache.write(other, &bytes);
         assert!(!temporary("1-0").exists() && cache.folder.join("letter.txt").exists());
         assert_eq!((cache.find(id), cache.find(other)), (None, Some(960)));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_not_followed_and_files_are_private() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let (folder, cache) = cache(LIMIT);
+        let (id, bytes) = asset(1, 300);
+        cache.write(id, &bytes);
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!((mode(&cache.folder), mode(&cache.path(id))), (0o700, 0o600));
+
+        let outside = folder.path().join("outside");
+        fs::rename(cache.path(id), &outside).unwrap();
+        symlink(&outside, cache.path(id)).unwrap();
+        assert_eq!((cache.find(id), cache.read(id, 300)), (None, None));
+        // A write replaces the link, and leaves the file that it refers to.
+        let before = fs::metadata(&outside).unwrap().modified().unwrap();
+        cache.write(id, &bytes);
+        assert_eq!(cache.read(id, 300), Some(bytes));
+        assert_eq!(fs::metadata(&outside).unwrap().modified().unwrap(), before);
     }
 
     #[test]

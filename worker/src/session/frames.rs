@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
+use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease};
 
 use crate::cancel::{CancelFlag, CancelGuard};
@@ -57,11 +58,23 @@ pub(super) struct FrameTable<F> {
     cancelled_before: FrameId,
     /// Number of announcements so far.
     announcements: u64,
+    /// Largest pixels of a lease, in bytes.
+    max_segment_bytes: usize,
 }
 
 impl<F> FrameTable<F> {
     pub(super) fn new() -> Self {
-        Self { frames: BTreeMap::new(), cancelled_before: FrameId(0), announcements: 0 }
+        Self {
+            frames: BTreeMap::new(),
+            cancelled_before: FrameId(0),
+            announcements: 0,
+            max_segment_bytes: MAX_PIXELS_BYTES,
+        }
+    }
+
+    /// Refuses leases with more than `bytes` of pixels.
+    pub(super) fn limit_segments(&mut self, bytes: usize) {
+        self.max_segment_bytes = bytes.min(MAX_PIXELS_BYTES);
     }
 
     /// Handles an announcement. Returns whether the frame is new, and the frame that was dropped for it, if any.
@@ -145,8 +158,15 @@ impl<F> FrameTable<F> {
         let Some(rows) = lease.rows().filter(|rows| rows.end <= height) else {
             return LeaseDecision::Refuse(format!("{lease}: the rows are outside a frame of {height} rows"));
         };
-        if format.segment_bytes(width, lease.row_count).is_none() {
-            return LeaseDecision::Refuse(format!("{lease}: the pixels do not fit into one message"));
+        match format.segment_bytes(width, lease.row_count) {
+            Some(bytes) if bytes <= self.max_segment_bytes => {}
+            Some(bytes) => {
+                return LeaseDecision::Refuse(format!(
+                    "{lease}: its pixels have {bytes} bytes, at most {} fit into this worker's --memory",
+                    self.max_segment_bytes
+                ));
+            }
+            None => return LeaseDecision::Refuse(format!("{lease}: the pixels do not fit into one message")),
         }
         match &entry.state {
             State::Ready(frame) => LeaseDecision::Render(rows, Arc::clone(frame)),
@@ -179,7 +199,7 @@ impl<F> Entry<F> {
 mod tests {
     use bytes::Bytes;
     use rayfarm_protocol::PixelFormat;
-    use rayfarm_protocol::limits::{MAX_FRAME_SIDE, MAX_PIXELS_BYTES};
+    use rayfarm_protocol::limits::MAX_FRAME_SIDE;
 
     use super::*;
 
@@ -216,6 +236,22 @@ mod tests {
                 let lease = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count };
                 let decision = frames.lease(lease, Instant::now());
                 assert_eq!(matches!(decision, LeaseDecision::Refuse(_)), refused, "{format:?}: {decision:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_lease_above_the_worker_s_own_bound_is_refused_with_the_bound() {
+        let mut frames = FrameTable::<()>::new();
+        frames.limit_segments(8 * 3 * 5);
+        frames.announce(announce(1));
+        for (row_count, refused) in [(5, false), (6, true)] {
+            let lease = Lease { frame: FrameId(1), segment: 0, attempt: 0, first_row: 0, row_count };
+            match frames.lease(lease, Instant::now()) {
+                LeaseDecision::Refuse(reason) => {
+                    assert!(refused && reason.contains("144 bytes") && reason.contains("120"), "{reason}");
+                }
+                decision => assert!(!refused, "{decision:?}"),
             }
         }
     }

@@ -53,6 +53,8 @@ pub(crate) struct SessionConfig {
     pub(crate) uses_disk: bool,
     /// The server of assets for other workers, if any.
     pub(crate) peer_server: Option<PeerServer>,
+    /// Largest pixels of a segment that are rendered, in bytes; `None` for the bound of the protocol.
+    pub(crate) max_segment_bytes: Option<usize>,
 }
 
 /// End of a session.
@@ -84,7 +86,10 @@ where
     let (sender, receiver, traffic) = session::spawn(io);
     let PersistentState { renderer, pool, builders, loader, disk } = persistent;
     let disk = disk.as_ref().filter(|_| config.uses_disk);
-    let state = SessionState::new(&mut *loader, disk.is_some(), config.peer_server.is_some());
+    let mut state = SessionState::new(&mut *loader, disk.is_some(), config.peer_server.is_some());
+    if let Some(bytes) = config.max_segment_bytes {
+        state.limit_segments(bytes);
+    }
     let runner = SessionRunner {
         renderer,
         pool,

@@ -75,6 +75,11 @@ impl<'a, R: Renderer> SessionState<'a, R> {
         Self { loader, frames: FrameTable::new(), effects: VecDeque::new() }
     }
 
+    /// Refuses leases with more than `bytes` of pixels.
+    pub(super) fn limit_segments(&mut self, bytes: usize) {
+        self.frames.limit_segments(bytes);
+    }
+
     /// Returns the next effect to perform.
     pub(super) fn poll_effect(&mut self) -> Option<Effect<R>> {
         self.effects.pop_front()

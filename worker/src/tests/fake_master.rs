@@ -45,7 +45,12 @@ impl FakeMaster {
         let shutdown = ShutdownHandle::new();
         let worker_shutdown = shutdown.clone();
         let worker = tokio::spawn(async move {
-            let config = SessionConfig { compress: false, uses_disk: worker.disk.is_some(), peer_server };
+            let config = SessionConfig {
+                compress: false,
+                uses_disk: worker.disk.is_some(),
+                peer_server,
+                max_segment_bytes: None,
+            };
             let end = run_session(theirs, config, &mut worker, &worker_shutdown).await;
             (end, worker)
         });

@@ -346,7 +346,8 @@ async fn a_closed_connection_and_invalid_bytes_are_reported() {
     use tokio::io::AsyncWriteExt;
     let (mut ours, theirs) = tokio::io::duplex(1 << 10);
     ours.write_all(b"HTTP/1.1 200 OK\r\n\r\n").await.unwrap();
-    let config = SessionConfig { compress: false, uses_disk: false, peer_server: None };
+    let config =
+        SessionConfig { compress: false, uses_disk: false, peer_server: None, max_segment_bytes: None };
     let end = run_session(theirs, config, &mut persistent(1, LARGE_CACHE).0, &ShutdownHandle::new()).await;
     assert!(matches!(&end, SessionEnd::Lost(why) if why.contains("unknown type")), "{end:?}");
 }

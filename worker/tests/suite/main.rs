@@ -5,3 +5,4 @@
 mod common;
 mod process;
 mod tcp;
+mod trust;

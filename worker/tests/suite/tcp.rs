@@ -11,6 +11,8 @@ fn options(master: &str) -> WorkerOptions {
         master: master.to_owned(),
         threads: Some(2),
         name: "attic".to_owned(),
+        tags: Vec::new(),
+        max_segment_bytes: None,
         reconnect: false,
         once: false,
         asset_cache_bytes: 1 << 20,

@@ -31,6 +31,8 @@ fn options(master: SocketAddr, share: Share) -> WorkerOptions {
         threads: Some(1),
         name: "worker".to_owned(),
         once: false,
+        tags: Vec::new(),
+        max_segment_bytes: None,
         reconnect: false,
         asset_cache_bytes: 1 << 28,
         disk_cache: None,

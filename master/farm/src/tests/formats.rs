@@ -29,6 +29,8 @@ async fn farm_of_workers(policy: SegmentPolicy, compress: bool, verify_percent: 
             master: farm.address().to_string(),
             threads: Some(threads),
             name: format!("worker-{threads}"),
+            tags: Vec::new(),
+            max_segment_bytes: None,
             reconnect: false,
             once: true,
             asset_cache_bytes: 1 << 20,

@@ -28,6 +28,8 @@ fn start_worker(master: SocketAddr) {
         master: master.to_string(),
         threads: Some(1),
         name: "correct".to_owned(),
+        tags: Vec::new(),
+        max_segment_bytes: None,
         reconnect: false,
         once: true,
         asset_cache_bytes: 1 << 20,

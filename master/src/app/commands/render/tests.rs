@@ -91,6 +91,8 @@ impl Renders {
             master: self.address.to_string(),
             threads: Some(1),
             name: "correct".to_owned(),
+            tags: Vec::new(),
+            max_segment_bytes: None,
             reconnect: false,
             once: true,
             asset_cache_bytes: 1 << 20,

@@ -1,38 +1,49 @@
-//! The worker's command line, for its own binary and for the master, which starts itself as a local worker.
+//! Arguments of a worker.
 
-use std::ffi::OsString;
-use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, Parser, ValueEnum};
-use rayfarm_protocol::address;
-use tracing_subscriber::EnvFilter;
+use clap::{ArgGroup, Args, ValueEnum};
+use rayfarm_protocol::{address, limits};
 
-use super::client::run;
-use super::options::{DiskCacheOptions, Share, WorkerOptions};
-use super::signals::{shut_down_on_signals, stop_at_end_of_stdin};
+use crate::app::memory::MemoryBudget;
+use crate::app::options::{DiskCacheOptions, Share, WorkerOptions};
+use crate::app::trust::{JOIN_VARIABLE, JoinInput};
 use crate::scenes::user_cache_folder;
-use crate::shutdown::ShutdownHandle;
 
 /// Environment variable with the name of a worker without `--name`. Unlike a command line, it is not readable for other
 /// users of the machine.
 pub const NAME_VARIABLE: &str = "RAYFARM_WORKER_NAME";
 
-/// A render node of rayfarm: traces segments for a master with all cores.
-#[derive(Debug, Parser)]
-#[command(name = "rayfarm-worker", version)]
-struct Cli {
-    #[command(flatten)]
-    worker: WorkerArgs,
+/// Default of `--asset-cache`, in MiB.
+const ASSET_CACHE_MIB: u64 = 2048;
+
+/// Selection of the master that a worker joins. Without any, the remembered masters are tried.
+#[derive(Clone, Debug, Args)]
+#[command(group = ArgGroup::new("farm").args(["master", "join", "discover"]))]
+pub struct FarmArgs {
+    /// Address of a master without encryption: one on this machine, or one with --insecure
+    #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
+    pub master: Option<String>,
+
+    /// Join line that the master prints, or - to read it from standard input, so that it is in no list of processes
+    #[arg(long, value_name = "LINE|-")]
+    pub join: Option<JoinInput>,
+
+    /// Search the local network for masters, and join the one that is found
+    #[arg(long)]
+    pub discover: bool,
 }
 
 /// Arguments of a worker. Another command line can flatten them.
 #[derive(Clone, Debug, Args)]
 pub struct WorkerArgs {
-    /// Address of the master
-    #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
-    pub master: String,
+    /// Master to join [default: the environment's RAYFARM_JOIN, or the remembered masters]
+    #[command(flatten)]
+    pub farm: FarmArgs,
+
+    /// Do not save the join line for later starts
+    #[arg(long)]
+    pub no_remember: bool,
 
     /// Number of render threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -43,9 +54,21 @@ pub struct WorkerArgs {
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
 
-    /// Memory for scenes and meshes; the least recently used are dropped first
-    #[arg(long, value_name = "MIB", default_value_t = 2048, value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
-    pub asset_cache: u64,
+    /// Labels of this worker for the master, separated by commas
+    #[arg(long, value_name = "TAG,...", value_delimiter = ',', value_parser = tag)]
+    pub tags: Vec<String>,
+
+    /// Run with a lower priority than other programs: a niceness from 1 to 19
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "10", value_parser = clap::value_parser!(u8).range(1..=19))]
+    pub nice: Option<u8>,
+
+    /// Bound of the memory for scenes, meshes, messages and pixels together [default: none, see --asset-cache]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(256..=1 << 24))]
+    pub memory: Option<u64>,
+
+    /// Memory for scenes and meshes; the least recently used are dropped first [default: 2048, or a part of --memory]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 24))]
+    pub asset_cache: Option<u64>,
 
     /// Folder that keeps scenes and meshes for later runs [default: in the user's cache folder, for masters on other
     /// machines]
@@ -102,20 +125,31 @@ pub enum PixelEncoding {
 }
 
 impl WorkerArgs {
-    fn options(&self) -> WorkerOptions {
+    /// Options of the worker, without a master.
+    pub(super) fn options(&self) -> WorkerOptions {
+        let budget = self.memory.map(MemoryBudget::of_mib);
+        let asset_cache = self.asset_cache.map(|mib| mib << 20);
+        let asset_cache_bytes = match (asset_cache, &budget) {
+            (Some(bytes), Some(budget)) => bytes.min(budget.asset_bytes),
+            (Some(bytes), None) => bytes,
+            (None, Some(budget)) => budget.asset_bytes,
+            (None, None) => ASSET_CACHE_MIB << 20,
+        };
+        let default_share = match &budget {
+            Some(budget) if !budget.allows_peers => Share::Off,
+            _ => Share::Auto,
+        };
         WorkerOptions {
-            master: self.master.clone(),
+            master: String::new(),
             threads: self.threads.map(usize::from),
-            name: self
-                .name
-                .clone()
-                .or_else(|| std::env::var(NAME_VARIABLE).ok())
-                .unwrap_or_else(machine_name),
+            name: self.name(),
+            tags: self.tags.clone(),
             reconnect: !self.no_reconnect,
             once: self.once,
-            asset_cache_bytes: self.asset_cache << 20,
+            asset_cache_bytes,
+            max_segment_bytes: budget.map(|budget| budget.segment_bytes),
             disk_cache: self.disk_cache(),
-            share: self.share.unwrap_or_default(),
+            share: self.share.unwrap_or(default_share),
             security: Default::default(),
             compress: match self.pixels {
                 PixelEncoding::Auto => None,
@@ -123,6 +157,11 @@ impl WorkerArgs {
                 PixelEncoding::Lz4 => Some(true),
             },
         }
+    }
+
+    fn name(&self) -> String {
+        let of_environment = || std::env::var(NAME_VARIABLE).ok();
+        self.name.clone().or_else(of_environment).unwrap_or_else(machine_name)
     }
 
     /// Options of the disk cache. A folder of the command line is used with every master.
@@ -133,74 +172,8 @@ impl WorkerArgs {
     }
 }
 
-/// Definition of the worker's command line, for completions and manual pages.
-pub fn command_line() -> clap::Command {
-    Cli::command()
-}
-
-/// Runs the program: parses `args` (the first is the program's name), logs to standard error, and renders. The exit code
-/// is 0 after a disconnect or a signal, 1 after an error, 2 for a wrong command line.
-pub fn main_from<I>(args: I) -> ExitCode
-where
-    I: IntoIterator,
-    I::Item: Into<OsString> + Clone,
-{
-    match Cli::try_parse_from(args) {
-        Ok(cli) => main_with(&cli.worker),
-        Err(error) => {
-            // A failure to print has no other output to report it.
-            let _ = error.print();
-            u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
-        }
-    }
-}
-
-/// Runs the program with parsed arguments: see [`main_from`]. Installs its own logging where none is installed.
-pub fn main_with(args: &WorkerArgs) -> ExitCode {
-    log_to_stderr(args);
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
-    let runtime = match runtime {
-        Ok(runtime) => runtime,
-        Err(error) => {
-            tracing::error!("cannot start: {error}");
-            return ExitCode::FAILURE;
-        }
-    };
-    let shutdown = ShutdownHandle::new();
-    if args.exit_with_stdin {
-        stop_at_end_of_stdin(shutdown.clone());
-    }
-    let result = runtime.block_on(async {
-        tokio::spawn(shut_down_on_signals(shutdown.clone()));
-        run(args.options(), shutdown).await
-    });
-    // Does not wait for a mesh that is being decoded.
-    runtime.shutdown_background();
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            tracing::error!("{error}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-/// Installs a log to standard error. `RUST_LOG` takes precedence over the flags.
-fn log_to_stderr(args: &WorkerArgs) {
-    let level = match (args.verbose, args.quiet) {
-        (true, _) => "debug",
-        (_, true) => "error",
-        _ => "info",
-    };
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    let log = log.with_target(false).with_ansi(std::io::stderr().is_terminal());
-    // Fails where the program has installed its own log.
-    let _ = log.try_init();
-}
-
 /// Validates the form of `HOST:PORT`. The host is resolved when the worker connects.
-fn host_and_port(text: &str) -> Result<String, String> {
+pub(super) fn host_and_port(text: &str) -> Result<String, String> {
     let form = "expected HOST:PORT, as in farm.local:7117, [::1]:7117 or [fe80::1%eth0]:7117";
     let (host, port) = text.rsplit_once(':').ok_or(form)?;
     let bare_v6 = host.contains(':') && !(host.starts_with('[') && host.ends_with(']'));
@@ -211,6 +184,16 @@ fn host_and_port(text: &str) -> Result<String, String> {
         Ok(1..) => Ok(text.to_owned()),
         _ => Err(format!("{port:?} is no port from 1 to 65535; {form}")),
     }
+}
+
+/// Validates one label of `--tags`.
+fn tag(text: &str) -> Result<String, String> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    if text.is_empty() || text.len() > limits::MAX_TAG_BYTES || !text.chars().all(is_plain) {
+        let limit = limits::MAX_TAG_BYTES;
+        return Err(format!("a tag has 1 to {limit} letters, digits, \"-\", \"_\" and \".\""));
+    }
+    Ok(text.to_owned())
 }
 
 /// Parses the value of `--share`.
@@ -228,7 +211,7 @@ fn share(text: &str) -> Result<Share, String> {
 fn machine_name() -> String {
     let file = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let command = || {
-        let output = std::process::Command::new("hostname").output().ok()?;
+        let output = std::process::Command::new("hostname").env_remove(JOIN_VARIABLE).output().ok()?;
         String::from_utf8(output.stdout).ok()
     };
     let name = file.or_else(command).unwrap_or_default();
