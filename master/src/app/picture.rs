@@ -11,6 +11,9 @@ pub(crate) const BEAUTY: &str = "beauty";
 /// Name of the layer of the frame itself, where its noise is filtered.
 pub(crate) const DENOISED: &str = "denoised";
 
+/// The reason for which pictures of the direct integrator are not denoised, and the remedy.
+pub(crate) const DENOISE_NEEDS_PATHS: &str = "--denoise filters the noise of paths, and the direct integrator has none: leave it out, or add --integrator path";
+
 /// A picture for a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Picture {

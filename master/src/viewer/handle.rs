@@ -88,7 +88,7 @@ impl ViewerHandle {
         !self.input.is_closed()
     }
 
-    /// A sender of knob changes, which does not keep the viewer running.
+    /// A sender of changes of knobs and of the denoiser, which does not keep the viewer running.
     pub(crate) fn knob_sender(&self) -> KnobSender {
         KnobSender(self.input.downgrade())
     }
@@ -106,18 +106,30 @@ impl ViewerHandle {
     }
 }
 
-/// Sender of knob changes to a viewer, which ends regardless of it.
+/// Sender of changes of knobs and of the denoiser to a viewer, which ends regardless of it.
 #[derive(Clone, Debug)]
 pub(crate) struct KnobSender(mpsc::WeakSender<(DisplayId, InputAction)>);
 
 impl KnobSender {
-    /// Sends a change, without waiting.
+    /// Sends a change of a knob, without waiting.
     ///
     /// # Errors
     /// A viewer that has ended, or that has too many actions to apply.
     pub(crate) fn send(&self, change: KnobChange) -> Result<(), String> {
+        self.send_action(InputAction::Set(change))
+    }
+
+    /// Switches the denoiser on or off, without waiting.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub(crate) fn denoise(&self, on: bool) -> Result<(), String> {
+        self.send_action(InputAction::Denoise(on))
+    }
+
+    fn send_action(&self, action: InputAction) -> Result<(), String> {
         let input = self.0.upgrade().ok_or("the view has ended")?;
-        input.try_send((DisplayId::FIRST, InputAction::Set(change))).map_err(|error| match error {
+        input.try_send((DisplayId::FIRST, action)).map_err(|error| match error {
             mpsc::error::TrySendError::Full(_) => {
                 "the view has too many actions to apply; try again".to_owned()
             }

@@ -70,6 +70,8 @@ pub(crate) enum InputAction {
     },
     /// Gives a knob of the view another value.
     Set(KnobChange),
+    /// Shows pictures of paths at rest with or without most of their noise.
+    Denoise(bool),
     /// Commands workers.
     Worker(WorkerCommand),
     /// Ends the viewer.

@@ -151,6 +151,10 @@ pub(crate) struct ViewArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) quality_control: QualityControlArgs,
+    /// Show pictures of paths at rest without most of their noise, guided by albedo, normals and depth: an estimate, which may blur
+    /// what is weaker than the noise.
+    #[arg(long)]
+    pub(crate) denoise: bool,
     /// End after N frames, which are rendered although nothing changes; without it, the window stays open until Esc.
     #[arg(long, value_name = "N", value_parser = frame_count)]
     pub(crate) frames: Option<u32>,

@@ -29,6 +29,8 @@ pub(super) enum Command {
     Allow(String),
     /// Gives a knob of the view another value.
     Set(KnobChange),
+    /// Shows pictures of paths at rest with or without most of their noise.
+    Denoise(bool),
 }
 
 /// Workers that a command applies to.
@@ -40,8 +42,11 @@ pub(super) enum WorkerSelector {
     One(String),
 }
 
+/// Name of the denoiser in `set`.
+const DENOISE: &str = "denoise";
+
 /// Syntax and effect of each command.
-pub(super) const COMMANDS: [(&str, &str); 10] = [
+pub(super) const COMMANDS: [(&str, &str); 11] = [
     ("workers", "list the connected workers"),
     ("status", "report the progress of the run"),
     ("drain ID|NAME", "disconnect a worker after it has finished its leases"),
@@ -50,6 +55,7 @@ pub(super) const COMMANDS: [(&str, &str); 10] = [
     ("pause [ID|NAME]", "grant a worker, or all, no more leases"),
     ("resume [ID|NAME]", "grant a paused worker, or all, leases again"),
     ("set KNOB VALUE", "give a knob of the view another value"),
+    ("set denoise on|off", "filter the noise of paths in the picture at rest"),
     ("help", "print this list"),
     ("quit", "end the run"),
 ];
@@ -71,7 +77,7 @@ impl Command {
             "drain" => return Ok(Self::Drain(one(word, rest)?)),
             "kick" => return Ok(Self::Kick(one(word, rest)?)),
             "allow" => return kicked(word, rest).map(Self::Allow),
-            "set" => return knob_change(rest).map(Self::Set),
+            "set" => return setting(rest),
             "pause" => return Ok(Self::Pause(one_or_all(rest))),
             "resume" => return Ok(Self::Resume(one_or_all(rest))),
             "" => return Err("an empty line; help lists the commands".to_owned()),
@@ -88,18 +94,28 @@ impl Command {
     }
 }
 
-/// Parses `KNOB VALUE`. A knob is named by its option, or by its name in reports.
-fn knob_change(text: &str) -> Result<KnobChange, String> {
+/// Parses `KNOB VALUE`, or the switch of the denoiser, which is no knob: workers render the same pixels with it.
+fn setting(text: &str) -> Result<Command, String> {
     let (name, value) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    match (name, value.trim()) {
+        (DENOISE, "on") => Ok(Command::Denoise(true)),
+        (DENOISE, "off") => Ok(Command::Denoise(false)),
+        (DENOISE, _) => Err(format!("set {DENOISE}: expected on or off")),
+        (name, value) => knob_change(name, value).map(Command::Set),
+    }
+}
+
+/// Parses a change of a knob, which is named by its option, or by its name in reports.
+fn knob_change(name: &str, value: &str) -> Result<KnobChange, String> {
     let Some(knob) = KNOBS.iter().find(|knob| knob.option == name || knob.name == name) else {
         let knobs: Vec<_> = KNOBS.iter().map(|knob| knob.option).collect();
         return Err(format!(
-            "set: there is no knob \"{}\"; expected one of {}",
+            "set: there is no knob \"{}\"; expected one of {}, {DENOISE}",
             printable(name),
             knobs.join(", ")
         ));
     };
-    let value = knob_values::parse(knob, value.trim());
+    let value = knob_values::parse(knob, value);
     let value = value.map_err(|expected| format!("set {}: {expected}", knob.option))?;
     Ok(KnobChange { knob, value })
 }

@@ -80,9 +80,12 @@ impl Console {
             Command::Resume(workers) => self.to_each(&status, workers, FarmControl::resume)?,
             Command::Kick(workers) => self.to_each(&status, workers, |farm, id| farm.ban(id, KICK_REASON))?,
             Command::Set(change) => {
-                let view = self.view.as_ref().ok_or("set needs a view, and this run writes files")?;
-                view.send(*change)?;
+                self.view()?.send(*change)?;
                 json!({ "ok": true, "knob": change.knob.name })
+            }
+            Command::Denoise(on) => {
+                self.view()?.denoise(*on)?;
+                json!({ "ok": true, "denoise": on })
             }
             Command::Allow(worker) => {
                 let worker = find_kicked(&status, worker)?;
@@ -90,6 +93,10 @@ impl Console {
             }
         };
         Ok((value, Then::Listen))
+    }
+
+    fn view(&self) -> Result<&KnobSender, String> {
+        self.view.as_ref().ok_or_else(|| "set needs a view, and this run writes files".to_owned())
     }
 
     fn to_each(

@@ -60,6 +60,8 @@ fn lines_are_parsed_as_documented() {
         ("pause", Command::Pause(WorkerSelector::All)),
         ("resume\tmill", Command::Resume(one("mill"))),
         ("allow mill", Command::Allow("mill".to_owned())),
+        ("set denoise on", Command::Denoise(true)),
+        (" set denoise  off ", Command::Denoise(false)),
         ("help", Command::Help),
         ("quit", Command::Quit),
     ] {
@@ -72,6 +74,8 @@ fn lines_are_parsed_as_documented() {
         ("drain ", "drain"),
         ("allow", "allow"),
         ("quit now", "now"),
+        ("set denoise", "on or off"),
+        ("set denoise 1", "on or off"),
     ] {
         let error = Command::parse(line).unwrap_err();
         assert!(error.contains(fact), "{line}: {error}");
@@ -110,6 +114,7 @@ async fn a_run_without_a_view_refuses_to_set_knobs() {
     let farm = farm().await;
     let (console, _quit) = console(&farm);
     assert_eq!(ask(&console, "set samples 4")["ok"], false);
+    assert_eq!(ask(&console, "set denoise on")["ok"], false);
     farm.shut_down().await;
 }
 
@@ -125,6 +130,7 @@ async fn a_set_knob_is_in_the_next_frame_of_the_view() {
         policy: RequestPolicy { animation, limit: None, continuous: false },
         log: None,
         controller: None,
+        denoised: false,
     };
     let (viewer, mut handle) = Viewer::interactive(farm, config);
     let stop = CancellationToken::new();

@@ -78,12 +78,16 @@ fn a_picture_in_passes_has_its_samples_its_error_and_the_time_left() {
         error: Some(0.042),
         target_error: None,
         left: Some(Duration::from_secs(12)),
+        is_denoised: false,
     };
     let lines = Figures { film: Some(film), ..figures() }.lines();
     assert_eq!(lines[1..4], ["1024 x 768", "16 of 64 samples, error 4.2 %", "12 s left"]);
     let complete = FilmProgress { samples: 64, left: Some(Duration::ZERO), ..film };
     let lines = Figures { film: Some(complete), ..figures() }.lines();
     assert_eq!(lines[2..4], ["64 of 64 samples, error 4.2 %", "2 workers, 4 threads"]);
+    let denoised = FilmProgress { is_denoised: true, ..film };
+    let lines = Figures { film: Some(denoised), ..figures() }.lines();
+    assert_eq!(lines[2], "16 of 64 samples, error 4.2 %, denoised");
 }
 
 #[test]

@@ -8,10 +8,14 @@
 //!   passes     ranges of samples, and the views that are rendered for them
 //!   error      estimate of the error from the sums of even and odd samples
 //!   progress   samples, error, and the time to the target
+//!   pass       frames of which a picture at rest consists
+//!   guides     auxiliary pictures that guide the denoiser
 //!   still      the film of an interactive view, and the frames that it shows
 //! ```
 
 mod error;
+mod guides;
+pub(super) mod pass;
 pub(crate) mod passes;
 mod progress;
 pub(super) mod still;
@@ -119,5 +123,7 @@ pub(crate) fn pixel_count(view: &FrameView) -> usize {
     view.width as usize * view.height as usize
 }
 
+#[cfg(test)]
+mod still_tests;
 #[cfg(test)]
 pub(in crate::viewer) mod tests;

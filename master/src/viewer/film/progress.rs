@@ -55,6 +55,8 @@ pub(crate) struct FilmProgress {
     pub(crate) target_error: Option<f64>,
     /// Estimated time to the end; `None` before the second pass.
     pub(crate) left: Option<Duration>,
+    /// Whether the picture is shown without most of its noise. The film and its error are those of the noisy one.
+    pub(crate) is_denoised: bool,
 }
 
 impl FilmProgress {
@@ -63,12 +65,13 @@ impl FilmProgress {
         FilmTarget { samples: self.of, error: self.target_error }.is_reached(self.samples, self.error)
     }
 
-    /// Samples and error as text: `12 of 64 samples, error 3.1 %`.
+    /// Samples, error and filter as text: `12 of 64 samples, error 3.1 %, denoised`.
     pub(crate) fn text(&self) -> String {
         let Self { samples, of, target_error, .. } = self;
         let error = self.error.map_or(String::new(), |error| format!(", error {}", percent(error)));
         let target = target_error.map_or(String::new(), |error| format!(" (to {})", percent(error)));
-        format!("{samples} of {of} samples{error}{target}")
+        let denoised = if self.is_denoised { ", denoised" } else { "" };
+        format!("{samples} of {of} samples{error}{target}{denoised}")
     }
 }
 
@@ -105,7 +108,8 @@ impl Pace {
             false => target.needed(samples, error).saturating_sub(samples).max(1),
         };
         let left = self.per_sample().map(|time| time.saturating_mul(more));
-        FilmProgress { samples, of: target.samples, error, target_error: target.error, left }
+        let (of, target_error) = (target.samples, target.error);
+        FilmProgress { samples, of, error, target_error, left, is_denoised: false }
     }
 
     /// Time of a sample of all pixels.
@@ -152,11 +156,14 @@ mod tests {
 
     #[test]
     fn progress_is_one_line() {
+        let error = Some(0.0312);
         let progress =
-            FilmProgress { samples: 12, of: 64, error: Some(0.0312), target_error: None, left: None };
+            FilmProgress { samples: 12, of: 64, error, target_error: None, left: None, is_denoised: false };
         assert_eq!(progress.text(), "12 of 64 samples, error 3.1 %");
         let targeted = FilmProgress { target_error: Some(0.005), error: Some(0.31), ..progress };
         assert_eq!(targeted.text(), "12 of 64 samples, error 31 % (to 0.50 %)");
         assert_eq!(FilmProgress { error: None, ..progress }.text(), "12 of 64 samples");
+        let denoised = FilmProgress { is_denoised: true, ..progress };
+        assert_eq!(denoised.text(), "12 of 64 samples, error 3.1 %, denoised");
     }
 }

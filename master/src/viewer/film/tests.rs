@@ -41,7 +41,7 @@ pub(in crate::viewer) fn rendered(view: &FrameView) -> Vec<u8> {
 }
 
 /// The frame of a pass.
-fn frame(number: u64, view: &FrameView) -> FinishedFrame {
+pub(super) fn frame(number: u64, view: &FrameView) -> FinishedFrame {
     FinishedFrame {
         frame: FrameId(number),
         request: (*view).into(),

@@ -48,6 +48,7 @@ fn config(controller: Option<QualityController>) -> ViewerConfig {
         policy: RequestPolicy { animation: STILL, limit: None, continuous: false },
         log: None,
         controller,
+        denoised: false,
     }
 }
 
@@ -80,9 +81,12 @@ async fn the_window_shows_after_n_samples_what_a_render_of_n_samples_shows() {
     assert!(film.is_complete() && film.error.is_some());
     assert_eq!(viewer.completed(), 5, "passes to 1, 2, 4, 8 and 12 samples");
 
-    // A change starts again, and no pass of the former view is added.
-    viewer.send(TURN);
-    let camera = turned_from(&view(SAMPLES), 1);
+    // A change starts again, and no pass of the former view is added. Without a controller too, a moving picture has one sample.
+    let mut steps = 0;
+    let turn = |handle: &ViewerHandle| steps += u32::from(handle.send(vec![TURN]));
+    let moving = viewer.frame(turn, |it| it.film.is_none()).await;
+    assert_eq!((moving.frame.view.samples, moving.frame.format()), (1, PixelFormat::Rgb8));
+    let camera = turned_from(&view(SAMPLES), steps);
     let last = viewer.frame(|_| (), |it| samples(it) == SAMPLES && it.frame.view.camera == camera).await;
     assert!(is_whole(&last, camera));
     viewer.end().await;
@@ -100,6 +104,32 @@ async fn a_moving_picture_of_paths_has_one_sample_and_comes_to_rest_on_the_whole
     let camera = turned_from(&view(SAMPLES), steps);
     let rests = viewer.frame(|_| (), |it| samples(it) == SAMPLES && it.frame.view.camera == camera).await;
     assert!(is_whole(&rests, camera));
+    viewer.end().await;
+}
+
+#[tokio::test]
+async fn a_denoised_picture_is_named_and_its_switch_shows_the_noise_again() {
+    let farm = farm(0).await;
+    start_worker(farm.address());
+    let mut viewer = Running::of(farm, ViewerConfig { denoised: true, ..config(None) });
+    let is_denoised = |it: &PresentedFrame| it.film.is_some_and(|film| film.is_denoised);
+    let camera = view(SAMPLES).camera;
+    let first = viewer.frame(|_| (), |it| it.film.is_some()).await;
+    assert!(samples(&first) > 1 || !is_denoised(&first), "one sample has no estimate of its noise");
+    let filtered = viewer.frame(|_| (), |it| samples(it) == SAMPLES && is_denoised(it)).await;
+    assert_eq!(filtered.frame.view, view(SAMPLES));
+    assert!(!is_whole(&filtered, camera), "most of the noise is gone");
+    assert!(filtered.film.unwrap().text().ends_with(", denoised"));
+    // At rest, without another frame of a worker.
+    viewer.until(|_, figures| figures.resting).await;
+    let completed = viewer.completed();
+    viewer.send(InputAction::Denoise(false));
+    let noisy = viewer.frame(|_| (), |it| !is_denoised(it)).await;
+    assert!(samples(&noisy) == SAMPLES && is_whole(&noisy, camera));
+    viewer.send(InputAction::Denoise(true));
+    let again = viewer.frame(|_| (), is_denoised).await;
+    assert_eq!(*again.frame.pixels, *filtered.frame.pixels);
+    assert_eq!(viewer.completed(), completed);
     viewer.end().await;
 }
 

@@ -18,7 +18,9 @@ use super::camera_control::CameraControl;
 use super::displays::{DisplayId, Visibility};
 use super::error::ViewerError;
 use super::film::FilmProgress;
-use super::film::still::{Pass, StillFilm, alone};
+use super::film::pass::Pass;
+use super::film::passes::has_passes;
+use super::film::still::{Added, Redeveloped, StillFilm, alone};
 use super::frame_log::FrameLogFile;
 use super::handle::{Channels, PresentedFrame, ViewerHandle};
 use super::input_action::InputAction;
@@ -45,6 +47,8 @@ pub(crate) struct ViewerConfig {
     pub(crate) log: Option<FrameLogFile>,
     /// Controller that holds a frame rate.
     pub(crate) controller: Option<QualityController>,
+    /// Whether pictures of paths at rest are shown without most of their noise at first.
+    pub(crate) denoised: bool,
 }
 
 /// The owner of a view over a farm.
@@ -59,6 +63,8 @@ pub(crate) struct Viewer {
     camera: CameraControl,
     requests: Requests,
     film: StillFilm,
+    /// Request that the next picture of the film answers, which is being developed.
+    developing: Option<Answered>,
     figures: ViewerState,
     log: Option<FrameLogFile>,
     channels: Channels,
@@ -68,15 +74,16 @@ pub(crate) struct Viewer {
 impl Viewer {
     /// A viewer of a view that input changes, and the handle for its displays.
     pub(crate) fn interactive(farm: Farm, config: ViewerConfig) -> (Self, ViewerHandle) {
-        let ViewerConfig { request, camera, policy, log, controller } = config;
+        let ViewerConfig { request, camera, policy, log, controller, denoised } = config;
         let (channels, handle) = Channels::new(farm.entrance(), farm.status());
         let viewer = Self {
             farm,
-            state: ViewState { request, hidden: false },
+            state: ViewState { request, hidden: false, denoised },
             visibility: Visibility::default(),
             camera,
             requests: Requests::new(policy, controller),
-            film: StillFilm::new(),
+            film: StillFilm::new(denoised),
+            developing: None,
             figures: ViewerState::new(),
             log,
             channels,
@@ -97,11 +104,12 @@ impl Viewer {
         let (channels, handle) = Channels::new(farm.entrance(), farm.status());
         let viewer = Self {
             farm,
-            state: ViewState { request, hidden: false },
+            state: ViewState { request, hidden: false, denoised: false },
             visibility: Visibility::default(),
             camera: CameraControl::new(request.view.camera, None),
             requests: Requests::of_sequence(animation, plan),
-            film: StillFilm::new(),
+            film: StillFilm::new(false),
+            developing: None,
             figures: ViewerState::new(),
             log: None,
             channels,
@@ -145,6 +153,7 @@ impl Viewer {
                         return Ok(());
                     }
                 }
+                picture = self.film.developed() => self.deliver_developed(picture),
                 () = until(self.requests.rests_at()) => self.requests.rest(&self.farm, &self.state),
                 () = self.requests.slot_is_free() => self.requests.fill(&self.farm, &self.state),
                 _ = tick.tick() => self.publish(),
@@ -199,13 +208,17 @@ impl Viewer {
             return;
         }
         match self.film.add(pass, frame).await {
-            Ok((frame, progress)) => {
+            Ok(Added::Samples { frame, progress }) => {
                 if progress.is_complete() {
                     self.requests.complete_picture(&self.farm);
                 }
-                self.deliver(frame, Some(progress), answered);
+                match frame {
+                    Some(frame) => self.deliver(frame, Some(progress), answered),
+                    None => self.developing = Some(answered),
+                }
                 self.check_film();
             }
+            Ok(Added::Guide) => self.check_film(),
             Err(error) => {
                 tracing::error!("the picture starts again: {error}");
                 self.restart_film();
@@ -213,13 +226,23 @@ impl Viewer {
         }
     }
 
+    /// Delivers a picture of the film that was developed beside the frame loop, unless the view has changed.
+    fn deliver_developed(&mut self, picture: Redeveloped) {
+        let Redeveloped { film, frame, progress } = picture;
+        let answered = self.developing.take();
+        if self.requests.is_film(film) {
+            let answered = answered.unwrap_or_else(|| self.requests.unanswered());
+            self.deliver(frame, Some(progress), answered);
+        }
+    }
+
     /// Starts the picture again if it has pixels of a worker that sent wrong ones.
     fn check_film(&mut self) {
-        if self.film.frames().is_empty() {
+        if self.film.frames().next().is_none() {
             return;
         }
         let wrong = self.farm.wrong_frames();
-        if self.film.frames().iter().any(|frame| wrong.contains(*frame)) {
+        if self.film.frames().any(|frame| wrong.contains(frame)) {
             tracing::warn!("the picture starts again, because a worker sent wrong pixels");
             self.restart_film();
         }
@@ -260,6 +283,7 @@ impl Viewer {
         state.request.view = FrameView { camera: self.camera.camera(), ..state.request.view };
         if self.state != state {
             self.state = state;
+            self.film.set_denoised(state.denoised);
             self.requests.replace(&self.farm, &self.state);
         }
         ControlFlow::Continue(())
@@ -296,6 +320,12 @@ fn apply(
                 Ok(()) => state.request = request,
                 Err(problem) => tracing::warn!("{} is not changed: {problem}", change.knob.name),
             }
+        }
+        InputAction::Denoise(on) => {
+            if on && !has_passes(&state.request.view) {
+                tracing::warn!("the direct integrator has no noise: only pictures of paths are denoised");
+            }
+            state.denoised = on;
         }
         InputAction::Worker(command) => command.perform(&farm.control()),
         InputAction::Quit => return ControlFlow::Break(()),

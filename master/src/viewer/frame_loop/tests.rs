@@ -45,6 +45,7 @@ impl Running {
             policy: RequestPolicy { animation, limit: None, continuous: false },
             log: None,
             controller,
+            denoised: false,
         };
         Self::of(farm(script).await, config)
     }

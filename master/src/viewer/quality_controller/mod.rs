@@ -33,7 +33,7 @@ pub(crate) use prior::ladder as prior_ladder;
 use rayfarm_farm::ViewRequest;
 use rayfarm_farm::accounting::FrameAccount;
 pub(crate) use small_scales::continued;
-use stillness::{Motion, Stillness};
+pub(crate) use stillness::{Motion, Stillness};
 pub(crate) use wire::bytes;
 
 /// Quality at which a frame is requested.

@@ -3,59 +3,40 @@
 //!
 //! A view of the path integrator at rest is requested in passes of samples, which the film of the view adds. Passes of a view are requested
 //! in their order, and never replace each other. If one is lost all the same, the picture starts again.
+//!
+//! ```text
+//!   policy   what is requested, by which rules, and of whom
+//!   next     choice of the next request
+//!   open     requests in flight
+//!   passes   passes of a view at rest
+//! ```
+
+mod next;
+mod open;
+mod passes;
+#[cfg(test)]
+mod path_tests;
+mod policy;
+#[cfg(test)]
+mod tests;
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use rayfarm_farm::accounting::FrameAccount;
-use rayfarm_farm::{Farm, FrameId, ViewRequest};
+use rayfarm_farm::{FrameId, ViewRequest};
 
-use super::film::passes as film_passes;
-use super::film::still::Pass;
+use super::film::pass::{Part, Pass};
 use super::open_requests::OPEN_REQUESTS;
 use super::orbit::Animation;
-use super::quality_controller::{QualityController, QualityMode};
-use super::sequence::{SequencePlan, Slot};
+use super::quality_controller::{QualityController, QualityMode, Stillness};
+use super::sequence::SequencePlan;
 
+pub(super) use open::Answered;
+use open::{Open, Requested};
 use passes::Passes;
-
-/// Accepts requests for frames.
-pub(super) trait Renderer {
-    /// Requests the next frame.
-    fn request(&self, request: ViewRequest) -> FrameId;
-    /// Drops all requested frames.
-    fn drop_requests(&self);
-}
-
-impl Renderer for Farm {
-    fn request(&self, request: ViewRequest) -> FrameId {
-        Self::request(self, request)
-    }
-
-    fn drop_requests(&self) {
-        self.drop_requests();
-    }
-}
-
-/// The view of the display.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ViewState {
-    /// Picture in the size of the display.
-    pub(crate) request: ViewRequest,
-    /// Whether the display is minimised, unmapped or covered.
-    pub(crate) hidden: bool,
-}
-
-/// Rules by which frames are requested.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RequestPolicy {
-    /// Movement without input.
-    pub(crate) animation: Animation,
-    /// Number of frames after which the run ends.
-    pub(crate) limit: Option<u64>,
-    /// Whether frames are requested even if nothing has changed and the display is hidden, for measurements.
-    pub(crate) continuous: bool,
-}
+pub(super) use policy::Renderer;
+pub(crate) use policy::{RequestPolicy, ViewState};
 
 /// Requested frames that have not been completed.
 pub(super) struct Requests {
@@ -76,45 +57,9 @@ pub(super) struct Requests {
     /// Time of the last camera movement, until a frame that shows it is finished.
     moved_at: Option<Instant>,
     controller: Option<QualityController>,
+    /// Motion of a view that is rendered in passes, without a controller.
+    stillness: Stillness,
     started: Instant,
-}
-
-/// The last request.
-struct Requested {
-    request: ViewRequest,
-    /// Request before the quality controller.
-    wanted: ViewRequest,
-    mode: Option<QualityMode>,
-}
-
-/// A request in flight.
-struct Open {
-    frame: FrameId,
-    answered: Answered,
-    requested_at: Instant,
-    /// `None` without a quality controller.
-    mode: Option<QualityMode>,
-}
-
-impl Open {
-    fn gives_way_to(&self, next: QualityMode) -> bool {
-        self.mode.is_some_and(|mode| mode.gives_way_to(next))
-    }
-}
-
-/// Properties of a request that the farm does not know.
-#[derive(Debug)]
-pub(super) struct Answered {
-    /// Time of the input that the frame answers.
-    pub(super) input_at: Instant,
-    /// Number of the frame in the animation.
-    pub(super) number: u64,
-    /// Place in the sequence, for a frame of one.
-    pub(super) slot: Option<Slot>,
-    /// Lines of the quality controller about the frame; empty without a controller.
-    pub(super) quality: Vec<String>,
-    /// The pass that the frame is, if it is one.
-    pub(super) pass: Option<Pass>,
 }
 
 impl Requests {
@@ -131,6 +76,7 @@ impl Requests {
             films: 0,
             moved_at: None,
             controller,
+            stillness: Stillness::new(policy.animation.is_moving()),
             started: Instant::now(),
         }
     }
@@ -164,25 +110,30 @@ impl Requests {
         }
         let Some(Open { mut answered, requested_at, mode, .. }) = answer else {
             self.moved_at = self.moved_at.filter(|&moved_at| moved_at > now);
-            return Answered {
-                input_at: now,
-                number: self.next,
-                slot: None,
-                quality: Vec::new(),
-                pass: None,
-            };
+            return self.unanswered();
         };
         self.moved_at = self.moved_at.filter(|&moved_at| moved_at > answered.input_at);
         let (now, requested_at) = (self.since_start(now), self.since_start(requested_at));
+        self.stillness.shown(requested_at);
         if let Some((controller, mode)) = self.controller.as_mut().zip(mode) {
             // The lines come first: afterwards the ladder may no longer have the frame's rung.
             answered.quality = controller.lines(mode);
-            match answered.pass {
+            match answered.pass.map(|pass| pass.part) {
                 None => controller.finished(now, elapsed, mode, requested_at, account),
-                Some(pass) => controller.finished_pass(now, elapsed / pass.samples.max(1), requested_at),
+                Some(Part::Samples { samples, .. }) => {
+                    controller.finished_pass(now, elapsed / samples.max(1), requested_at);
+                }
+                // Its time is no picture's.
+                Some(Part::Guide(_)) => {}
             }
         }
         answered
+    }
+
+    /// Properties of a picture that answers no request, such as one that is developed again.
+    pub(super) fn unanswered(&self) -> Answered {
+        let input_at = Instant::now();
+        Answered { input_at, number: self.next, slot: None, quality: Vec::new(), pass: None }
     }
 
     /// Requests the next frame after one has finished. A request beyond [`OPEN_REQUESTS`] costs nothing: either an open one
@@ -209,13 +160,18 @@ impl Requests {
 
     /// Whether a pass is of the picture that is being rendered.
     pub(super) fn is_current(&self, pass: Option<Pass>) -> bool {
-        self.passes.zip(pass).is_some_and(|(passes, pass)| passes.film == pass.film)
+        pass.is_some_and(|pass| self.is_film(pass.film))
+    }
+
+    /// Whether a film is of the picture that is being rendered, or was rendered last and is still the wanted one.
+    pub(super) fn is_film(&self, number: u64) -> bool {
+        self.passes.is_some_and(|passes| passes.film == number)
     }
 
     /// Requests no further pass of the picture, and drops those in flight.
     pub(super) fn complete_picture(&mut self, farm: &impl Renderer) {
         let Some(passes) = &mut self.passes else { return };
-        passes.complete();
+        passes.complete(self.open.iter().filter(|open| open.is_guide()).count());
         if !self.open.is_empty() {
             let (passes, requested) = (self.passes, self.requested.take());
             self.drop_all(farm);
@@ -231,7 +187,11 @@ impl Requests {
 
     /// Time at which the camera comes to rest if it does not move any more.
     pub(super) fn rests_at(&self) -> Option<Instant> {
-        Some(self.started + self.controller.as_ref()?.rests_at()?)
+        let at = match &self.controller {
+            Some(controller) => controller.rests_at(),
+            None => self.stillness.rests_at(),
+        };
+        Some(self.started + at?)
     }
 
     /// Lines of the quality controller about the picture at rest, if no frame is in flight and none will be requested
@@ -264,104 +224,6 @@ impl Requests {
         self.fill(farm, state);
     }
 
-    /// Requests a frame, if one is needed. Returns whether it was.
-    fn request(&mut self, farm: &impl Renderer, state: &ViewState) -> bool {
-        let now = Instant::now();
-        let since_start = self.since_start(now);
-        let wanted = &state.request;
-        self.note_change(farm, wanted, since_start);
-        let mode = self.controller.as_mut().map(|controller| controller.next(since_start));
-        let RequestPolicy { animation, limit, continuous } = self.policy;
-        if limit.is_some_and(|limit| self.next >= limit) && !self.open.is_empty() {
-            return false;
-        }
-        if state.hidden && !continuous {
-            return false;
-        }
-        let request = match self.controller.as_ref().zip(mode) {
-            Some((controller, mode)) => controller.apply(wanted, mode),
-            None => *wanted,
-        };
-        let (number, slot) = match &self.plan {
-            None => (self.next, None),
-            Some(plan) => match plan.number(self.next).zip(plan.free_slot()) {
-                Some((number, slot)) => (number, Some(slot)),
-                None => return false,
-            },
-        };
-        let request = animation.request(&request, number);
-        let request = self.plan.as_ref().map_or(request, |plan| plan.request(self.next, request));
-        let is_moving = animation.is_moving() || is_moving(mode);
-        let (request, passes) = match self.plan.is_none() && film_passes::has_passes(&request.view) {
-            false => (request, None),
-            true if is_moving => (film_passes::while_moving(&request), None),
-            true => (request, Some(self.passes_of(&request))),
-        };
-        let pass = match passes.map(|passes| passes.pass()) {
-            None if !continuous && self.is_requested(&request, wanted, mode) => return false,
-            None => None,
-            // All passes have been requested.
-            Some(None) => return false,
-            // A third request may replace the second one, which is a pass of the same picture.
-            Some(Some(pass)) if pass.first > 0 && self.open.len() >= OPEN_REQUESTS => return false,
-            Some(pass) => pass,
-        };
-        let request = pass.map_or(request, |Pass { first, samples, .. }| ViewRequest {
-            view: film_passes::pass(&request.view, first..first.saturating_add(samples)),
-            ..request
-        });
-        if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
-            self.drop_all(farm);
-        }
-        self.passes = passes.zip(pass).map(|(passes, pass)| passes.after(&pass));
-        self.films = self.passes.map_or(self.films, |passes| passes.film);
-        // A request that replaces another one is as old as the camera that it shows.
-        let input_at = self.moved_at.unwrap_or(now);
-        let answered = Answered { input_at, number, slot, quality: Vec::new(), pass };
-        self.open.push_back(Open { frame: farm.request(request), answered, requested_at: now, mode });
-        self.requested = Some(Requested { request, wanted: *wanted, mode });
-        self.next += 1;
-        true
-    }
-
-    /// Passes of a picture: those that are being rendered, or those of a new film.
-    fn passes_of(&self, whole: &ViewRequest) -> Passes {
-        let first = Passes::new(whole, self.films + 1);
-        match self.passes.filter(|passes| passes.whole == *whole) {
-            // A measurement renders the picture again and again, each time to its end.
-            Some(passes) if self.policy.continuous && passes.pass().is_none() && self.open.is_empty() => {
-                first
-            }
-            Some(passes) => passes,
-            None => first,
-        }
-    }
-
-    /// Whether the last request serves for this one: it is the same, or only the quality controller's rung has changed
-    /// since then and nothing moves any more.
-    fn is_requested(&self, request: &ViewRequest, wanted: &ViewRequest, mode: Option<QualityMode>) -> bool {
-        self.requested.as_ref().is_some_and(|last| {
-            let is_still = !self.policy.animation.is_moving() && last.wanted == *wanted;
-            last.request == *request || is_still && is_moving(last.mode) && is_moving(mode)
-        })
-    }
-
-    /// Records the view, which may have changed.
-    fn note_change(&mut self, farm: &impl Renderer, wanted: &ViewRequest, now: Duration) {
-        let Some(before) = self.wanted.replace(*wanted).filter(|before| before != wanted) else { return };
-        if let Some(controller) = &mut self.controller {
-            controller.changed(now);
-        }
-        let size = |request: &ViewRequest| (request.view.width, request.view.height);
-        if size(&before) != size(wanted) {
-            // Frames in flight are of the display's former size.
-            self.drop_all(farm);
-        } else if self.open.iter().any(|open| open.answered.pass.is_some_and(|pass| pass.first > 0)) {
-            // Nothing shows a later pass of a former view.
-            self.drop_all(farm);
-        }
-    }
-
     fn drop_all(&mut self, farm: &impl Renderer) {
         farm.drop_requests();
         self.open.clear();
@@ -373,12 +235,3 @@ impl Requests {
         at.saturating_duration_since(self.started)
     }
 }
-
-/// Whether a mode is of a moving picture; without a quality controller there is none.
-fn is_moving(mode: Option<QualityMode>) -> bool {
-    mode.is_some_and(|mode| mode != QualityMode::Resting)
-}
-
-mod passes;
-#[cfg(test)]
-mod tests;

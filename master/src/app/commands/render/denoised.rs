@@ -6,7 +6,7 @@ use rayfarm_tracer::scene::{FrameView, Integrator};
 use rayfarm_tracer::{Guides, PixelFormat, PixelSums, develop_denoised};
 
 use crate::app::cli::Aov;
-use crate::app::picture::{DENOISED, Picture};
+use crate::app::picture::{DENOISE_NEEDS_PATHS, DENOISED, Picture};
 
 /// Auxiliary pictures that guide the denoiser: albedo, normals and depth, as [`Guides::new`] takes them.
 const GUIDES: [Aov; 3] = [Aov::Albedo, Aov::Normal, Aov::Depth];
@@ -29,9 +29,7 @@ pub(super) fn with_guides(requested: &[Aov]) -> Vec<Aov> {
 /// The reason for which pictures of a view cannot be denoised, in words.
 pub(super) fn refusal(view: &FrameView) -> Option<&'static str> {
     match view.integrator {
-        Integrator::Direct => Some(
-            "--denoise filters the noise of paths, and the direct integrator has none: leave it out, or add --integrator path",
-        ),
+        Integrator::Direct => Some(DENOISE_NEEDS_PATHS),
         Integrator::Path(settings) if settings.max_noise > 0.0 => Some(
             "--denoise needs the same number of samples in all pixels: leave it or --max-noise (max_noise in the scene) out",
         ),

@@ -16,9 +16,11 @@ use super::observability::Observability;
 use super::quality::view_quality;
 use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
+use crate::app::picture::DENOISE_NEEDS_PATHS;
 use crate::app::trust;
 use crate::display::SceneInfo;
 use crate::error::CommandError;
+use crate::viewer::film::passes::has_passes;
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
 };
@@ -40,6 +42,9 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let (request, controller) =
         view_quality(&args.quality_control, &source, requested, animation.is_moving())?;
     let view = request.view;
+    if args.denoise && !has_passes(&view) {
+        return Err(CommandError::WrongInput(DENOISE_NEEDS_PATHS.to_owned()));
+    }
     let compiled = source.compiled()?;
     let info = SceneInfo {
         name: source.name.clone(),
@@ -56,7 +61,8 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let limit = args.frames.map(u64::from);
     // A number of frames is for measuring: they are rendered although nothing changes.
     let policy = RequestPolicy { animation, limit, continuous: args.continuous || limit.is_some() };
-    let config = ViewerConfig { request, camera, policy, log, controller };
+    let denoised = args.denoise;
+    let config = ViewerConfig { request, camera, policy, log, controller, denoised };
     let runtime = super::runtime()?;
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
