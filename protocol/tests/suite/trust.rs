@@ -66,7 +66,7 @@ async fn relay(a: DuplexStream, b: DuplexStream) -> Vec<u8> {
     tokio::join!(forth, back).0
 }
 
-// The clock stands while anything moves: single bytes take longer than the deadline on a busy machine.
+// The clock is paused while anything moves: single bytes take longer than the deadline on a busy machine.
 #[tokio::test(start_paused = true)]
 async fn both_ends_know_the_key_of_the_other_and_a_session_follows() {
     let (trust, master, worker) = farm();

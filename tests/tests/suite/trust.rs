@@ -111,7 +111,7 @@ fn local_workers_of_a_secure_farm_need_no_help() {
 }
 
 #[test]
-fn strangers_are_refused() {
+fn workers_without_the_line_are_refused() {
     let farm = Farm::start(1);
     let line = farm.join_line();
     let (rest, token) = line.rsplit_once(':').unwrap();
@@ -125,8 +125,8 @@ fn strangers_are_refused() {
     let mut plain = worker();
     plain.args(["--master", &format!("127.0.0.1:{}", farm.port), "--no-reconnect"]);
     Running::start(&mut plain).finish().expect_failure(1, &["--join"]);
-    assert!(!farm.frame(0).exists(), "no stranger has rendered");
-    let _honest = farm.worker("honest", &line, &[]);
+    assert!(!farm.frame(0).exists(), "no refused worker has rendered");
+    let _joined = farm.worker("joined", &line, &[]);
     farm.master.finish().expect_success();
 }
 

@@ -1,7 +1,7 @@
 //! Admission of connections before their handshake is complete.
 //!
-//! A stranger must not keep workers out. So a new connection is always looked at, the number of pending ones is bounded for each host and in
-//! all, and a connection that has sent nothing gives way to a newcomer. Connections of this machine have places of their own: the
+//! An unauthenticated peer must not keep workers out. So a new connection is always looked at, the number of pending ones is bounded for each host and in
+//! all, and a connection that has sent nothing gives way to a new one. Connections of this machine have places of their own: the
 //! master's own workers start undisturbed.
 
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ const MAX_PENDING: usize = 64;
 const MAX_PENDING_HERE: usize = 32;
 /// Most connections in their handshake from one other host.
 const MAX_PENDING_OF_HOST: usize = 8;
-/// Time after which a connection that has sent something may give way as well: an honest handshake takes a part of that.
+/// Time after which a connection that has sent something may give way as well: a handshake of a worker takes a part of that.
 const SLOW: Duration = Duration::from_secs(1);
 
 /// The connections in their handshake.

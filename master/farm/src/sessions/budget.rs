@@ -1,4 +1,4 @@
-//! What one session may send beside pixels. Pixels are bounded by leases; everything else costs the master time, log lines or bytes, so
+//! What one session may send in addition to pixels. Pixels are bounded by leases; everything else costs the master time, log lines or bytes, so
 //! it has a budget, and a worker that exceeds it is disconnected.
 
 use std::collections::BTreeMap;
@@ -15,11 +15,11 @@ const REQUESTS_OF_ASSET: u32 = 4;
 /// Assets that one session requests.
 const MAX_ASSETS: usize = 65_536;
 
-/// A worker sends more than any honest one.
+/// A worker sends more than its work needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum OverBudget {
     /// Too many messages.
-    #[error("it sends more than {} messages per second beside pixels", MESSAGES.1)]
+    #[error("it sends more than {} messages per second in addition to pixels", MESSAGES.1)]
     Messages,
     /// Too many failures.
     #[error("it reports more than {} failures per second", FAILURES.1)]

@@ -46,7 +46,7 @@ async fn hundreds_of_silent_connections_keep_no_worker_out() {
     let begun = std::time::Instant::now();
     fake_worker::start(farm.address(), Script::Correct).await;
     until_workers(&farm, 1).await;
-    // Without places that newcomers take over, it waits for several deadlines of one second.
+    // Without places that new connections take over, it waits for several deadlines of one second.
     assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
     render(&mut farm, view()).await;
 }

@@ -27,6 +27,10 @@ pub(crate) struct FarmArgs {
     /// Folder with the key and the token of this master; without it, in the user's state folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) state: Option<PathBuf>,
+    /// Do not announce this master in the local network, where `rayfarm-worker --discover` finds it.
+    #[cfg(feature = "discovery")]
+    #[arg(long)]
+    pub(crate) no_announce: bool,
     /// Number of worker processes that the master starts on this machine.
     #[arg(long, value_name = "N", default_value = "1", value_parser = worker_count)]
     pub(super) local_workers: u32,

@@ -3,10 +3,12 @@
 //! The key and the token are made at the first start that needs them, and stay in the state folder, so that a worker that has joined
 //! once joins again. Their files have mode 0600.
 
+#[cfg(feature = "discovery")]
+mod announcement;
 mod state;
 
 use rayfarm_farm::Entrance;
-use rayfarm_protocol::transport::MasterSecurity;
+use rayfarm_protocol::transport::{MasterSecurity, MasterTrust};
 use tokio_util::sync::CancellationToken;
 
 use crate::app::cli::{FarmArgs, TrustAction, TrustArgs};
@@ -32,9 +34,9 @@ pub(crate) fn security(args: &FarmArgs) -> Result<MasterSecurity, CommandError> 
 }
 
 /// Says how to start workers on other machines, and follows changes of the token. The join line is a secret: it is written to a
-/// terminal and into no file. Call it inside a runtime.
-pub(crate) fn announce(args: &FarmArgs, entrance: &Entrance, stop: &CancellationToken) {
-    let MasterSecurity::Tls(trust) = &entrance.security else { return };
+/// terminal and into no file. Dropping the result withdraws the announcement in the local network. Call it inside a runtime.
+pub(crate) fn announce(args: &FarmArgs, entrance: &Entrance, stop: &CancellationToken) -> Announced {
+    let MasterSecurity::Tls(trust) = &entrance.security else { return Announced::default() };
     if let Ok(state) = MasterState::at(args.state.as_deref()) {
         tokio::spawn(state.follow(trust.clone(), stop.clone()));
     }
@@ -43,6 +45,31 @@ pub(crate) fn announce(args: &FarmArgs, entrance: &Entrance, stop: &Cancellation
         tracing::info!("only machines with this line can join: {}", reachable.command());
     } else {
         tracing::info!("only machines with the join line can join; {}", reachable.for_log());
+    }
+    Announced::of(args, entrance, trust)
+}
+
+/// The announcement of a master in its local network, if there is one. Dropping it withdraws it.
+#[derive(Default)]
+pub(crate) struct Announced {
+    #[cfg(feature = "discovery")]
+    _announcement: Option<announcement::Announcement>,
+}
+
+impl Announced {
+    #[cfg(feature = "discovery")]
+    fn of(args: &FarmArgs, entrance: &Entrance, trust: &MasterTrust) -> Self {
+        if !args.listens_beyond_this_machine() || args.no_announce {
+            return Self::default();
+        }
+        let started = announcement::Announcement::start(entrance.address, trust.key_hash());
+        let failed = |error| tracing::warn!("workers cannot discover this master: {error}");
+        Self { _announcement: started.map_err(failed).ok() }
+    }
+
+    #[cfg(not(feature = "discovery"))]
+    fn of(_args: &FarmArgs, _entrance: &Entrance, _trust: &MasterTrust) -> Self {
+        Self::default()
     }
 }
 

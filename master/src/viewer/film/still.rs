@@ -28,7 +28,7 @@ struct Numbered {
 
 /// The film of an interactive view, if it is at rest and rendered in passes.
 ///
-/// Its pictures are denoised on request, once its guides are there. That takes many times as long as a pass is added, so it runs beside the
+/// Its pictures are denoised on request, once its guides are there. That takes many times as long as a pass is added, so it runs next to the
 /// viewer, one picture at a time: what the film has when a picture is ready is the next one. The film itself is not changed.
 #[derive(Debug)]
 pub(in crate::viewer) struct StillFilm {
@@ -59,7 +59,7 @@ pub(in crate::viewer) enum Added {
     Guide,
 }
 
-/// A picture that was developed beside the viewer.
+/// A picture that was developed next to the viewer.
 #[derive(Debug)]
 pub(in crate::viewer) struct Redeveloped {
     /// Number of its film.
@@ -135,7 +135,7 @@ impl StillFilm {
         Ok(if is_guide { Added::Guide } else { Added::Samples { frame, progress } })
     }
 
-    /// Waits for a picture that is developed beside the viewer. Never returns where none is. Cancel safe.
+    /// Waits for a picture that is developed next to the viewer. Never returns where none is. Cancel safe.
     pub(in crate::viewer) async fn developed(&mut self) -> Redeveloped {
         loop {
             let Some(developing) = &mut self.developing else { return std::future::pending().await };
@@ -193,7 +193,7 @@ impl StillFilm {
         }
     }
 
-    /// Whether a picture is being developed beside the viewer.
+    /// Whether a picture is being developed next to the viewer.
     #[cfg(test)]
     pub(super) fn is_developing(&self) -> bool {
         self.developing.is_some()
@@ -256,7 +256,7 @@ impl Numbered {
         FilmProgress { is_denoised, ..self.pace.progress(&self.target, self.film.error()) }
     }
 
-    /// The picture that the film shows, without most of its noise if that is wanted and the guides are there.
+    /// The picture that the film shows, without most of its noise if that is requested and the guides are there.
     fn develop(&self, denoised: bool) -> Developed {
         let view = self.film.shown(PixelFormat::Rgb8);
         let guides = self.guides.all().filter(|_| denoised && self.can_be_denoised());

@@ -226,7 +226,7 @@ impl Viewer {
         }
     }
 
-    /// Delivers a picture of the film that was developed beside the frame loop, unless the view has changed.
+    /// Delivers a picture of the film that was developed next to the frame loop, unless the view has changed.
     fn deliver_developed(&mut self, picture: Redeveloped) {
         let Redeveloped { film, frame, progress } = picture;
         let answered = self.developing.take();

@@ -163,7 +163,7 @@ impl Requests {
         pass.is_some_and(|pass| self.is_film(pass.film))
     }
 
-    /// Whether a film is of the picture that is being rendered, or was rendered last and is still the wanted one.
+    /// Whether a film is of the picture that is being rendered, or was rendered last and is still the requested one.
     pub(super) fn is_film(&self, number: u64) -> bool {
         self.passes.is_some_and(|passes| passes.film == number)
     }

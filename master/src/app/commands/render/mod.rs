@@ -173,6 +173,7 @@ impl Run {
         let interrupted = runtime.block_on(async { cancelled_by_signals() });
         let local_workers = args.local_workers();
         let mut farm = runtime.block_on(self.start(args, scene, &interrupted))?;
+        let _announced = runtime.block_on(async { trust::announce(args, &farm.entrance(), &interrupted) });
         let mut progress = Progress::new(self.files.count(), farm.entrance(), local_workers);
         runtime.block_on(self.await_workers(&farm, local_workers, &mut progress, &interrupted));
         let (farm, rendered) = match self.passes.take() {
@@ -194,7 +195,6 @@ impl Run {
     ) -> Result<Farm, CommandError> {
         let options = args.options(trust::security(args)?);
         let farm = Farm::start(options, scene).await.map_err(CommandError::failed)?;
-        trust::announce(args, &farm.entrance(), interrupted);
         if let Err(error) = self.observability.begin(&farm, None, interrupted) {
             farm.shut_down().await;
             return Err(error);

@@ -67,6 +67,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
     let (viewer, handle, control) = runtime.block_on(start(&args, source, config, &observability, &stop))?;
+    let _announced = runtime.block_on(async { trust::announce(&args.farm, handle.entrance(), &stop) });
     let statistics = handle.statistics_receiver();
     let rendering = runtime.spawn(async move {
         let (farm, result) = viewer.run(&stop).await;
@@ -91,7 +92,6 @@ async fn start(
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let security = trust::security(&args.farm)?;
     let farm = Farm::start(args.farm.options(security), scene).await.map_err(CommandError::failed)?;
-    trust::announce(&args.farm, &farm.entrance(), stop);
     if let Some(frames) = args.frames {
         farm.expect_frames(frames.into());
     }
