@@ -13,25 +13,32 @@ use super::values::listen_address;
 pub(crate) struct TrustArgs {
     #[command(subcommand)]
     pub(crate) action: TrustAction,
-    /// Address at which the master listens or will listen.
-    #[arg(long, global = true, value_name = "ADDR:PORT", value_parser = listen_address,
-          default_value_t = SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_PORT)))]
-    pub(crate) listen: SocketAddr,
-    /// Folder with the key and the token of this master; without it, in the user's state folder.
-    #[arg(long, global = true, value_name = "DIR")]
-    pub(crate) state: Option<PathBuf>,
 }
 
 /// Actions of `trust`.
-#[derive(Clone, Copy, Debug, Subcommand)]
+#[derive(Clone, Debug, Subcommand)]
 pub(crate) enum TrustAction {
     /// Print the command that starts a worker on another machine, one line for each address of this machine. The line contains a
     /// secret.
-    Show,
-    /// Make a new token: connected workers stay, and the old join line is refused.
+    Show(MasterArgs),
+    /// Make a new token: connected workers stay, and the old join line is refused. Print the new line.
     Rotate {
         /// Make a new key as well: no worker that has joined before trusts this master any more.
         #[arg(long)]
         key: bool,
+        #[command(flatten)]
+        master: MasterArgs,
     },
+}
+
+/// The master whose join line is meant.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct MasterArgs {
+    /// Address at which the master listens or will listen.
+    #[arg(long, value_name = "ADDR:PORT", value_parser = listen_address,
+          default_value_t = SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_PORT)))]
+    pub(crate) listen: SocketAddr,
+    /// Folder with the key and the token of the master; without it, in the user's state folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
 }

@@ -78,21 +78,19 @@ impl Announced {
 /// # Errors
 /// A state folder or a file in it that cannot be used.
 pub(crate) fn run(args: &TrustArgs) -> Result<(), CommandError> {
-    let state = MasterState::at(args.state.as_deref())?;
-    match args.action {
-        TrustAction::Show => {}
-        TrustAction::Rotate { key } => {
-            state.rotate(key)?;
-            let effect = if key {
-                "the key and the token are new: masters that run keep the old key until they end"
-            } else {
-                "the token is new: connected workers stay, and the old join line is refused"
-            };
-            tracing::info!("{effect}");
-        }
+    let (TrustAction::Show(master) | TrustAction::Rotate { master, .. }) = &args.action;
+    let state = MasterState::at(master.state.as_deref())?;
+    if let TrustAction::Rotate { key, .. } = args.action {
+        state.rotate(key)?;
+        let effect = if key {
+            "the key and the token are new: masters that run keep the old key until they end"
+        } else {
+            "the token is new: connected workers stay, and the old join line is refused"
+        };
+        tracing::info!("{effect}");
     }
     let security = MasterSecurity::Tls(state.trust()?);
-    let reachable = Entrance { address: args.listen, security }.reachable();
+    let reachable = Entrance { address: master.listen, security }.reachable();
     for command in reachable.commands() {
         println!("{command}");
     }
