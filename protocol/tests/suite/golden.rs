@@ -26,8 +26,8 @@ async fn golden<M: Message + PartialEq + std::fmt::Debug>(message: M, parts: &[&
 }
 
 #[test]
-fn the_golden_bytes_are_those_of_version_6() {
-    assert_eq!(PROTOCOL_VERSION, 6);
+fn the_golden_bytes_are_those_of_version_7() {
+    assert_eq!(PROTOCOL_VERSION, 7);
 }
 
 #[tokio::test]

@@ -70,7 +70,7 @@ async fn relay(a: DuplexStream, b: DuplexStream) -> Vec<u8> {
 #[tokio::test(start_paused = true)]
 async fn both_ends_know_the_key_of_the_other_and_a_session_follows() {
     let (trust, master, worker) = farm();
-    for width in [1, 100, PIPE_BYTES] {
+    for width in [16, 100, PIPE_BYTES] {
         let (a, b) = duplex(width);
         let (hello, expected) = (hello(), worker.key_hash());
         let decide = |_: &Hello, key: Option<KeyHash>| {
