@@ -52,7 +52,7 @@ pub(in crate::viewer) enum Added {
     /// Samples were added.
     Samples {
         /// The picture that the film shows; `None` if it follows from [`StillFilm::developed`].
-        frame: Option<FinishedFrame>,
+        frame: Option<Box<FinishedFrame>>,
         progress: FilmProgress,
     },
     /// A guide was added, after which a picture may follow from [`StillFilm::developed`].
@@ -132,7 +132,7 @@ impl StillFilm {
         if is_later {
             self.develop_again();
         }
-        Ok(if is_guide { Added::Guide } else { Added::Samples { frame, progress } })
+        Ok(if is_guide { Added::Guide } else { Added::Samples { frame: frame.map(Box::new), progress } })
     }
 
     /// Waits for a picture that is developed next to the viewer. Never returns where none is. Cancel safe.

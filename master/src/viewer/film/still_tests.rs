@@ -29,7 +29,7 @@ async fn add_samples(still: &mut StillFilm, first: u32, samples: u32) -> Option<
     match add(still, pass(1, Part::Samples { first, samples })).await {
         Added::Samples { frame, progress } => {
             assert!(progress.samples == first + samples && !progress.is_denoised);
-            frame
+            frame.map(|frame| *frame)
         }
         Added::Guide => panic!("samples are no guide"),
     }

@@ -213,7 +213,7 @@ impl Viewer {
                     self.requests.complete_picture(&self.farm);
                 }
                 match frame {
-                    Some(frame) => self.deliver(frame, Some(progress), answered),
+                    Some(frame) => self.deliver(*frame, Some(progress), answered),
                     None => self.developing = Some(answered),
                 }
                 self.check_film();

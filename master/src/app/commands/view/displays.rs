@@ -19,7 +19,7 @@ pub(super) struct OpenDisplays {
 /// An open display.
 enum OpenDisplay {
     /// The window, which must run on the main thread.
-    Window(WindowDisplay),
+    Window(Box<WindowDisplay>),
     /// Any other display, with its name.
     Other(&'static str, RunDisplay),
 }
@@ -54,7 +54,7 @@ impl OpenDisplays {
     ) -> Result<Self, CommandError> {
         let open = |kind: &DisplayKind| match kind {
             DisplayKind::Window => WindowDisplay::open(info.clone(), width, height)
-                .map(OpenDisplay::Window)
+                .map(|window| OpenDisplay::Window(Box::new(window)))
                 .map_err(|problem| no_window(&problem, scene)),
             #[cfg(feature = "terminal")]
             DisplayKind::Terminal => terminal(args),
