@@ -157,9 +157,8 @@ struct Conic([f64; 6]);
 impl Conic {
     fn new(directions: &[DVec3; 3], across: &[DVec3; 3], radius: f64) -> Self {
         let square = radius * radius;
-        let product = |i: usize, j: usize| {
-            square * directions[i].dot(directions[j]) - across[i].dot(across[j])
-        };
+        let product =
+            |i: usize, j: usize| square * directions[i].dot(directions[j]) - across[i].dot(across[j]);
         Self([
             product(0, 0),
             2.0 * product(0, 1),
@@ -184,3 +183,6 @@ impl Conic {
         [c + by, cx, cy, cxx, cxy, cyy].map(|factor| factor as f32)
     }
 }
+
+#[cfg(test)]
+mod tests;
