@@ -72,10 +72,7 @@ impl Projection {
 
     /// The volume in (a, b, g) of a unit cube of the projected space.
     pub(crate) fn volume(&self) -> f64 {
-        let [a, b, g] = three!(i => {
-            let [x, y, z, _] = self.exact.0[i];
-            DVec3::new(x, y, z)
-        });
+        let [a, b, g] = self.factors();
         a.dot(b.cross(g)).abs()
     }
 
@@ -114,6 +111,14 @@ impl Projection {
             size[i] = row[0].abs() * reach.x + row[1].abs() * reach.y + row[2].abs() * reach.z + row[3].abs();
         }
         Projection::with_sizes(exact, size, self.parallel)
+    }
+
+    /// The factors of x, y and z in a, b and g.
+    pub(crate) fn factors(&self) -> [DVec3; 3] {
+        three!(i => {
+            let [x, y, z, _] = self.exact.0[i];
+            DVec3::new(x, y, z)
+        })
     }
 
     /// (a, b, g) of a point in `f64`, within [`Projection::exact_error`].

@@ -3,6 +3,7 @@
 //! The closeness z of a hit at t is 1 / t for rays from a point, and -t for parallel rays; see `rays::Projection`. Parallel rays
 //! start at depth 0, and what is behind has a positive z.
 
+use super::outline::PictureLines;
 use super::projected_triangles::{At, ProjectedTriangles};
 use super::query::{TileQuery, cover_nearest_first, cover_projected};
 use super::traversal::{NodeFilter, Traversal};
@@ -94,7 +95,8 @@ pub(crate) fn find_closest<S: Simd, T: PictureTile + ?Sized>(
     let picture = Picture { projection: tile.projection(), rays };
     let mut query = ClosestQuery { tile, item: NO_ITEM, cutouts: &[], closeness, hits };
     let mut traversal = Traversal::new(&frame.nodes, &[], picture, scene_stack).around_last();
-    while let Some((leaf, _)) = traversal.next(simd, &query) {
+    let mut lines = None;
+    while let Some((leaf, blocks)) = traversal.next(simd, &query) {
         for &item in frame.items_of(leaf) {
             query.item = item;
             query.cutouts = frame.cutouts_of(item);
@@ -110,13 +112,17 @@ pub(crate) fn find_closest<S: Simd, T: PictureTile + ?Sized>(
                     projected.project_exactly(0, tile.projection(), corners, rays);
                     cover_projected(simd, projected, 0, ALL_BLOCKS, &mut query);
                 }
-                Item::Sphere(_) | Item::Disk(_) => query.test_every_ray(simd),
+                Item::Sphere(index) => {
+                    let lines = lines.get_or_insert_with(|| PictureLines::new(tile.projection(), rays));
+                    query.cover_sphere(simd, lines, index, blocks);
+                }
+                Item::Disk(_) => query.test_every_ray(simd, blocks),
             }
         }
     }
     for plane in 0..frame.planes.len() as u32 {
         query.item = frame.items.first_plane() + plane;
-        query.test_every_ray(simd);
+        query.test_every_ray(simd, ALL_BLOCKS);
     }
     if hits.iter().any(|hits| hits.coincident != 0) {
         resolve_coincident(tile, hits);
@@ -163,13 +169,36 @@ struct Nearest<S: Simd> {
 impl<T: PictureTile + ?Sized> ClosestQuery<'_, '_, T> {
     /// Tests an item without lines in the picture, exactly, ray by ray.
     #[inline(always)]
-    fn test_every_ray<S: Simd>(&mut self, simd: S) {
-        for block in 0..BLOCKS {
+    fn test_every_ray<S: Simd>(&mut self, simd: S, blocks: u32) {
+        for block in each_bit(blocks) {
             for lane in each_bit(self.tile.live(block)) {
                 self.test_exactly(block, lane, 0);
             }
         }
-        self.closeness.settle(simd, ALL_BLOCKS);
+        self.closeness.settle(simd, blocks);
+    }
+
+    /// Tests a sphere against some blocks: exactly, for the rays inside its outline for which it is not farther for certain.
+    #[inline(never)]
+    fn cover_sphere<S: Simd>(&mut self, simd: S, lines: &PictureLines<'_>, index: usize, blocks: u32) {
+        let outline = lines.outline(&self.tile.frame().spheres[index]);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut tested = 0;
+                for block in each_bit(blocks) {
+                    let [may_hit, _] = outline.at(simd, self.tile.picture(), block);
+                    let low = self.closeness.low[block].load(simd);
+                    let farther = bits(splat(simd, outline.z_high).simd_lt(low));
+                    let rays = may_hit & !farther & self.tile.live(block);
+                    for lane in each_bit(rays) {
+                        self.test_exactly(block, lane, 0);
+                    }
+                    tested |= u32::from(rays != 0) << block;
+                }
+                self.closeness.settle(simd, tested);
+            },
+        );
     }
 
     /// Tests exactly whether a primitive is the closest hit of a ray.

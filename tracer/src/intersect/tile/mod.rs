@@ -10,6 +10,7 @@
 //!   NodeTester           boxes outside the tile, or behind all of its hits, are dropped                 projected_boxes.rs
 //!   Traversal            the tree, nearest first or level by level                                      traversal.rs
 //!   ProjectedTriangles   sixteen triangles at once become lines and a depth plane in the picture        projected_triangles.rs
+//!   Outline              a sphere becomes a conic and a range of closeness in the picture                outline.rs
 //!   TileQuery            the remaining triangles against blocks of sixteen rays                         query.rs
 //! ```
 //!
@@ -23,6 +24,7 @@
 mod closest;
 mod light_projection;
 mod occlusion;
+mod outline;
 mod points;
 mod projected_boxes;
 mod projected_triangles;

@@ -1,10 +1,11 @@
 //! Occlusion of the points of a tile: boxes and triangles between them and a light.
 
 use super::Picture;
+use super::outline::PictureLines;
 use super::points::Points;
 use super::projected_triangles::{At, ProjectedTriangles};
 use super::query::{TileQuery, cover_any_order, cover_projected};
-use super::traversal::{Frontier, NodeFilter};
+use super::traversal::{Frontier, Leaf, NodeFilter};
 use crate::compile::Item;
 use crate::intersect::cutout;
 use crate::rays::{ALL_BLOCKS, BLOCKS, NO_ITEM, PrimitiveId, Projection, RaySource, ShadowTile, TileRays};
@@ -48,12 +49,14 @@ impl<'a> OcclusionQuery<'a> {
         !self.tile.frame.is_clear(item)
     }
 
-    /// Tests the selected item against all open points.
+    /// Tests the selected item, of a leaf of the scene's tree, against all open points.
     #[inline(always)]
-    pub(super) fn cover_item<S: Simd>(
+    pub(super) fn cover_item<'p, S: Simd>(
         &mut self,
         simd: S,
-        projection: &Projection,
+        leaf: Leaf,
+        projection: &'p Projection,
+        lines: &mut Option<PictureLines<'p>>,
         frontier: &mut Frontier,
         projected: &mut ProjectedTriangles,
     ) {
@@ -69,13 +72,50 @@ impl<'a> OcclusionQuery<'a> {
                 projected.project_exactly(0, projection, corners, self.rays);
                 cover_projected(simd, projected, 0, ALL_BLOCKS, self);
             }
-            Item::Sphere(_) | Item::Disk(_) => self.test_item(),
+            Item::Sphere(index) => {
+                let lines = lines.get_or_insert_with(|| PictureLines::new(projection, self.rays));
+                self.cover_sphere(simd, lines, index, leaf);
+            }
+            Item::Disk(_) => self.test_item(leaf.blocks),
         }
     }
 
-    /// Tests the selected item exactly, for every open point.
-    pub(super) fn test_item(&mut self) {
-        for block in 0..BLOCKS {
+    /// Tests a sphere against the open points of some blocks. Points whose rays pass through it, and that are behind all of
+    /// it, are occluded.
+    #[inline(never)]
+    fn cover_sphere<S: Simd>(&mut self, simd: S, lines: &PictureLines<'_>, index: usize, leaf: Leaf) {
+        let outline = lines.outline(&self.tile.frame.spheres[index]);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for block in each_bit(leaf.blocks) {
+                    let open = self.points.open_before(simd, block, leaf.z_most);
+                    if open == 0 {
+                        continue;
+                    }
+                    let [may_hit, inside] = outline.at(simd, self.rays, block);
+                    let (low, high) = (self.points.low[block].load(simd), self.points.high[block].load(simd));
+                    let mut before = bits(splat(simd, outline.z_low).simd_gt(high));
+                    if self.tile.t_max.is_finite() {
+                        // Only the exact test distinguishes a sphere next to the light from the light.
+                        let end = low * splat(simd, BEFORE_LIGHT);
+                        before &= bits(splat(simd, outline.z_high).simd_lt(end));
+                    }
+                    let certain = open & inside & before;
+                    if certain != 0 {
+                        self.mark(block, certain);
+                    }
+                    for lane in each_bit(open & may_hit & !certain) {
+                        self.test_exactly(block, lane, 0);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Tests the selected item exactly, for every open point of some blocks.
+    pub(super) fn test_item(&mut self, blocks: u32) {
+        for block in each_bit(blocks) {
             for lane in each_bit(self.points.open[block]) {
                 self.test_exactly(block, lane, 0);
             }

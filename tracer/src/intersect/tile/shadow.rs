@@ -13,7 +13,7 @@
 use super::light_projection::Extent;
 use super::occlusion::OcclusionQuery;
 use super::{Picture, Scratch};
-use crate::rays::{BLOCKS, ShadowTile};
+use crate::rays::{ALL_BLOCKS, BLOCKS, ShadowTile};
 use crate::simd::Simd;
 
 /// What is between the points of a tile and a light.
@@ -59,19 +59,20 @@ impl ShadowTile<'_> {
         let picture = Picture { projection: &projection, rays };
         let mut query = OcclusionQuery::new(self, rays, points);
         scene_frontier.find(simd, &self.frame.nodes, picture, &query);
-        for leaf in &scene_frontier.leaves {
+        let mut lines = None;
+        for &leaf in &scene_frontier.leaves {
             if leaf.z_most < query.points.least_of_all {
                 continue;
             }
             for &item in self.frame.items_of(leaf.index) {
                 if query.turn_to(item) {
-                    query.cover_item(simd, &projection, mesh_frontier, projected);
+                    query.cover_item(simd, leaf, &projection, &mut lines, mesh_frontier, projected);
                 }
             }
         }
         for plane in 0..self.frame.planes.len() as u32 {
             if query.turn_to(self.frame.items.first_plane() + plane) {
-                query.test_item();
+                query.test_item(ALL_BLOCKS);
             }
         }
     }
