@@ -41,6 +41,7 @@ pub mod testing;
 
 mod admission;
 mod assets;
+mod bucket;
 mod control;
 mod driver;
 mod error;

@@ -17,7 +17,7 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-use crate::admission::{Admission, Place};
+use crate::admission::{Admission, Place, RefusalLog};
 use crate::driver::{AnswerError, Driver};
 use crate::sessions::Session;
 use crate::sessions::budget::{Budget, OverBudget};
@@ -51,6 +51,7 @@ pub(crate) async fn accept(
     stop: CancellationToken,
 ) {
     let admission = Admission::default();
+    let refusals = Arc::new(RefusalLog::new(Instant::now()));
     loop {
         let accepted = tokio::select! {
             () = stop.cancelled() => return,
@@ -60,13 +61,13 @@ pub(crate) async fn accept(
             Ok((stream, address)) => {
                 // Without a place the connection is closed: its host has as many that are not silent.
                 let Some(place) = admission.enter(address.ip()) else { continue };
-                let (driver, stop) = (driver.clone(), stop.clone());
+                let (driver, stop, refusals) = (driver.clone(), stop.clone(), refusals.clone());
                 sessions.spawn(async move {
                     let session = async {
                         let admitted = tokio::select! {
                             biased;
                             () = place.closed() => None,
-                            admitted = shake_hands(&driver, stream, address, &place) => admitted,
+                            admitted = shake_hands(&driver, stream, address, &place, &refusals) => admitted,
                         };
                         drop(place);
                         if let Some(admitted) = admitted {
@@ -101,6 +102,7 @@ async fn shake_hands(
     stream: TcpStream,
     address: SocketAddr,
     place: &Place,
+    refusals: &RefusalLog,
 ) -> Option<Admitted> {
     if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
@@ -131,7 +133,7 @@ async fn shake_hands(
             None
         }
         Err(error) => {
-            tracing::warn!("{address} is refused: {error}");
+            refusals.log(address, &error);
             None
         }
     }

@@ -4,6 +4,8 @@
 //! all, and a connection that has sent nothing gives way to a new one. Connections of this machine have places of their own: the
 //! master's own workers start undisturbed.
 
+mod refusal_log;
+
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,6 +15,8 @@ use rayfarm_scheduler::HostId;
 use tokio_util::sync::CancellationToken;
 
 use crate::sessions::identity::host;
+
+pub(crate) use refusal_log::RefusalLog;
 
 /// Most connections in their handshake from other machines, and from this one.
 const MAX_PENDING: usize = 64;

@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use rayfarm_protocol::{AssetId, ToMaster};
 
+use crate::bucket::Bucket;
+
 /// Small messages at once, and per second. A scene with thousands of textures is requested at once.
 const MESSAGES: (f64, f64) = (8192.0, 200.0);
 /// Failures at once, and per second: at most one for each announced frame, and a master announces few frames beyond 60 a second.
@@ -37,15 +39,6 @@ pub(crate) struct Budget {
     requests: BTreeMap<AssetId, u32>,
 }
 
-/// A token bucket: a number at once, and a rate at which it fills again.
-#[derive(Debug)]
-struct Bucket {
-    most: f64,
-    per_second: f64,
-    left: f64,
-    at: Instant,
-}
-
 impl Budget {
     pub(crate) fn new(now: Instant) -> Self {
         Self {
@@ -74,23 +67,6 @@ impl Budget {
             }
             _ => Ok(()),
         }
-    }
-}
-
-impl Bucket {
-    fn new((most, per_second): (f64, f64), at: Instant) -> Self {
-        Self { most, per_second, left: most, at }
-    }
-
-    fn take(&mut self, now: Instant) -> Option<()> {
-        let filled = now.duration_since(self.at).as_secs_f64() * self.per_second;
-        self.left = (self.left + filled).min(self.most);
-        self.at = now;
-        if self.left < 1.0 {
-            return None;
-        }
-        self.left -= 1.0;
-        Some(())
     }
 }
 
