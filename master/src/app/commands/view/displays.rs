@@ -21,6 +21,10 @@ enum OpenDisplay {
     /// The window, which must run on the main thread.
     Window(Box<WindowDisplay>),
     /// Any other display, with its name.
+    #[cfg_attr(
+        not(feature = "terminal"),
+        allow(dead_code, reason = "the window is the only display of this build")
+    )]
     Other(&'static str, RunDisplay),
 }
 
