@@ -116,11 +116,12 @@ fn sampling(setting: &Setting) -> Effect {
 
 #[cfg(test)]
 mod tests {
-    use rayfarm_tracer::scene::{FrameView, RenderScale};
+    use rayfarm_tracer::scene::{FrameView, PathSettings, RenderScale};
 
     use super::*;
     use crate::measure::tradeoff::setting::MeasuredSetting;
     use crate::measure::tradeoff::table::Table;
+    use crate::viewer::film::passes::while_moving;
 
     const TABLES: [&[u8]; 5] = [
         include_bytes!("../../../../models/tradeoff/room.csv"),
@@ -220,6 +221,20 @@ mod tests {
         let first = wanted(16).at_most(&first.setting);
         assert!(first.view.quality.adaptive && first.view.samples == 16, "{first:?}");
         assert_eq!(first.scale, RenderScale::Full);
+    }
+
+    /// A moving picture of paths has one sample, so that its rungs are scales. Neither depth nor roulette has a general effect.
+    #[test]
+    fn moving_pictures_of_paths_have_rungs_of_all_scales_and_one_sample() {
+        let integrator = Integrator::Path(PathSettings::default());
+        let view = FrameView { integrator, ..wanted(64).view };
+        let moving = while_moving(&ViewRequest { view, scale: RenderScale::Full });
+        let ladder = ladder(&rayfarm_farm::testing::test_scene::scene(), &moving);
+        let rungs: Vec<ViewRequest> =
+            ladder.rungs().iter().map(|rung| moving.at_most(&rung.setting)).collect();
+        assert!(rungs.iter().all(|rung| rung.view.samples == 1 && rung.view.integrator == integrator));
+        assert!(RenderScale::ALL.iter().all(|scale| rungs.iter().any(|rung| rung.scale == *scale)));
+        assert_eq!(rungs.len(), RenderScale::ALL.len());
     }
 
     #[test]
