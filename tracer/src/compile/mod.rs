@@ -5,11 +5,13 @@
 //!   bounds       placements of models, bounds of items
 //!   attributes   vertex attributes that the materials of a model use
 //!   solids       meshes that bound volumes
+//!   motion       objects that move while the shutter is open
 //! ```
 
 mod attributes;
 mod bounds;
 mod items;
+mod motion;
 mod solids;
 
 use std::collections::BTreeMap;
@@ -27,6 +29,7 @@ use attributes::{attribute_uses, uses_uvs};
 pub(crate) use bounds::{disk_reach, orientation, transformed_bounds};
 use bounds::{relative_boxes, world_bounds};
 pub(crate) use items::{Item, Items};
+pub(crate) use motion::moving_item;
 pub(crate) use solids::Solid;
 
 /// Reasons why a scene cannot be traced.
@@ -94,6 +97,8 @@ pub struct CompiledScene {
     features: SceneFeatures,
     /// The scene as the direct integrator shows it, where that differs; made by its first frame.
     shown_directly: OnceLock<Option<Arc<CompiledScene>>>,
+    /// The same with a tree without the items that move, if any do.
+    without_moving: Option<Arc<CompiledScene>>,
 }
 
 impl CompiledScene {
@@ -139,11 +144,29 @@ impl CompiledScene {
         let tree = bvh::build_wide(&relative_boxes(&boxes, bounds), 1, BuildQuality::Default, cancelled)?;
         let features = SceneFeatures::of(&scene);
         let shown_directly = OnceLock::new();
-        Ok(Self { scene, meshes, attributes, solids, textures, tree, bounds, features, shown_directly })
+        let without_moving = None;
+        let mut compiled = Self {
+            scene,
+            meshes,
+            attributes,
+            solids,
+            textures,
+            tree,
+            bounds,
+            features,
+            shown_directly,
+            without_moving,
+        };
+        compiled.without_moving = motion::without_moving(&compiled, &boxes, cancelled)?;
+        Ok(compiled)
     }
 
-    /// The scene for the frames of a view: with its materials as the direct integrator shows them, if it is the one.
+    /// The scene for the frames of a view: with its materials as the direct integrator shows them, if it is the one; with a tree without
+    /// the items that move, if the view shows their motion.
     pub(crate) fn for_view(self: Arc<Self>, view: &FrameView) -> Arc<Self> {
+        if let Some(still) = self.without_moving.as_ref().filter(|_| view.shows_motion()) {
+            return Arc::clone(still);
+        }
         if !self.features.metallic_roughness || !view.shows_materials_directly() {
             return self;
         }

@@ -60,6 +60,9 @@ impl Few {
             Self { triangles: Vec::new(), spheres: Vec::new(), drift: (4.0 * frame.coarsest) as f32 };
         let mut previous = [DVec3::ZERO; 3];
         for item in items {
+            if frame.motions.as_ref().is_some_and(|motions| motions.of(item).is_some()) {
+                continue;
+            }
             match frame.items.get(item) {
                 Item::Sphere(index) => {
                     let sphere = &frame.spheres[index];

@@ -8,6 +8,7 @@
 //!   camera     pixels to rays, and the camera's map from eye space to its picture
 //!   affine     the maps
 //!   instance   placed meshes
+//!   motion     objects that move while the shutter is open
 //!   passage    how light passes items along shadow rays
 //!   rounding   error bounds of placed geometry
 //!   few        the primitives of scenes with few of them
@@ -19,6 +20,7 @@ mod affine;
 mod camera;
 mod few;
 mod instance;
+mod motion;
 mod passage;
 mod rounding;
 mod sources;
@@ -45,6 +47,8 @@ pub(crate) use camera::{CameraRays, FisheyeRay, FisheyeRays, ParallelRays, Pinho
 pub(crate) use few::{Few, FewSphere, FewTriangle};
 pub(crate) use instance::Instance;
 use instance::ToEye;
+use motion::Sweep;
+pub(crate) use motion::{Motions, MovingItem, Pose};
 use passage::Passage;
 use rounding::placement_rounding;
 pub(crate) use rounding::{F64_ERROR, corner_rounding, mesh_rounding};
@@ -78,6 +82,10 @@ pub struct PreparedFrame {
     pub(crate) light_table: Option<LightTable>,
     /// The volumes; only in frames of the path integrator.
     pub(crate) volumes: Vec<EyeVolume>,
+    /// The items that move while the shutter is open, if the frame shows their motion: they are in no other structure.
+    pub(crate) motions: Option<Box<Motions>>,
+    /// Whether a model that does not move is all there is to hit, apart from planes.
+    pub(crate) is_single_model: bool,
     /// The background as rays of the camera see it.
     pub(crate) seen_background: Background,
     /// Sine and cosine of the rotation of a sky.
@@ -128,7 +136,8 @@ impl PreparedFrame {
         go_on(cancelled)?;
         let scene = scene.for_view(view);
         let source = scene.scene();
-        let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera) };
+        let sweeps = motion::sweeps(&scene, view);
+        let to_eye = ToEye { eye: view.camera.position, unit: unit_of(&scene, &view.camera, &sweeps) };
         let rays = CameraRays::new(view, 1.0 / to_eye.unit);
         let to_picture = rays.picture_map();
         let mut instances: Vec<Instance> = source
@@ -141,6 +150,7 @@ impl PreparedFrame {
             })
             .collect();
         go_on(cancelled)?;
+        let motions = Motions::new(&sweeps, &to_eye, cancelled)?;
         let (triangles, disks, planes) =
             (triangles(source, &to_eye), disks(source, &to_eye), planes(source, &to_eye));
         let flat = disks.iter().map(|disk| &disk.plane).chain(&planes);
@@ -162,6 +172,10 @@ impl PreparedFrame {
             few: None,
             light_table: None,
             volumes: Vec::new(),
+            is_single_model: source.models.len() == 1
+                && Items::of(source).range().len() == 1
+                && motions.is_none(),
+            motions,
             seen_background: seen_background(source),
             sky_rotation: sky_rotation(source),
             nodes: Vec::new(),
@@ -310,8 +324,9 @@ impl PreparedFrame {
 
 /// World units per eye unit: the power of two next to the distance from the camera to the far end of all finite primitives.
 /// Scaling the world by a power of two scales the unit by the same factor.
-fn unit_of(scene: &CompiledScene, camera: &Camera) -> f64 {
-    let reach = match scene.bounds() {
+fn unit_of(scene: &CompiledScene, camera: &Camera, sweeps: &[Sweep]) -> f64 {
+    let swept = sweeps.iter().map(|sweep| sweep.bounds);
+    let reach = match scene.bounds().into_iter().chain(swept).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) {
         Some((lo, hi)) => (lo - camera.position).abs().max((hi - camera.position).abs()).max_element(),
         None => (camera.look_at - camera.position).length(),
     };

@@ -64,13 +64,39 @@ impl PreparedFrame {
         t_max: f64,
         starts_on: Option<PrimitiveId>,
     ) -> (PrimitiveId, bool) {
+        self.preferred_by(ray, nearest, t_max, starts_on, |query| self.search_all(ray, query))
+    }
+
+    /// [`PreparedFrame::preferred`] of the hits of the nearest hit's item.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn preferred_of_item(
+        &self,
+        ray: &Ray,
+        nearest: PrimitiveId,
+        t_max: f64,
+        starts_on: Option<PrimitiveId>,
+    ) -> (PrimitiveId, bool) {
+        let item = nearest.item;
+        self.preferred_by(ray, nearest, t_max, starts_on, |query| self.search_all_of(item, ray, query))
+    }
+
+    #[inline(always)]
+    fn preferred_by(
+        &self,
+        ray: &Ray,
+        nearest: PrimitiveId,
+        t_max: f64,
+        starts_on: Option<PrimitiveId>,
+        search: impl FnOnce(&mut Coincident<'_>),
+    ) -> (PrimitiveId, bool) {
         let Some(hit) = self.hit_of(ray, nearest, starts_on) else { return (nearest, false) };
         let crossing = self.crossing(ray, nearest, hit.t);
         let limit = hit.t + self.slack_of(ray, &crossing, hit.t);
         let nearest = CrossedHit { hit, crossing };
         let mut query =
             Coincident { frame: self, ray, t_max, starts_on, limit, nearest, best: nearest, others: false };
-        self.search_all(ray, &mut query);
+        search(&mut query);
         (query.best.hit.primitive, query.others)
     }
 

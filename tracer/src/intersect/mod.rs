@@ -24,6 +24,6 @@ mod volumes;
 mod world;
 
 pub(crate) use exact::Hit;
-pub(crate) use single::Crossings;
+pub(crate) use single::{Crossings, TimedRay};
 pub(crate) use volumes::VolumeSections;
 pub use world::{Primitive, RayHit, RaySegment};

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Hit;
+use super::{Hit, TimedRay};
 use crate::compile::Item;
 use crate::frame::PreparedFrame;
 use crate::rays::{HitBlock, PrimitiveId, RayBatch, RayBlock, RaySource};
@@ -60,17 +60,23 @@ impl PreparedFrame {
     /// Of surfaces that coincide within the rounding of their corners, the same one is hit everywhere: one of an item
     /// before one of an infinite plane, then one that faces the ray before one seen from behind, then the first in the
     /// scene: models before spheres before triangles before disks before planes, and in a mesh the first triangle of its file.
+    /// Objects that move are where they are when the shutter opens.
     ///
     /// Returns `None` also for an origin or a direction that is not finite, or a direction whose largest component is not
     /// within 1e-100 to 1e100.
     pub fn closest_hit(&self, origin: DVec3, direction: DVec3, t_max: f64) -> Option<RayHit> {
         let ray = self.to_eye(origin, direction)?;
-        Some(self.in_scene(&self.closest(&ray, t_max, None)?))
+        let still = self.closest(&ray, t_max, None);
+        let moving = self.closest_at_opening(TimedRay { ray, t_max, starts_on: None, time: 0.0 }, || still);
+        Some(self.in_scene(&moving.or(still)?))
     }
 
     /// Whether there is a hit with 0 < t < `t_max`. The same as [`PreparedFrame::closest_hit`], in less time.
     pub fn any_hit(&self, origin: DVec3, direction: DVec3, t_max: f64) -> bool {
-        self.to_eye(origin, direction).is_some_and(|ray| self.hits_anything(&ray, t_max, None))
+        self.to_eye(origin, direction).is_some_and(|ray| {
+            self.hits_anything(&ray, t_max, None)
+                || self.hits_moving(&TimedRay { ray, t_max, starts_on: None, time: 0.0 }, false)
+        })
     }
 
     /// The closest hits of up to sixteen rays of any origins and directions, each that of [`PreparedFrame::closest_hit`],
@@ -79,12 +85,24 @@ impl PreparedFrame {
         let block = self.block_of(rays);
         let mut hits = HitBlock::NONE;
         self.closest_hits_of(&block, u32::MAX, &mut hits);
-        std::array::from_fn(|lane| Some(self.in_scene(&self.hit_in(&block, &hits, lane)?)))
+        std::array::from_fn(|lane| {
+            let still = self.hit_in(&block, &hits, lane);
+            let moving = self.closest_at_opening(at_opening(&block, lane)?, || still);
+            Some(self.in_scene(&moving.or(still)?))
+        })
     }
 
     /// Bits of those of up to sixteen rays that hit anything: [`PreparedFrame::any_hit`] of each.
     pub fn any_hits(&self, rays: &[RaySegment]) -> u32 {
-        self.any_hits_of(&self.block_of(rays))
+        let block = self.block_of(rays);
+        let of_moving = (0..LANES)
+            .filter(|&lane| at_opening(&block, lane).is_some_and(|ray| self.hits_moving(&ray, false)));
+        of_moving.fold(self.any_hits_of(&block), |hits, lane| hits | 1 << lane)
+    }
+
+    /// The closest hit of an item that moves, as it is when the shutter opens, if it is before a still one.
+    fn closest_at_opening(&self, ray: TimedRay, still: impl FnOnce() -> Option<Hit>) -> Option<Hit> {
+        self.closest_moving(&ray, still).map(|moving| moving.hit)
     }
 
     fn block_of(&self, rays: &[RaySegment]) -> RayBlock<'_> {
@@ -141,4 +159,10 @@ impl PreparedFrame {
         };
         PrimitiveId { item, triangle: 0 }
     }
+}
+
+/// A live ray of a block when the shutter opens.
+fn at_opening(block: &RayBlock<'_>, lane: usize) -> Option<TimedRay> {
+    let (ray, t_max, starts_on) = (block.ray(0, lane), block.t_max(lane), block.starts_on(0, lane));
+    (block.live(0) >> lane & 1 == 1).then_some(TimedRay { ray, t_max, starts_on, time: 0.0 })
 }

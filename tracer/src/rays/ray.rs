@@ -4,7 +4,7 @@ use std::ops::AddAssign;
 
 use glam::DVec3;
 
-use crate::frame::{Instance, PreparedFrame};
+use crate::frame::{Instance, Pose, PreparedFrame};
 
 /// A ray o + t d in eye space; d need not be a unit vector.
 #[derive(Clone, Copy, Debug)]
@@ -60,5 +60,12 @@ impl Instance {
             origin: self.inverse * (ray.origin - self.translation),
             direction: self.inverse * ray.direction,
         }
+    }
+}
+
+impl Pose {
+    /// A ray as the object at rest meets it, with the same t.
+    pub(crate) fn to_rest(&self, ray: &Ray) -> Ray {
+        Ray { origin: self.point_to_rest(ray.origin), direction: self.direction_to_rest(ray.direction) }
     }
 }

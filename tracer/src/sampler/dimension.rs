@@ -27,6 +27,8 @@ impl Dimension {
     pub(crate) const PIXEL: Self = Self(0);
     /// The place on the lens.
     pub(crate) const LENS: Self = Self(1);
+    /// First the time between the opening and the closing of the shutter.
+    pub(crate) const TIME: Self = Self(2);
     /// Dimensions before those of the first vertex.
     const OF_CAMERA: u32 = 4;
 

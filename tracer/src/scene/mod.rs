@@ -18,7 +18,7 @@ mod validate;
 
 pub use data::{
     Attenuation, Background, Camera, CameraKind, Disk, FovAxis, FrameView, Integrator, Lens, Light,
-    LightKind, Model, NormalMode, PathSettings, PixelFormat, Plane, RenderSettings, Sampler, Scene,
+    LightKind, Model, Motion, NormalMode, PathSettings, PixelFormat, Plane, RenderSettings, Sampler, Scene,
     SceneFeatures, Sky, SkyPicture, Sphere, ToneCurve, ToneMapping, Triangle, Volume, VolumeBoundary,
 };
 #[cfg(feature = "import")]

@@ -19,6 +19,7 @@
 //!   normal_map     shading normals tilted by textures
 //!   material       colours and exponents of the materials
 //!   of_batch       the points of a batch of rays
+//!   moved          points of objects that move
 //! ```
 
 mod detail;
@@ -28,6 +29,7 @@ mod filter;
 mod footprint;
 mod group;
 mod material;
+mod moved;
 mod normal_map;
 mod of_batch;
 mod pattern;

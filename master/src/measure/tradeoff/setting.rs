@@ -215,6 +215,7 @@ mod tests {
         normal_mapped: false,
         metallic_roughness: false,
         volumes: false,
+        motion: false,
     };
     const EVERYTHING: SceneFeatures = SceneFeatures {
         specular: true,

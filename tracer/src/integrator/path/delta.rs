@@ -48,6 +48,9 @@ impl Group<'_> {
             for block in 0..BLOCKS {
                 lit[block] &= !occluded[block];
             }
+            if self.moving.is_some() {
+                self.shade_by_moving(light, &origins, &mut lit);
+            }
         }
         for block in 0..BLOCKS {
             self.add(simd, block, lit[block], 1, Vec3x16::load(simd, &contributions[block]));

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::super::regular::lanes_of;
 use super::super::stage::{Stage, Watch};
 use super::camera::{EyeLens, LensNumbers, places, put_rays};
+use super::moving::MovingHits;
 use super::queue::Path;
 use crate::bsdf::Media;
 use crate::cancel::Cancelled;
@@ -34,7 +35,7 @@ pub(super) struct Group<'a> {
     /// Whether the light of all lights without extent is computed at first vertices.
     pub(super) tiles_lights: bool,
     /// Seeds of the pixels of the tile.
-    seeds: [Indices; BLOCKS],
+    pub(super) seeds: [Indices; BLOCKS],
     /// Bits of the pixels that are traced.
     pub(super) live: [u32; BLOCKS],
     /// Centre of the tile, in pixels.
@@ -47,16 +48,18 @@ pub(super) struct Group<'a> {
     pub(super) surfaces: Surfaces,
     pub(super) scratch: tile::Scratch,
     /// The paths of the current generation, and those that go on.
-    current: Vec<Path>,
+    pub(super) current: Vec<Path>,
     pub(super) next: Vec<Path>,
     /// Index of the first path of the current batch.
-    base: usize,
+    pub(super) base: usize,
     pub(super) shadow_rays: RayBlock<'a>,
     /// Ways of the current ray inside of volumes.
     pub(super) sections: VolumeSections,
     /// Radiance of each sample, by its number in the group and its place in the tile.
     pub(super) radiance: Vec<[f32; 3]>,
     pub(super) counts: RayCounts,
+    /// Only in frames in which something moves.
+    pub(super) moving: Option<Box<MovingHits<'a>>>,
 }
 
 impl<'a> Group<'a> {
@@ -93,6 +96,7 @@ impl<'a> Group<'a> {
             sections: VolumeSections::default(),
             radiance: Vec::new(),
             counts: RayCounts::default(),
+            moving: MovingHits::of(frame),
         })
     }
 
@@ -225,7 +229,12 @@ impl<'a> Group<'a> {
             }
         }
         self.counts.primary += self.live_rays();
-        self.surfaces.find_of_batch(simd, &self.batch, &self.hits);
+        if self.moving.is_some() {
+            self.set_first_times(number);
+            self.find_moving_surfaces(simd);
+        } else {
+            self.surfaces.find_of_batch(simd, &self.batch, &self.hits);
+        }
     }
 
     /// Makes the paths of the first rays; `sample` is their number in the group.
@@ -259,7 +268,12 @@ impl<'a> Group<'a> {
             }
         }
         self.counts.secondary += self.live_rays();
-        self.surfaces.find_of_batch(simd, &self.batch, &self.hits);
+        if self.moving.is_some() {
+            self.set_times();
+            self.find_moving_surfaces(simd);
+        } else {
+            self.surfaces.find_of_batch(simd, &self.batch, &self.hits);
+        }
     }
 
     fn live_rays(&self) -> u64 {

@@ -16,8 +16,11 @@ impl Group<'_> {
         let surface = &self.surfaces.blocks[block];
         let index = surface.material.0[lane];
         let point = DVec3::from_array(three!(axis => f64::from(surface.point[axis].0[lane])));
-        let outwards = self.frame.front_normal(self.hits[block].slot(lane), point);
-        let front = outwards.dot(self.batch.ray(block, lane).direction) < 0.0;
+        let of_moving = if self.moving.is_some() { self.hits_moving_front(block, lane, point) } else { None };
+        let front = of_moving.unwrap_or_else(|| {
+            let outwards = self.frame.front_normal(self.hits[block].slot(lane), point);
+            outwards.dot(self.batch.ray(block, lane).direction) < 0.0
+        });
         (&self.frame.scene().materials[index as usize], index, front)
     }
 

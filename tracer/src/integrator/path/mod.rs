@@ -22,6 +22,7 @@
 //!   group         some samples of all pixels of a tile, from their rays to their radiance
 //!   media         transparent bodies: indices of refraction, absorption
 //!   medium        volumes: free paths, scattering, transmittance
+//!   moving        objects that move while the shutter is open
 //!   vertex        sixteen paths at the surfaces that they hit
 //!   delta         light of all lights without extent at the first vertices of a tile
 //!   noise_limit   adaptive sampling: cells of pixels that have enough samples
@@ -32,6 +33,7 @@ mod delta;
 mod group;
 mod media;
 mod medium;
+mod moving;
 mod noise_limit;
 mod queue;
 #[cfg(test)]

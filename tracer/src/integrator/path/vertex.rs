@@ -375,6 +375,9 @@ impl Group<'_> {
             }
             self.counts.shadow += u64::from(shadowed.count_ones());
             visible &= !self.frame.occluded_of(&self.shadow_rays);
+            if self.moving.is_some() {
+                visible &= !self.behind_moving(block, visible, true);
+            }
             watch.enter(Stage::Shading);
         }
         let mut light = light;

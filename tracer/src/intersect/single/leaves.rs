@@ -34,12 +34,29 @@ impl PreparedFrame {
             }
         }
         // A single model: its own tree is all there is to walk.
-        if let ([instance], 1) = (&self.instances[..], self.items.first_plane()) {
+        if let ([instance], true) = (&self.instances[..], self.is_single_model) {
             return if query.skips(0) { Continue(()) } else { instance.search(simd, ray, 0, stack, query) };
         }
         let bounds = || self.nodes[0].bounds();
         let Some(near) = NearRay::new(*ray, 0.0, bounds) else { return Continue(()) };
         traverse(simd, &self.nodes, &near, stack, &mut ItemLeaves { frame: self, ray, query })
+    }
+
+    /// Passes every primitive of an item that the ray may hit to a query.
+    #[inline(always)]
+    pub(super) fn search_item<S: Simd>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        item: u32,
+        stack: Stack,
+        query: &mut impl RayQuery,
+    ) -> ControlFlow<()> {
+        if let Item::Model(index) = self.items.get(item) {
+            self.instances[index].search(simd, ray, item, stack, query)
+        } else {
+            self.visit_item(ray, item, query)
+        }
     }
 
     /// Passes a sphere, a plane or a triangle of the scene file to a query.
@@ -72,12 +89,7 @@ impl<S: Simd, T: RayQuery> LeafVisitor<S> for ItemLeaves<'_, T> {
             if self.query.skips(item) {
                 continue;
             }
-            if let Item::Model(index) = self.frame.items.get(item) {
-                let instance = &self.frame.instances[index];
-                instance.search(simd, self.ray, item, stack.above(), self.query)?;
-            } else {
-                self.frame.visit_item(self.ray, item, self.query)?;
-            }
+            self.frame.search_item(simd, self.ray, item, stack.above(), self.query)?;
         }
         Continue(true)
     }

@@ -9,12 +9,14 @@
 //!   filter          one ray against sixteen triangles
 //!   query           closest hit, any hit
 //!   transmittance   share of light that passes all surfaces
+//!   moving          items that move while the shutter is open
 //!   solid           where a ray crosses the surface of a closed mesh
 //!   leaves          the leaves of the scene's tree and of a mesh's tree
 //! ```
 
 mod filter;
 mod leaves;
+mod moving;
 mod near_ray;
 mod query;
 mod solid;
@@ -23,6 +25,7 @@ mod tests;
 mod transmittance;
 mod traversal;
 
+pub(crate) use moving::TimedRay;
 use query::Closest;
 pub(super) use query::{Any, Candidate, RayQuery};
 pub(super) use solid::SolidCrossing;
@@ -87,5 +90,12 @@ impl PreparedFrame {
     /// Passes every primitive that the ray may hit to a query, those in nearer boxes first.
     pub(super) fn search_all(&self, ray: &Ray, query: &mut impl RayQuery) {
         let _ = with_stack(|stack| dispatch!(self.level, simd => self.search(simd, ray, stack, query)));
+    }
+
+    /// Passes every primitive of an item that the ray may hit to a query.
+    pub(super) fn search_all_of(&self, item: u32, ray: &Ray, query: &mut impl RayQuery) {
+        let _ = with_stack(
+            |stack| dispatch!(self.level, simd => self.search_item(simd, ray, item, stack, query)),
+        );
     }
 }

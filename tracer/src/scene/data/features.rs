@@ -45,6 +45,8 @@ pub struct SceneFeatures {
     pub metallic_roughness: bool,
     /// A volume scatters light.
     pub volumes: bool,
+    /// An object moves while the shutter is open.
+    pub motion: bool,
 }
 
 impl SceneFeatures {
@@ -74,6 +76,7 @@ impl SceneFeatures {
             normal_mapped: any(|material| material.normal_map.is_some()),
             metallic_roughness: any(|material| material.metallic_roughness.is_some()),
             volumes: scene.volumes.iter().any(|volume| volume.density > 0.0),
+            motion: scene.motions.iter().any(|motion| motion.moves(scene)),
         }
     }
 
@@ -238,6 +241,7 @@ mod tests {
             normal_mapped: true,
             metallic_roughness: true,
             volumes: true,
+            motion: true,
         };
         let at = |shading| everything.at(&Quality { shading, ..Quality::default() });
         assert_eq!(at(Shading::Full), everything);

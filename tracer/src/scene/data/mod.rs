@@ -4,6 +4,7 @@ mod features;
 mod integrator;
 mod lens;
 mod light;
+mod motion;
 mod objects;
 mod picture;
 mod quality;
@@ -19,6 +20,7 @@ pub use features::SceneFeatures;
 pub use integrator::{Integrator, PathSettings, Sampler};
 pub use lens::Lens;
 pub use light::{Attenuation, Light, LightKind};
+pub use motion::Motion;
 pub use objects::{Disk, Model, NormalMode, Plane, Sphere, Triangle};
 pub use picture::{PixelFormat, ToneCurve, ToneMapping};
 pub use quality::{ColorDepth, ExponentPrecision, Quality, Shading, word_of};
@@ -65,6 +67,8 @@ pub struct Scene {
     pub triangles: Vec<Triangle>,
     /// Volumes that scatter light; only the path integrator has them.
     pub volumes: Vec<Volume>,
+    /// Objects that move while the shutter is open, each at most once; only the path integrator moves them.
+    pub motions: Vec<Motion>,
 }
 
 impl Scene {
@@ -98,6 +102,7 @@ impl Default for Scene {
             planes: Vec::new(),
             triangles: Vec::new(),
             volumes: Vec::new(),
+            motions: Vec::new(),
         }
     }
 }

@@ -219,6 +219,12 @@ impl FrameView {
         self.integrator == Integrator::Direct && self.quality.shading.is_light()
     }
 
+    /// Whether pictures show the motion of objects while the shutter is open: those of light by the path integrator. All others show
+    /// objects as they are when it opens.
+    pub(crate) fn shows_motion(&self) -> bool {
+        self.integrator.path().is_some() && self.quality.shading.is_light()
+    }
+
     /// The frame that the scene requests, at full scale.
     pub fn of(scene: &Scene) -> Self {
         let RenderSettings { width, height, integrator, samples, quality, tone, .. } = scene.render;

@@ -89,6 +89,7 @@ fn assemble(
         triangles: text.triangles,
         disks: text.disks,
         background_visible: text.background.visible,
+        motions: text.motions,
         ..Scene::default()
     };
     for model in &text.models {
@@ -196,7 +197,7 @@ fn load_textures(
 
 /// The camera of the file with its look-at point.
 fn aimed(text: CameraText, bounds: Option<framing::Bounds>) -> Camera {
-    let CameraText { kind, position, aim, up, fov, zoom, lens: _ } = text;
+    let CameraText { kind, position, aim, up, fov, zoom, .. } = text;
     let look_at = match aim {
         Aim::Point(point) => point,
         Aim::Direction(direction) => framing::point_on_axis(position, direction, bounds),

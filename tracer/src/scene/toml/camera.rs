@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::Reading;
 use super::fault::Read;
 use super::knobs;
+use super::shutter::{Shutter, shutter};
 use super::table::Table;
 use super::value::Value;
 use crate::rotation;
@@ -24,6 +25,7 @@ pub(super) const CAMERA_KEYS: &[&str] = &[
     "zoom",
     "aperture",
     "focus_distance",
+    "shutter",
 ];
 
 /// Default field of view of a pinhole camera in degrees.
@@ -50,6 +52,8 @@ pub(crate) struct CameraText {
     pub(crate) zoom: f64,
     /// Its lens.
     pub(crate) lens: Lens,
+    /// When its shutter is open.
+    pub(in crate::scene::toml) shutter: Shutter,
 }
 
 /// Viewing direction of a camera.
@@ -104,7 +108,8 @@ pub(super) fn camera(table: Table<'_>, integrator: &Integrator, reading: &mut Re
     if let Kind::Pinhole = word {
         warn_about_lens(table, &lens, integrator, reading);
     }
-    Ok(CameraText { kind, position, aim: looks, up, fov, zoom, lens })
+    let shutter = shutter(table)?;
+    Ok(CameraText { kind, position, aim: looks, up, fov, zoom, lens, shutter })
 }
 
 fn lens(table: Table<'_>) -> Read<Lens> {

@@ -11,8 +11,8 @@ mod knobs;
 mod light;
 mod material;
 mod objects;
+mod shutter;
 mod table;
-mod unbuilt;
 mod value;
 mod view;
 
@@ -28,11 +28,12 @@ use toml::de::{DeTable, DeValue};
 use fault::{FirstFault, Read};
 use groups::{Objects, with_name};
 use material::Materials;
+use shutter::Shutter;
 use table::{Table, tables_of};
 use value::Value;
 
 use crate::material::Material;
-use crate::scene::data::{Disk, Integrator, Light, Plane, RenderSettings, Sphere, Triangle};
+use crate::scene::data::{Disk, Integrator, Light, Motion, Plane, RenderSettings, Sphere, Triangle};
 use crate::scene::validate::{
     MAX_DISKS, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
     MAX_VOLUMES,
@@ -86,6 +87,8 @@ pub(super) struct SceneText {
     /// Single triangles, then those of rectangles and boxes.
     pub(super) triangles: Vec<Triangle>,
     pub(super) volumes: Vec<VolumeText>,
+    /// Objects that move while the shutter is open; models have the indices of `models`.
+    pub(super) motions: Vec<Motion>,
     /// Accepted input that is probably a mistake.
     pub(super) warnings: Vec<Fault>,
 }
@@ -96,6 +99,9 @@ struct Reading {
     warnings: Vec<Fault>,
     /// Messages about keys without an effect, each reported once.
     idle: BTreeSet<String>,
+    shutter: Shutter,
+    /// Whether a table has a pose at time 1.
+    has_ends: bool,
 }
 
 impl Reading {
@@ -182,6 +188,7 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     }
     let camera = |table: Table<'_>| camera::camera(table, integrator, reading);
     let camera = section(top, "camera", "[camera]", camera::CAMERA_KEYS, camera, first);
+    reading.shutter = camera.flatten().map_or(Shutter::default(), |camera| camera.shutter);
     let background = |table: Table<'_>| background::background(table, reading);
     let background =
         section(top, "background", "[background]", background::BACKGROUND_KEYS, background, first);
@@ -196,6 +203,8 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let volume = |table: Table<'_>| objects::volume(table, reading);
     let volumes = list(top, "volume", "[[volume]]", (objects::VOLUME_KEYS, MAX_VOLUMES), volume, first);
     let objects = read_objects(top, &mut materials, reading, first);
+    let motions = objects.motions();
+    reading.check_shutter(integrator, !motions.is_empty());
     reading.warnings.sort_by_key(|warning| warning.at);
     let (materials, textures) = materials.into_parts();
     Some(SceneText {
@@ -212,6 +221,7 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
         disks: objects.disks,
         triangles: objects.triangles,
         volumes,
+        motions,
         warnings: std::mem::take(&mut reading.warnings),
     })
 }

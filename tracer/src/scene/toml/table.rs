@@ -4,7 +4,6 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::fault::{Fault, Read, shortened, suggestion};
-use super::unbuilt;
 use super::value::Value;
 
 /// Table of a scene file whose keys are all known.
@@ -84,9 +83,6 @@ fn unknown_key(owner: &str, key: &str, known: &[&str]) -> String {
     let key = shortened(key);
     if key == "ambient" {
         return format!("`ambient` does not belong into {owner}; move it to the top, before the first table");
-    }
-    if let Some(refusal) = unbuilt::refusal(owner, &key) {
-        return refusal;
     }
     let hint = suggestion(&key, known.iter().copied(), |list| format!("; known here: {list}"));
     format!("unknown key `{key}` in {owner}{hint}")

@@ -1,6 +1,8 @@
 //! Checks of untrusted scenes: every index in range, every number finite and within its bounds, every list bounded. A
 //! scene that passes can be compiled and traced without further checks.
 
+mod motion;
+
 use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec3};
@@ -137,7 +139,8 @@ impl Scene {
             self.check_material_index(plane.material, name)
         })?;
         each("triangles", &self.triangles, |triangle, name| self.check_triangle(triangle, name))?;
-        each("volumes", &self.volumes, |volume, name| self.check_volume(volume, name))
+        each("volumes", &self.volumes, |volume, name| self.check_volume(volume, name))?;
+        self.check_motions()
     }
 
     fn check_counts(&self) -> Check {

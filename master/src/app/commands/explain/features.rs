@@ -52,6 +52,7 @@ pub(super) fn features(source: &Source, compiled: &CompiledScene, view: &FrameVi
         of_materials(source, "cut-outs", used.cut_out, |material| material.cutout.is_some()),
         soft_shadows(source, used.soft_shadows, view),
         bounces(source, used.bounces, view),
+        motion(source, used.motion && view.integrator.path().is_some()),
         samples(view),
     ]
 }
@@ -66,6 +67,19 @@ fn soft_shadows(source: &Source, asked_for: bool, view: &FrameView) -> FeatureFa
             "{soft} of {} have a radius{}",
             counted(lights.len() as u64, "light"),
             turned_off("shadows", view)
+        ),
+        measured_percent: None,
+        bytes: 0,
+    }
+}
+
+fn motion(source: &Source, asked_for: bool) -> FeatureFacts {
+    FeatureFacts {
+        name: "motion blur",
+        asked_for,
+        why: format!(
+            "{} moving while the shutter is open",
+            counted(source.scene.motions.len() as u64, "object")
         ),
         measured_percent: None,
         bytes: 0,
@@ -292,6 +306,11 @@ pub(super) fn kernels(source: &Source, compiled: &CompiledScene, view: &FrameVie
             "bounces: reflected and transmitted rays of each tile, generation by generation, up to depth {}",
             view.quality.max_depth
         ));
+    }
+    if features.motion && view.integrator.path().is_some() {
+        kernels.push(
+            "motion: each ray at its own time, against a hierarchy of all poses of what moves".to_owned(),
+        );
     }
     if view.is_adaptive() {
         kernels.push(format!(

@@ -62,6 +62,18 @@ pub(in crate::integrator) fn occluded<S: Simd, R: SurfaceSource>(
     occluded
 }
 
+/// The shadow rays from some points of a batch to a light without extent.
+pub(in crate::integrator) fn tile_of<'a, R: SurfaceSource>(
+    rays: &'a R,
+    hits: &'a [HitBlock; BLOCKS],
+    light: &EyeLight,
+    points: &'a [[Lanes; 3]; BLOCKS],
+    live: [u32; BLOCKS],
+) -> ShadowTile<'a> {
+    let (light, t_max) = target_of(light);
+    ShadowTile { frame: rays.frame(), light, t_max, grid: rays.places(), points, hits, live }
+}
+
 /// Bits of the live points of a tile with anything before the light, ray by ray: faster for points that are far apart.
 #[inline(never)]
 fn occluded_one_by_one(tile: &ShadowTile<'_>) -> [u32; BLOCKS] {

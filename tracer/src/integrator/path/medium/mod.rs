@@ -169,6 +169,9 @@ impl Group<'_> {
             }
             self.counts.shadow += u64::from(shadowed.count_ones());
             visible &= !self.frame.any_hits_of(&self.shadow_rays);
+            if self.moving.is_some() {
+                visible &= !self.behind_moving(block, visible, false);
+            }
             watch.enter(Stage::Shading);
         }
         self.dim_in_volumes(simd, (points, visible), &samples, &mut light);

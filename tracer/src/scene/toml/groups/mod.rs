@@ -9,6 +9,7 @@
 mod placement;
 mod tree;
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::{DMat3, DVec3};
@@ -20,7 +21,7 @@ use super::objects::{ModelText, Name, name, scale};
 use super::table::Table;
 use super::value::Value;
 use crate::rotation;
-use crate::scene::data::{Disk, Sphere, Triangle};
+use crate::scene::data::{Disk, Motion, Sphere, Triangle};
 use placement::Placement;
 use tree::Tree;
 
@@ -95,6 +96,8 @@ fn placement_of(value: Value<'_>) -> Read<Placement> {
 pub(super) struct Objects {
     pub(super) models: Vec<ModelText>,
     pub(super) spheres: Vec<Sphere>,
+    /// Centres of spheres when the shutter closes, of those that move.
+    closing: BTreeMap<usize, DVec3>,
     pub(super) disks: Vec<Disk>,
     pub(super) triangles: Vec<Triangle>,
     /// All names with the objects and groups that they mean.
@@ -116,8 +119,23 @@ impl Objects {
         self.models = self.named(models, Target::Model);
     }
 
-    pub(super) fn add_spheres(&mut self, spheres: Vec<(Sphere, Option<Name>)>) {
-        self.spheres = self.named(spheres, Target::Sphere);
+    /// Adds spheres with their centres when the shutter closes, if these are elsewhere.
+    pub(super) fn add_spheres(&mut self, spheres: Vec<((Sphere, Option<DVec3>), Option<Name>)>) {
+        let (spheres, closing): (Vec<_>, Vec<_>) = self.named(spheres, Target::Sphere).into_iter().unzip();
+        self.spheres = spheres;
+        let moving = closing.into_iter().enumerate();
+        self.closing = moving.filter_map(|(index, center)| Some((index, center?))).collect();
+    }
+
+    /// The objects that move while the shutter is open.
+    pub(super) fn motions(&self) -> Vec<Motion> {
+        let of_models = self.models.iter().enumerate().filter_map(|(index, model)| {
+            let [translate, rotate] = model.closing?;
+            Some(Motion::Model { model: index as u32, translate, rotate })
+        });
+        let of_spheres =
+            self.closing.iter().map(|(&index, &center)| Motion::Sphere { sphere: index as u32, center });
+        of_models.chain(of_spheres).collect()
     }
 
     pub(super) fn add_disks(&mut self, disks: Vec<(Disk, Option<Name>)>) {

@@ -13,8 +13,19 @@ use crate::scene::data::NormalMode;
 use crate::scene::import::Up;
 use crate::scene::validate::MAX_COORDINATE;
 
-pub(in crate::scene::toml) const MODEL_KEYS: &[&str] =
-    &["name", "file", "material", "normals", "translate", "rotate", "scale", "up", "crease_angle"];
+pub(in crate::scene::toml) const MODEL_KEYS: &[&str] = &[
+    "name",
+    "file",
+    "material",
+    "normals",
+    "translate",
+    "rotate",
+    "scale",
+    "up",
+    "crease_angle",
+    "translate_end",
+    "rotate_end",
+];
 
 /// A model whose file has not been loaded.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +49,8 @@ pub(crate) struct ModelText {
     pub(crate) scale: DVec3,
     /// Linear part of the transforms of its groups.
     pub(crate) group: DMat3,
+    /// `translate` and `rotate` when the shutter closes, if they are other ones.
+    pub(in crate::scene::toml) closing: Option<[DVec3; 2]>,
 }
 
 pub(in crate::scene::toml) fn model(
@@ -57,6 +70,16 @@ pub(in crate::scene::toml) fn model(
         reading.warn(at, message);
     }
     let [translate, rotate, scale] = placement(table)?;
+    for key in ["translate_end", "rotate_end"] {
+        reading.note_end(table, key);
+    }
+    let up = table.read("up", |value| value.word(&Up::WORDS))?.unwrap_or_default();
+    let rotate_end = table.read("rotate_end", |value| value.vector())?;
+    let translate = reading.shutter.ends(translate, table.read("translate_end", |value| value.vector())?);
+    let rotate = reading.shutter.ends(rotate, rotate_end.map(|degrees| up.before(degrees, scale).0));
+    let moves = translate.opening != translate.closing || rotate.opening != rotate.closing;
+    let closing = moves.then_some([translate.closing, rotate.closing]);
+    let (translate, rotate) = (translate.opening, rotate.opening);
     Ok(ModelText {
         file: PathBuf::from(name),
         at: file.start(),
@@ -68,6 +91,7 @@ pub(in crate::scene::toml) fn model(
         rotate,
         scale,
         group: DMat3::IDENTITY,
+        closing,
     })
 }
 

@@ -9,18 +9,22 @@ use super::super::table::Table;
 use crate::scene::data::{Disk, Plane, Sphere};
 
 pub(in crate::scene::toml) const SPHERE_KEYS: &[&str] =
-    &["name", "center", "radius", "material", "inside_out", "uv_rotate"];
+    &["name", "center", "radius", "material", "inside_out", "uv_rotate", "center_end"];
 pub(in crate::scene::toml) const PLANE_KEYS: &[&str] = &["point", "normal", "material", "size"];
 pub(in crate::scene::toml) const DISK_KEYS: &[&str] = &["name", "center", "normal", "radius", "material"];
 
+/// A sphere as it is when the shutter opens, and its centre when the shutter closes, if that is elsewhere.
 pub(in crate::scene::toml) fn sphere(
     table: Table<'_>,
     materials: &mut Materials,
     reading: &mut Reading,
-) -> Read<Sphere> {
+) -> Read<(Sphere, Option<DVec3>)> {
     let material = materials.referred_or_neutral(table)?;
+    let center = table.required("center")?.vector()?;
+    reading.note_end(table, "center_end");
+    let center = reading.shutter.ends(center, table.read("center_end", |value| value.vector())?);
     let sphere = Sphere {
-        center: table.required("center")?.vector()?,
+        center: center.opening,
         radius: table.required("radius")?.positive()?,
         material,
         inside_out: table.read("inside_out", |value| value.boolean())?.unwrap_or(false),
@@ -29,7 +33,7 @@ pub(in crate::scene::toml) fn sphere(
     if !materials.needs_uvs(material) {
         reading.idle(table, "uv_rotate", "without a texture");
     }
-    Ok(sphere)
+    Ok((sphere, (center.opening != center.closing).then_some(center.closing)))
 }
 
 pub(in crate::scene::toml) fn plane(

@@ -100,5 +100,6 @@ fn model(table: Table<'_>, file: Value<'_>) -> Read<ModelText> {
         rotate,
         scale,
         group: DMat3::IDENTITY,
+        closing: None,
     })
 }

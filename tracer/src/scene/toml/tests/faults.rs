@@ -131,18 +131,6 @@ fn unknown_words_and_materials_are_refused_with_the_nearest() {
 }
 
 #[test]
-fn unsupported_features_are_refused_by_name() {
-    let yet = "not supported yet";
-    assert_faults(&[
-        ("[camera]\nshutter = [0, 1]", "2:1", &["motion blur (`shutter` in [camera])", yet]),
-        ("[[model]]\nfile = \"a.obj\"\ntranslate_end = [0,0,0]", "3:1", &["`translate_end`", yet]),
-        ("[[model]]\nfile = \"a.obj\"\nrotate_end = [0,0,0]", "3:1", &["`rotate_end`", yet]),
-        ("[[sphere]]\ncenter_end = [0,0,0]", "2:1", &["`center_end` in [[sphere]]", yet]),
-    ]);
-    assert_eq!(warnings("[render]\nintegrator = \"direct\""), [""; 0]);
-}
-
-#[test]
 fn missing_and_contradicting_keys_are_refused() {
     assert_faults(&[
         ("\n[camera]\nlook_at = [0,0,0]", "2:1", &["`position` is missing in [camera]"]),

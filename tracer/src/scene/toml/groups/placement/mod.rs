@@ -6,6 +6,7 @@ use super::{Objects, Target};
 use crate::rotation;
 use crate::scene::data::{Disk, Sphere, Triangle};
 use crate::scene::toml::material::Materials;
+use crate::scene::toml::objects::ModelText;
 use crate::scene::validate::MAX_COORDINATE;
 
 /// Largest relative difference between scales that count as equal: matrices are written with six digits.
@@ -80,12 +81,19 @@ impl Objects {
             Target::Model(index) => {
                 let Some(model) = self.models.get_mut(index) else { return Ok(()) };
                 (model.group, model.translate) = (placement.linear, placement.point(model.translate));
+                place_closing(model, placement)?;
                 if in_range(model.translate) { Ok(()) } else { Err(TOO_FAR.into()) }
             }
-            Target::Sphere(index) => self
-                .spheres
-                .get_mut(index)
-                .map_or(Ok(()), |sphere| place_sphere(sphere, placement, materials)),
+            Target::Sphere(index) => {
+                if let Some(center) = self.closing.get_mut(&index) {
+                    *center = placement.point(*center);
+                    if !in_range(*center) {
+                        return Err(TOO_FAR.into());
+                    }
+                }
+                let sphere = self.spheres.get_mut(index);
+                sphere.map_or(Ok(()), |sphere| place_sphere(sphere, placement, materials))
+            }
             Target::Disk(index) => {
                 self.disks.get_mut(index).map_or(Ok(()), |disk| place_disk(disk, placement))
             }
@@ -97,6 +105,19 @@ impl Objects {
             Target::Group(_) => Ok(()),
         }
     }
+}
+
+/// Places a model as it is when the shutter closes.
+fn place_closing(model: &mut ModelText, placement: &Placement) -> Result<(), String> {
+    let Some([translate, rotate]) = &mut model.closing else { return Ok(()) };
+    *translate = placement.point(*translate);
+    if *rotate != model.rotate && placement.uniform_scale().is_none() {
+        return Err(
+            "its groups scale this model, which rotates, by different factors along its axes: scale the model instead"
+                .into(),
+        );
+    }
+    if in_range(*translate) { Ok(()) } else { Err(TOO_FAR.into()) }
 }
 
 fn place_sphere(sphere: &mut Sphere, placement: &Placement, materials: &Materials) -> Result<(), String> {
