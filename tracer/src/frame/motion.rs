@@ -221,3 +221,65 @@ impl Pose {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mesh::MeshId;
+    use crate::scene::NormalMode;
+
+    fn vector() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-2.0..2.0_f64).prop_map(DVec3::from_array)
+    }
+
+    proptest! {
+        #[test]
+        fn models_go_from_pose_to_pose_within_their_bounds(
+            places in [vector(), vector()], angles in [vector(), vector()], point in vector(),
+            group in vector(), size in 0.1..3.0_f64, mirrored: bool, spin in -360.0..360.0_f64, time in 0.0..=1.0_f64,
+        ) {
+            let axes = DVec3::new(if mirrored { -size } else { size }, size, size);
+            let model = |translate, angles| Model {
+                mesh: MeshId([0; 32]),
+                materials: Vec::new(),
+                normals: NormalMode::Flat,
+                translate,
+                rotate: angles * 180.0,
+                scale: DVec3::new(1.0, -2.0, 0.5),
+                group: rotation::of_model(group * 90.0) * DMat3::from_diagonal(axes),
+            };
+            let pose_at = |time: f64| model(places[0].lerp(places[1], time), angles[0].lerp(angles[1], time));
+            let (opening, closing) = (pose_at(0.0), pose_at(1.0));
+            let mesh = (point.min(DVec3::ZERO), point.max(DVec3::ONE));
+            let sweep = of_model((0, &opening), mesh, (closing.translate, closing.rotate), spin);
+            let place = |model: &Model| orientation(model, spin) * point + model.translate;
+            let then = place(&pose_at(time));
+            let (lo, hi) = sweep.bounds;
+            prop_assert!((then - lo).min_element() > -1e-9 && (hi - then).min_element() > -1e-9);
+            let to_eye = ToEye { eye: DVec3::new(0.3, -0.7, 1.1), unit: 8.0 };
+            let motions = Motions::new(&[sweep], &to_eye, &crate::cancel::never).unwrap().unwrap();
+            let pose = motions.of(0).unwrap().pose(time);
+            let rest = to_eye.point(place(&opening));
+            let error = (pose.point_from_rest(rest) - to_eye.point(then)).length();
+            prop_assert!(error < 1e-12, "{}", error);
+            prop_assert!((pose.point_to_rest(to_eye.point(then)) - rest).length() < 1e-12);
+            let direction = pose.direction_to_rest(DVec3::Y);
+            prop_assert!((direction.length() - 1.0).abs() < 1e-12);
+            prop_assert!((pose.normal_from_rest(direction) - DVec3::Y).length() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn poses_at_the_opening_are_the_rest() {
+        let to_eye = ToEye { eye: DVec3::ZERO, unit: 1.0 };
+        let (from, to) = (DVec3::new(0.1, 0.2, 0.3), DVec3::new(7.0, 8.0, 9.0));
+        let sweep = Sweep { item: 3, bounds: (from.min(to), from.max(to)), from, to, turn: None };
+        let motions = Motions::new(&[sweep], &to_eye, &crate::cancel::never).unwrap().unwrap();
+        assert!(motions.of(2).is_none());
+        let pose = motions.of(3).unwrap().pose(0.0);
+        assert_eq!(pose.point_to_rest(DVec3::ONE), DVec3::ONE);
+        assert_eq!(pose.point_from_rest(DVec3::ONE), DVec3::ONE);
+    }
+}

@@ -7,6 +7,7 @@
 //!
 //! ```text
 //!   flatten      the scene as a list of primitives
+//!   motion       the scene at a time while the shutter is open
 //!   shape        primitives, and their intersection
 //!   cull         triangles that a ray may hit
 //!   attributes   texture coordinates and vertex colours of points on shapes
@@ -38,6 +39,7 @@ mod extent;
 mod flatten;
 mod footprint;
 mod material;
+mod motion;
 mod optics;
 mod path;
 mod pyramid;

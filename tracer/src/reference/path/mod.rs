@@ -58,6 +58,11 @@ impl Oracle {
 }
 
 impl PathOracle<'_> {
+    /// The time of sample `number` of pixel (x, y), from 0 to 1: see [`Oracle::at_time`].
+    pub fn time(&self, x: u32, y: u32, number: u32) -> f64 {
+        Numbers::new(&self.settings, [x, y], number).time()
+    }
+
     /// Linear RGB of sample `number` of pixel (x, y), before it is bounded and rounded to the steps of [`crate::PixelSums`]. `None` if
     /// the path meets a material with rough reflection.
     pub fn radiance(&self, x: u32, y: u32, number: u32) -> Option<[f64; 3]> {

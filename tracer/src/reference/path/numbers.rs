@@ -28,6 +28,11 @@ impl Numbers {
         self.pair(Dimension::LENS)
     }
 
+    /// The time between the opening and the closing of the shutter.
+    pub(super) fn time(&self) -> f64 {
+        self.pair(Dimension::TIME).x
+    }
+
     /// A pair for one use at the vertex after a number of bounces.
     pub(super) fn at_vertex(&self, bounce: u32, vertex: Vertex) -> DVec2 {
         self.pair(Dimension::of(bounce, vertex))

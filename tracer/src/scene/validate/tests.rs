@@ -3,7 +3,7 @@ use glam::{DMat3, Vec2};
 use super::*;
 use crate::material::CheckerSpace;
 use crate::material::MetallicRoughness;
-use crate::scene::data::{Disk, NormalMode, PathSettings, Plane, Sky, Sphere};
+use crate::scene::data::{Disk, Motion, NormalMode, PathSettings, Plane, Sky, Sphere};
 use crate::texture::Filter;
 
 fn scene() -> Scene {
@@ -389,4 +389,48 @@ fn volumes_out_of_bounds_are_found_by_name() {
     assert!(with(volume(VolumeBoundary::Model(seen))).starts_with("volumes[0].model.materials"));
     let flat = Model { scale: DVec3::ZERO, ..bare };
     assert!(with(volume(VolumeBoundary::Model(flat))).starts_with("volumes[0].model.scale"));
+}
+
+#[test]
+fn motions_are_of_different_objects_that_emit_nothing() {
+    let (translate, rotate, center) = (DVec3::X, DVec3::Y, DVec3::Z);
+    let of_sphere = Motion::Sphere { sphere: 0, center };
+    let of_model = Motion::Model { model: 0, translate, rotate };
+    let mut sound = scene();
+    sound.motions = vec![of_sphere, of_model];
+    assert_eq!(sound.validate(), Ok(()));
+    let fault = |spoil: fn(&mut Scene)| {
+        let mut scene = sound.clone();
+        spoil(&mut scene);
+        scene.validate().unwrap_err().to_string()
+    };
+    assert!(fault(|s| s.motions.push(s.motions[0])).contains("3 moving objects; 2 are allowed"));
+    assert!(
+        fault(|s| s.motions[1] = s.motions[0]).contains("motions[1] must be of an object without another")
+    );
+    for (motion, what) in [
+        (Motion::Sphere { sphere: 1, center }, "motions[0] must be of one of the scene's spheres"),
+        (
+            Motion::Model { model: u32::MAX, translate, rotate },
+            "motions[0] must be of one of the scene's models",
+        ),
+        (Motion::Sphere { sphere: 0, center: DVec3::splat(1e31) }, "motions[0].center must be finite"),
+        (Motion::Model { model: 0, translate: DVec3::NAN, rotate }, "motions[0].translate must be finite"),
+        (Motion::Model { model: 0, translate, rotate: DVec3::INFINITY }, "motions[0].rotate must be finite"),
+    ] {
+        let message = Scene { motions: vec![motion], ..scene() }.validate().unwrap_err().to_string();
+        assert!(message.starts_with(what), "{message}");
+    }
+    let emitting = |s: &mut Scene| s.materials[0].emission = Vec3::X;
+    assert!(
+        fault(emitting).starts_with("spheres[0] must be of materials without emission, because it moves")
+    );
+    assert!(
+        fault(|s| s.materials[1].emission = Vec3::X).starts_with("models[0] must be of materials without")
+    );
+    let stretched = |s: &mut Scene| s.models[0].group = DMat3::from_diagonal(DVec3::new(1.0, 2.0, 1.0));
+    assert!(fault(stretched).starts_with("models[0].group must be one that scales all axes by one factor"));
+    let mirrored = |s: &mut Scene| s.models[0].group = DMat3::from_diagonal(DVec3::new(-3.0, 3.0, 3.0));
+    mirrored(&mut sound);
+    assert_eq!(sound.validate(), Ok(()));
 }

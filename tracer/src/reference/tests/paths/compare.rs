@@ -54,7 +54,13 @@ pub(super) fn compare(furnished: &Furnished, view: &FrameView, numbers: Range<u3
         for (place, pixel) in (0..).zip(pixels) {
             let (x, y) = (place % view.width, place / view.width);
             let found = PixelSums::from_bytes(pixel).rgb.map(|sum| sum as f64 * STEP);
-            let expected = paths.radiance(x, y, number).unwrap();
+            let expected = if scene.motions.is_empty() {
+                paths.radiance(x, y, number).unwrap()
+            } else {
+                let time = paths.time(x, y, number);
+                let oracle = Oracle::at_time(scene, meshes, textures, view, time);
+                oracle.paths().unwrap().radiance(x, y, number).unwrap()
+            };
             let expected = PixelSums::steps(expected.map(|value| value as f32));
             let expected = expected.map(|steps| f64::from(steps) * STEP);
             samples.push(([x, y], number, DVec3::from(found), DVec3::from(expected)));

@@ -97,3 +97,21 @@ fn single_paths_under_a_panorama_are_those_of_the_oracle() {
 fn one_of_many_lights_is_selected_as_in_the_oracle() {
     assert_same(&scenes::many_lights(), seeded(0), 5, |_| {});
 }
+
+#[test]
+fn single_paths_among_objects_that_move_are_those_of_the_oracle() {
+    for seed in [0, 12] {
+        assert_same(&scenes::moving_room(), seeded(seed), 6, |_| {});
+    }
+    let room = scenes::moving_room();
+    assert_same(&room, seeded(13), 6, |view| view.spin = 40.0);
+    for kind in [CameraKind::Orthographic { view_height: 4.0 }, CameraKind::Fisheye] {
+        assert_same(&room, seeded(14), 4, |view| view.camera.kind = kind);
+    }
+    assert_same(&room, seeded(15), 4, |view| view.lens = Lens { aperture: 0.2, focus_distance: None });
+}
+
+#[test]
+fn single_paths_through_glass_that_moves_are_those_of_the_oracle() {
+    assert_same(&scenes::moving_glass(), seeded(0), 10, |_| {});
+}

@@ -7,8 +7,8 @@ use glam::{DMat3, DVec3, Vec3};
 use crate::image::RgbImage;
 use crate::mesh::{CompiledMesh, Mesh, MeshId, NamedMaterial};
 use crate::scene::{
-    Attenuation, Background, Camera, Filter, Light, LightKind, Material, Model, NormalMode, Plane, Scene,
-    Sky, SkyPicture, Sphere, TextureMap, Triangle,
+    Attenuation, Background, Camera, Filter, Light, LightKind, Material, Model, Motion, NormalMode, Plane,
+    Scene, Sky, SkyPicture, Sphere, TextureMap, Triangle,
 };
 use crate::texture::Texture;
 
@@ -210,4 +210,56 @@ pub(super) fn outdoors() -> Furnished {
     scene.textures = vec![TextureMap::new(textures[0].id(), Filter::Bilinear)];
     scene.background = Background::Sky(Sky { picture: SkyPicture::Panorama(0), rotate: 35.0, strength: 1.5 });
     Furnished { scene, meshes, textures }
+}
+
+/// The room with two balls that move, one of them of a mirror, and three models of one mesh: one that moves, one that rotates in a group,
+/// one that does both.
+pub(super) fn moving_room() -> Furnished {
+    let mut scene = room();
+    let mirror = scene.materials.len() as u32;
+    scene.materials.push(Material { reflect: Vec3::new(0.8, 0.7, 0.6), ..diffuse(Vec3::splat(0.1)) });
+    scene.spheres.push(ball(DVec3::new(-1.3, -0.5, 0.0), 0.5, 3));
+    scene.spheres.push(ball(DVec3::new(0.8, -0.4, -0.5), 0.4, mirror));
+    let meshes = compiled(&octahedron());
+    let gem = |place: DVec3, scale: DVec3| model(meshes[0].id(), 3, place, scale);
+    let grouped = Model {
+        group: DMat3::from_rotation_x(0.7) * DMat3::from_diagonal(DVec3::new(-0.5, 0.5, 0.5)),
+        ..gem(DVec3::new(1.2, 0.6, 0.2), DVec3::new(1.0, 0.6, 0.8))
+    };
+    scene.models = vec![
+        gem(DVec3::new(-0.6, 0.3, 0.6), DVec3::splat(0.3)),
+        grouped,
+        gem(DVec3::new(0.1, -0.4, 1.0), DVec3::new(0.4, 0.2, 0.3)),
+        gem(DVec3::new(-1.4, 1.2, -0.6), DVec3::splat(0.3)),
+    ];
+    scene.motions = vec![
+        Motion::Sphere { sphere: 1, center: DVec3::new(-0.7, -0.2, 0.3) },
+        Motion::Model {
+            model: 1,
+            translate: scene.models[1].translate,
+            rotate: DVec3::new(20.0, 75.0, -30.0),
+        },
+        Motion::Model { model: 0, translate: DVec3::new(-0.2, 0.8, 0.7), rotate: scene.models[0].rotate },
+        Motion::Sphere { sphere: 2, center: DVec3::new(0.5, -0.4, -0.9) },
+        Motion::Model {
+            model: 2,
+            translate: DVec3::new(0.5, -0.3, 1.1),
+            rotate: DVec3::new(0.0, 210.0, 15.0),
+        },
+    ];
+    Furnished { scene, meshes, textures: Vec::new() }
+}
+
+/// The room with glass that moves: a ball, and two pieces that are the same mesh, one of them mirrored.
+pub(super) fn moving_glass() -> Furnished {
+    let mut furnished = room_of_mirrors();
+    let scene = &mut furnished.scene;
+    let [first, second] = [&scene.models[0], &scene.models[1]].map(|model| model.translate);
+    let rotate = DVec3::new(10.0, 50.0, 0.0);
+    scene.motions = vec![
+        Motion::Sphere { sphere: 1, center: DVec3::new(-0.6, -0.4, 0.2) },
+        Motion::Model { model: 0, translate: first + DVec3::new(0.2, 0.1, 0.0), rotate },
+        Motion::Model { model: 1, translate: second, rotate: -rotate },
+    ];
+    furnished
 }

@@ -4,6 +4,7 @@ mod bounces;
 mod checkers;
 mod faults;
 mod groups;
+mod motion;
 mod paths;
 mod shapes;
 mod textures;

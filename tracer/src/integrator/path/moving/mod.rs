@@ -3,6 +3,9 @@
 //! Still objects are hit first, in tiles or blocks; then each ray is tested against the objects that move. What a ray hits there is a
 //! surface of the object at rest, hit by the ray that the inverse of the pose maps there; the surface point is taken back to the pose.
 
+#[cfg(test)]
+mod tests;
+
 use glam::DVec3;
 
 use super::super::direct::shadow;
