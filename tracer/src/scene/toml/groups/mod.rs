@@ -17,7 +17,7 @@ use glam::{DMat3, DVec3};
 use super::Reading;
 use super::fault::Read;
 use super::material::Materials;
-use super::objects::{ModelText, Name, name, scale};
+use super::objects::{ModelText, MovingSphere, Name, name, scale};
 use super::table::Table;
 use super::value::Value;
 use crate::rotation;
@@ -120,7 +120,7 @@ impl Objects {
     }
 
     /// Adds spheres with their centres when the shutter closes, if these are elsewhere.
-    pub(super) fn add_spheres(&mut self, spheres: Vec<((Sphere, Option<DVec3>), Option<Name>)>) {
+    pub(super) fn add_spheres(&mut self, spheres: Vec<(MovingSphere, Option<Name>)>) {
         let (spheres, closing): (Vec<_>, Vec<_>) = self.named(spheres, Target::Sphere).into_iter().unzip();
         self.spheres = spheres;
         let moving = closing.into_iter().enumerate();

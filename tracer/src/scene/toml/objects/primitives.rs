@@ -14,11 +14,14 @@ pub(in crate::scene::toml) const PLANE_KEYS: &[&str] = &["point", "normal", "mat
 pub(in crate::scene::toml) const DISK_KEYS: &[&str] = &["name", "center", "normal", "radius", "material"];
 
 /// A sphere as it is when the shutter opens, and its centre when the shutter closes, if that is elsewhere.
+pub(in crate::scene::toml) type MovingSphere = (Sphere, Option<DVec3>);
+
+/// Reads a sphere.
 pub(in crate::scene::toml) fn sphere(
     table: Table<'_>,
     materials: &mut Materials,
     reading: &mut Reading,
-) -> Read<(Sphere, Option<DVec3>)> {
+) -> Read<MovingSphere> {
     let material = materials.referred_or_neutral(table)?;
     let center = table.required("center")?.vector()?;
     reading.note_end(table, "center_end");
