@@ -24,6 +24,7 @@
 //!   medium        volumes: free paths, scattering, transmittance
 //!   moving        objects that move while the shutter is open
 //!   vertex        sixteen paths at the surfaces that they hit
+//!   selected      light of one light that is selected at random, at sixteen vertices
 //!   delta         light of all lights without extent at the first vertices of a tile
 //!   noise_limit   adaptive sampling: cells of pixels that have enough samples
 //! ```
@@ -36,6 +37,7 @@ mod medium;
 mod moving;
 mod noise_limit;
 mod queue;
+mod selected;
 #[cfg(test)]
 mod tests;
 mod vertex;
