@@ -1,8 +1,13 @@
 //! The lights that paths select from.
 
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
 use super::PreparedFrame;
 use crate::compile::Item;
-use crate::light::table::{LightTable, SkyTable, Sources};
+use crate::light::EyeLight;
+use crate::light::table::{Beam, LightTable, SkyTable, Sources};
 use crate::scene::{Attenuation, Background, Light, LightKind, Material, SkyPicture};
 
 /// The lights of a frame; `None` if the scene has none that paths could select.
@@ -13,9 +18,8 @@ pub(super) fn light_table(frame: &PreparedFrame) -> Option<LightTable> {
     let mut sources = Sources::new(reach);
     for (index, (light, placed)) in scene.lights.iter().zip(&frame.lights).enumerate() {
         let strength = light.color * attenuation(light, reach / frame.per_unit) as f32;
-        let center = placed.emitter.position().filter(|_| placed.extent.is_some());
-        let ball = center.map(|center| (center, light.radius * frame.per_unit));
-        sources.add_light(index as u32, ball, strength);
+        let radius = if placed.extent.is_some() { light.radius * frame.per_unit } else { 0.0 };
+        sources.add_light(index as u32, beam(light, placed), radius, strength);
     }
     if frame.features.emissive {
         frame.items.range().for_each(|item| add_item(frame, item, &mut sources));
@@ -27,6 +31,23 @@ pub(super) fn light_table(frame: &PreparedFrame) -> Option<LightTable> {
         sources.add_sky(table, sky.strength);
     }
     sources.into_table()
+}
+
+/// Where a light is, and what it lights.
+fn beam(light: &Light, placed: &EyeLight) -> Option<Beam> {
+    let position = placed.emitter.position()?;
+    let (axis, half_angle) = match light.kind {
+        LightKind::Spot { direction, beam_angle, .. } => {
+            (direction.normalize_or_zero(), (beam_angle / 2.0).to_radians())
+        }
+        LightKind::Point { .. } | LightKind::Directional { .. } => (DVec3::Z, PI),
+    };
+    let falls = match light.attenuation {
+        Attenuation::None => false,
+        Attenuation::InverseSquare => true,
+        Attenuation::Polynomial { quadratic, .. } => quadratic > 0.0,
+    };
+    Some(Beam { position, axis, half_angle, falls })
 }
 
 /// Adds an item that emits light.

@@ -12,7 +12,7 @@ use crate::cancel::Cancelled;
 use crate::film::{PixelSums, TilePixels};
 use crate::frame::{CameraRays, PreparedFrame};
 use crate::intersect::{VolumeSections, tile};
-use crate::light::table::{LightTable, Selection};
+use crate::light::table::{LightTable, Receiver, Selection};
 use crate::rays::{
     BATCH, BLOCKS, EyeTile, HitBlock, ParallelTile, PictureTile, RayBatch, RayBlock, RayCounts, RaySource,
     SIDE, TileRays, TileSamples, place,
@@ -50,6 +50,11 @@ pub(super) struct Group<'a> {
     /// The paths of the current generation, and those that go on.
     pub(super) current: Vec<Path>,
     pub(super) next: Vec<Path>,
+    /// Whether the points that paths start from are kept: if a tree selects lights.
+    pub(super) keeps_receivers: bool,
+    /// The points that the current paths started from, and those that go on.
+    pub(super) receivers: Vec<Receiver>,
+    pub(super) next_receivers: Vec<Receiver>,
     /// Index of the first path of the current batch.
     pub(super) base: usize,
     pub(super) shadow_rays: RayBlock<'a>,
@@ -91,6 +96,9 @@ impl<'a> Group<'a> {
             scratch: tile::Scratch::new(),
             current: Vec::new(),
             next: Vec::new(),
+            keeps_receivers: frame.light_table.as_ref().is_some_and(LightTable::has_tree),
+            receivers: Vec::new(),
+            next_receivers: Vec::new(),
             base: 0,
             shadow_rays: RayBlock::new(frame),
             sections: VolumeSections::default(),
@@ -133,6 +141,7 @@ impl<'a> Group<'a> {
         self.radiance.clear();
         self.radiance.resize(numbers.len() * BATCH, [0.0; 3]);
         self.next.clear();
+        self.next_receivers.clear();
         self.first = numbers.start;
         for (sample, number) in numbers.enumerate() {
             self.poll()?;
@@ -148,6 +157,8 @@ impl<'a> Group<'a> {
             }
             std::mem::swap(&mut self.current, &mut self.next);
             self.next.clear();
+            std::mem::swap(&mut self.receivers, &mut self.next_receivers);
+            self.next_receivers.clear();
             for base in (0..self.current.len()).step_by(BATCH) {
                 self.poll()?;
                 watch.enter(Stage::Secondary);

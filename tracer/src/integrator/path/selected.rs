@@ -5,11 +5,11 @@ use super::super::stage::{Stage, Watch};
 use super::group::Group;
 use super::vertex::{Incoming, arrays, power_heuristic, vector};
 use crate::bsdf::scattering::{Evaluated, Scattering, Setting};
-use crate::light::table::{LightSamples, LightScene};
+use crate::light::table::{LightSamples, LightScene, Receiver, Receivers};
 use crate::rays::Ray;
 use crate::sampler::{Dimension, Vertex};
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Simd, SimdBase, SimdFloat, bits, each_bit, f32x16, mask_of, select, splat};
+use crate::simd::{LANES, Simd, SimdBase, bits, each_bit, f32x16, mask_of, select, splat, three};
 
 /// Upper end of shadow rays, as a share of the way to the light: far enough before a surface that emits for it to be no candidate of the
 /// filters of `intersect::block`.
@@ -22,13 +22,13 @@ impl Group<'_> {
         &self,
         simd: S,
         bounce: u32,
-        points: (Vec3x16<S>, u32),
+        receivers: &Receivers<S>,
         incoming: &Incoming<S>,
     ) -> Option<LightSamples> {
         let [select_by, _] = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Light));
         let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::LightPoint));
         let scene = LightScene { lights: &self.frame.lights, sky_rotation: self.frame.sky_rotation };
-        let mut samples = self.table?.sample(simd, &scene, points, self.selection(bounce), select_by, at);
+        let mut samples = self.table?.sample(simd, &scene, receivers, self.selection(bounce), select_by, at);
         if samples.live == 0 {
             return None;
         }
@@ -56,7 +56,8 @@ impl Group<'_> {
         watch: &mut W,
     ) {
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
-        let Some(samples) = self.select_light(simd, bounce, (points, lanes), incoming) else { return };
+        let receivers = Receivers { points, normals: setting.geometric, lanes };
+        let Some(samples) = self.select_light(simd, bounce, &receivers, incoming) else { return };
         let to_light = Vec3x16::load(simd, &samples.direction);
         let Evaluated { value, density } = scattering.eval(simd, to_light);
         let along = setting.geometric.dot(to_light);
@@ -101,6 +102,22 @@ impl Group<'_> {
             self.dim_in_volumes(simd, (points, visible), &samples, &mut light);
         }
         self.add(simd, block, visible, bounce + 1, light);
+    }
+
+    /// Keeps the points that paths of a block go on from, with the normals of their surfaces: the probabilities of lights that these
+    /// paths hit depend on them.
+    #[inline(never)]
+    pub(super) fn keep_receivers<S: Simd>(&mut self, points: Vec3x16<S>, normals: Vec3x16<S>, lanes: u32) {
+        let (points, normals) = (arrays(points), arrays(normals));
+        self.next_receivers.extend(each_bit(lanes).map(|lane| Receiver {
+            point: three!(axis => points[axis][lane]),
+            normal: three!(axis => normals[axis][lane]),
+        }));
+    }
+
+    /// The point that a path of the current batch started from.
+    pub(super) fn receiver(&self, block: usize, lane: usize) -> Receiver {
+        self.receivers[self.base + block * LANES + lane]
     }
 }
 

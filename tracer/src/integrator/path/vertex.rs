@@ -192,6 +192,7 @@ impl Group<'_> {
                 simd,
                 selection,
                 (origins, incoming.direction),
+                &|lane| self.receiver(block, lane),
                 (&key_of, shining),
                 Vec3x16::load(simd, &surface.point),
             );
@@ -257,6 +258,9 @@ impl Group<'_> {
                 next.media = self.media_behind(block, lane);
             }
             self.next.push(next);
+        }
+        if self.keeps_receivers {
+            self.keep_receivers(points, setting.geometric, alive);
         }
     }
 

@@ -7,6 +7,9 @@
 //!   sources    a list of sources with their power
 //!   delta      the light of one light of the scene
 //!   select     a source at random, by its power
+//!   tree       many sources: one at random, by its power and place
+//!   selector   the sources that sixteen points select
+//!   samples    the light of selected sources
 //!   triangle   points on triangles
 //!   ball       directions into the cone of a sphere
 //!   sky        directions to a sky, by its radiance
@@ -14,9 +17,12 @@
 
 mod ball;
 mod delta;
+mod samples;
 mod select;
+mod selector;
 mod sky;
 mod sources;
+mod tree;
 mod triangle;
 
 use glam::Vec3;
@@ -25,10 +31,12 @@ use super::EyeLight;
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, each_bit, f32x16, splat, three};
 use ball::Ball;
+pub(crate) use samples::LightSamples;
 use select::Choice;
+use selector::{Many, Selected};
 pub(crate) use sky::SkyTable;
-pub(crate) use sources::{Sources, SurfaceKey};
-
+pub(crate) use sources::{Beam, Sources, SurfaceKey};
+pub(crate) use tree::{LEAST_COSINE, LEAST_DISTANCE, Layout, MIN_LIGHTS, Receiver};
 use triangle::Triangle;
 
 /// The lights that paths select from, in eye space.
@@ -38,8 +46,21 @@ pub(crate) struct LightTable {
     /// The primitives that are sources, in ascending order, with the index of the source.
     surfaces: Vec<(SurfaceKey, u32)>,
     sky: Option<(SkyTable, u32)>,
+    /// Probabilities of the sources that are not in the tree.
     extended: Choice,
     all: Choice,
+    /// The tree of the sources that have a place, if these are many.
+    many: Option<Box<Many>>,
+}
+
+/// Sixteen points that get light, in eye space.
+#[derive(Clone, Copy)]
+pub(crate) struct Receivers<S: Simd> {
+    pub points: Vec3x16<S>,
+    /// Unit normals of their surfaces: light from behind is not reflected. Normals of 0 are none.
+    pub normals: Vec3x16<S>,
+    /// Bits of the points.
+    pub lanes: u32,
 }
 
 /// A light that may be selected.
@@ -73,64 +94,28 @@ pub(crate) enum Selection {
     All,
 }
 
-/// Light that one selected light sends to each of sixteen points.
-pub(crate) struct LightSamples {
-    /// Bits of the points that it may reach.
-    pub live: u32,
-    /// Bits of the points whose light no path hits: it has no extent, or is a light with a radius.
-    pub alone: u32,
-    /// Bits of the points whose light casts shadows.
-    pub shadows: u32,
-    /// Bits of the points whose light is the sky: its radiance is left to the caller.
-    pub sky: u32,
-    /// Unit vectors to the light.
-    pub direction: [Lanes; 3],
-    /// Distance of the light, in eye units; infinite for the sky and directional lights.
-    pub distance: [f64; LANES],
-    /// Radiance, linear RGB; of lights without extent pi times I_j A_j B_j.
-    pub radiance: [Lanes; 3],
-    /// Density of the direction over solid angle, times the probability of the light; of lights without extent that probability.
-    pub density: Lanes,
-}
-
-impl LightSamples {
-    fn none() -> Self {
-        Self {
-            live: 0,
-            alone: 0,
-            shadows: 0,
-            sky: 0,
-            direction: [Lanes::ZERO; 3],
-            distance: [0.0; LANES],
-            radiance: [Lanes::ZERO; 3],
-            density: Lanes::ZERO,
-        }
-    }
-}
-
 impl LightTable {
-    /// Selects a light and a point on it for each of some points (a bit a lane). The first number of `select` selects, those of `at` are
+    /// Selects a light and a point on it for each of some points. The first number of `select` selects, those of `at` are
     /// the point; all are in [0, 1).
     #[inline(never)]
     pub(crate) fn sample<S: Simd>(
         &self,
         simd: S,
         scene: &LightScene<'_>,
-        (points, lanes): (Vec3x16<S>, u32),
+        receivers: &Receivers<S>,
         selection: Selection,
         select: f32x16<S>,
         at: [f32x16<S>; 2],
     ) -> LightSamples {
         let mut samples = LightSamples::none();
-        let choice = self.choice(selection);
-        if choice.is_empty() {
+        let Selected { lanes, sources, probability } =
+            self.select(simd, receivers, selection, select.to_array());
+        if lanes == 0 {
             return samples;
         }
-        let select = select.to_array();
-        let mut sources = [0_u32; LANES];
+        let points = receivers.points;
         let mut kinds = Kinds::default();
         for lane in each_bit(lanes) {
-            sources[lane] = choice.select(select[lane]);
             kinds.add(&self.sources[sources[lane] as usize], lane);
         }
         simd.vectorize(
@@ -151,25 +136,28 @@ impl LightTable {
             },
         );
         for lane in each_bit(samples.live) {
-            samples.density.0[lane] *= choice.probability(sources[lane]);
+            samples.density.0[lane] *= probability.0[lane];
         }
         samples
     }
 
     /// Density, over solid angle, with which [`LightTable::sample`] selects the points of sources that rays hit: from their origins, along
-    /// unit vectors, to `points` on `surfaces`. 0 where those are no sources.
+    /// unit vectors, to `points` on `surfaces`. 0 where those are no sources. `receivers` are the points and normals that lights were
+    /// selected for: of use if [`LightTable::has_tree`].
     #[inline(never)]
     pub(crate) fn density_of_hits<S: Simd>(
         &self,
         simd: S,
         selection: Selection,
         (origins, direction): (Vec3x16<S>, Vec3x16<S>),
+        receivers: &dyn Fn(usize) -> Receiver,
         (surfaces, lanes): (&dyn Fn(usize) -> SurfaceKey, u32),
         points: Vec3x16<S>,
     ) -> f32x16<S> {
         let mut probability = Lanes::ZERO;
         let (mut normal, mut area) = ([Lanes::ZERO; 3], Lanes([1.0; LANES]));
         let mut cones = Lanes::ZERO;
+        let (mut listed, mut sources) = (0, [0; LANES]);
         let starts = three!(axis => origins.0[axis].to_array());
         let choice = self.choice(selection);
         for lane in each_bit(lanes) {
@@ -177,6 +165,8 @@ impl LightTable {
                 continue;
             };
             let source = self.surfaces[place].1;
+            listed |= 1 << lane;
+            sources[lane] = source;
             probability.0[lane] = choice.probability(source);
             match &self.sources[source as usize] {
                 Source::Triangle(triangle) => {
@@ -191,6 +181,9 @@ impl LightTable {
                 }
                 Source::Lamp(..) | Source::Delta(_) | Source::Sky => {}
             }
+        }
+        if let Some(many) = &self.many {
+            probability = many.probabilities(simd, selection, &sources, receivers, listed);
         }
         simd.vectorize(
             #[inline(always)]
@@ -213,18 +206,12 @@ impl LightTable {
         direction: Vec3x16<S>,
     ) -> f32x16<S> {
         let Some((sky, source)) = &self.sky else { return splat(simd, 0.0) };
-        let probability = splat(simd, self.choice(selection).probability(*source));
+        let probability = self.choice(selection).probability(*source) * self.share_outside(selection);
+        let probability = splat(simd, probability);
         simd.vectorize(
             #[inline(always)]
             || sky.density(simd, sky_rotation, direction) * probability,
         )
-    }
-
-    fn choice(&self, selection: Selection) -> &Choice {
-        match selection {
-            Selection::Extended => &self.extended,
-            Selection::All => &self.all,
-        }
     }
 
     #[inline(always)]

@@ -8,6 +8,7 @@ use super::super::shading::{attenuation, beam};
 use super::super::shape::Shape;
 use super::PathOracle;
 use super::hemisphere::in_cone;
+use super::light_tree::Receiver;
 use super::sources::{Among, Kind};
 use crate::scene::{Background, LightKind};
 
@@ -137,12 +138,12 @@ impl PathOracle<'_> {
     /// The density of hits of a primitive, with its probability.
     pub(super) fn density_of_hit(
         &self,
-        among: Among,
+        (among, to): (Among, &Receiver),
         primitive: usize,
         (from, direction, distance): (DVec3, DVec3, f64),
     ) -> f64 {
         let is_hit = |kind: &Kind| matches!(kind, Kind::Surface(index) if *index == primitive);
-        let probability = self.sources.probability(among, is_hit);
+        let probability = self.sources.probability(among, to, is_hit);
         if probability > 0.0 {
             probability * self.density_on(primitive, from, direction, distance)
         } else {
@@ -151,9 +152,9 @@ impl PathOracle<'_> {
     }
 
     /// The density of a direction to the sky, with the probability of the sky.
-    pub(super) fn density_of_sky(&self, among: Among, direction: DVec3) -> f64 {
+    pub(super) fn density_of_sky(&self, (among, to): (Among, &Receiver), direction: DVec3) -> f64 {
         let Some(light) = self.sources.sky() else { return 0.0 };
-        let probability = self.sources.probability(among, |kind| matches!(kind, Kind::Sky(_)));
+        let probability = self.sources.probability(among, to, |kind| matches!(kind, Kind::Sky(_)));
         let sine = direction.x.hypot(direction.z);
         let turn = libm::atan2(direction.x, -direction.z) + self.sky_turn();
         let u = (0.5 + turn / (2.0 * PI)).rem_euclid(1.0);

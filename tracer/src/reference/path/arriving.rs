@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::super::surface::SurfacePoint;
 use super::PathOracle;
 use super::aim::{Aim, Light};
+use super::light_tree::Receiver;
 use super::numbers::Numbers;
 use super::parts::Parts;
 use super::step::{Path, Sum, power_heuristic};
@@ -38,7 +39,8 @@ impl PathOracle<'_> {
             }
         }
         let select = numbers.at_vertex(bounce, Vertex::Light).x;
-        if let Some(selected) = self.sources.select(self.sources.among(bounce), select) {
+        let to = Receiver { position: surface.position, normal: surface.ng };
+        if let Some(selected) = self.sources.select(self.sources.among(bounce), &to, select) {
             let at = numbers.at_vertex(bounce, Vertex::LightPoint);
             add(self.aim(selected.kind, surface.position, at), selected.probability);
         }

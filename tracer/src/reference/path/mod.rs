@@ -7,8 +7,8 @@
 //! ```
 //!
 //! L_e at a hit has the weight of multiple importance sampling by the power heuristic (Veach 1997), and so has the light of one light that
-//! is selected at each vertex. Besides the scene, two things are shared with the integrator: the random numbers, and the piecewise constant
-//! distribution of the light of a panorama. All directions, densities, values and weights are computed here.
+//! is selected at each vertex. Besides the scene, three things are shared with the integrator: the random numbers, the piecewise constant
+//! distribution of the light of a sky, and which of many lights are together in a tree. All directions, densities, values and weights are computed here.
 //!
 //! Surfaces are diffuse, mirrors, glass, sheets, emitters, and sums of these. Rough reflection is missing: such paths have no result.
 //!
@@ -18,6 +18,7 @@
 //!   hemisphere   directions around a normal
 //!   size         size of the scene, which powers of lights depend on
 //!   sources      the lights of paths, with their power
+//!   light_tree   one of many lights, by its place
 //!   aim          directions to a source, and their densities
 //!   parts        how a surface scatters light
 //!   arriving     light of lights that are aimed at
@@ -27,6 +28,7 @@
 mod aim;
 mod arriving;
 mod hemisphere;
+mod light_tree;
 mod numbers;
 mod parts;
 mod size;

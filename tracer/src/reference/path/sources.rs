@@ -1,4 +1,5 @@
-//! The lights of paths: emitting triangles and spheres, lights of the scene, the sky. One is selected in proportion to its power.
+//! The lights of paths: emitting triangles and spheres, lights of the scene, the sky. One is selected in proportion to its power, or by a
+//! tree if there are many.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -8,8 +9,9 @@ use glam::{DVec3, Vec3};
 use super::super::Oracle;
 use super::super::shading::attenuation;
 use super::super::shape::{Primitive, Shape};
+use super::light_tree::{Lamp, LightTree, Receiver};
 use crate::intersect::Primitive as Name;
-use crate::scene::{Background, Light, LightKind, Material, SkyPicture};
+use crate::scene::{Attenuation, Background, Light, LightKind, Material, SkyPicture};
 use crate::texture::{Distribution, Texture};
 
 /// Most lights without extent whose light is computed at every first vertex.
@@ -18,6 +20,8 @@ const ALL_AT_FIRST: usize = 16;
 /// The lights of a scene.
 pub(super) struct Sources {
     list: Vec<Source>,
+    /// The tree of those that have a place, if they are many.
+    tree: Option<LightTree>,
     /// Indices of the lights of the scene that shine.
     pub lights: Vec<usize>,
     /// Whether the light of all lights without extent is computed at first vertices.
@@ -28,6 +32,7 @@ pub(super) struct Sources {
 pub(super) struct Source {
     pub kind: Kind,
     power: f64,
+    lamp: Option<Lamp>,
 }
 
 /// The kinds of light.
@@ -69,7 +74,8 @@ impl Sources {
         for &index in &lights {
             let light = &scene.lights[index];
             let kind = if oracle.is_ball(light) { Kind::Ball(index) } else { Kind::Point(index) };
-            list.push(Source { kind, power: PI * section * mean(light.color) * attenuation(light, reach) });
+            let power = PI * section * mean(light.color) * attenuation(light, reach);
+            list.push(Source { kind, power, lamp: lamp(oracle, light, reach) });
         }
         list.extend(surfaces(oracle));
         if let Some(panorama) = panorama(oracle)
@@ -77,11 +83,12 @@ impl Sources {
         {
             // The weights of the picture have the sines of its rows, whose mean is 2 / pi, and the channels added.
             let power = PI * section * light.total() * (PI / 2.0) / 3.0 * strength(oracle);
-            list.push(Source { kind: Kind::Sky(Arc::clone(panorama)), power });
+            list.push(Source { kind: Kind::Sky(Arc::clone(panorama)), power, lamp: None });
         }
         let without_extent = lights.iter().filter(|&&index| !oracle.is_ball(&scene.lights[index]));
         let all_at_first = without_extent.count() <= ALL_AT_FIRST;
-        Self { list, lights, all_at_first }
+        let tree = tree(&list, reach);
+        Self { list, tree, lights, all_at_first }
     }
 
     /// The lights that the vertex after a number of bounces selects from.
@@ -89,24 +96,34 @@ impl Sources {
         if bounce == 0 && self.all_at_first { Among::WithExtent } else { Among::All }
     }
 
-    /// The light in whose share of [0, 1) a number is.
-    pub(super) fn select(&self, among: Among, number: f64) -> Option<Selected<'_>> {
+    /// The light that a point selects by a number in [0, 1).
+    pub(super) fn select(&self, among: Among, to: &Receiver, number: f64) -> Option<Selected<'_>> {
+        let in_tree = self.share_of_tree(among);
+        if let Some(tree) = self.tree.as_ref().filter(|_| number < in_tree) {
+            let (source, probability) = tree.select(among, to, number / in_tree)?;
+            return Some(Selected { kind: &self.list[source].kind, probability: probability * in_tree });
+        }
+        // The powers outside of the tree follow its share.
         let total = self.total(among);
-        let mut end = 0.0;
-        self.list.iter().filter(|source| source.power_among(among) > 0.0).find_map(|source| {
-            let power = source.power_among(among);
-            end += power;
-            let probability = power / total;
-            (number < end / total).then_some(Selected { kind: &source.kind, probability })
+        let mut end = in_tree;
+        self.outside().filter(|source| source.power_among(among) > 0.0).find_map(|source| {
+            let probability = source.power_among(among) / total;
+            end += probability;
+            (number < end).then_some(Selected { kind: &source.kind, probability })
         })
     }
 
-    /// Probability of the lights for which a condition holds.
-    pub(super) fn probability(&self, among: Among, is: impl Fn(&Kind) -> bool) -> f64 {
+    /// Probability that a point selects one of the lights for which a condition holds.
+    pub(super) fn probability(&self, among: Among, to: &Receiver, is: impl Fn(&Kind) -> bool) -> f64 {
         let total = self.total(among);
-        let powers = self.list.iter().filter(|source| is(&source.kind));
+        let powers = self.outside().filter(|source| is(&source.kind));
         let power: f64 = powers.map(|source| source.power_among(among)).sum();
-        if total > 0.0 { power / total } else { 0.0 }
+        let outside = if total > 0.0 { power / total } else { 0.0 };
+        let in_tree = self.tree.iter().flat_map(|tree| {
+            let sources = tree.sources.iter().filter(|&&source| is(&self.list[source].kind));
+            sources.map(|&source| tree.probability(among, to, source) * self.share_of_tree(among))
+        });
+        outside + in_tree.sum::<f64>()
     }
 
     /// The distribution of the light of the sky, if it is a light.
@@ -115,6 +132,17 @@ impl Sources {
             Kind::Sky(texture) => texture.light(),
             _ => None,
         })
+    }
+
+    /// The sources that are not in the tree.
+    fn outside(&self) -> impl Iterator<Item = &Source> {
+        self.list.iter().filter(|source| self.tree.is_none() || source.lamp.is_none())
+    }
+
+    fn share_of_tree(&self, among: Among) -> f64 {
+        let (total, outside) =
+            (self.total(among), self.outside().map(|source| source.power_among(among)).sum::<f64>());
+        if total > 0.0 { 1.0 - outside / total } else { 0.0 }
     }
 
     fn total(&self, among: Among) -> f64 {
@@ -150,13 +178,22 @@ fn surfaces(oracle: &Oracle) -> Vec<Source> {
         if !material.is_emissive() || varies || material.unlit {
             continue;
         }
-        let area = match primitive.shape {
-            Shape::Triangle { corners: [a, b, c], .. } => (b - a).cross(c - a).length() / 2.0,
-            Shape::Sphere { radius, inside_out: false, .. } => 4.0 * PI * radius * radius,
+        let radiance = mean(material.emission);
+        let (area, lamp) = match &primitive.shape {
+            Shape::Triangle { corners, skin, .. } => {
+                let [a, b, c] = *corners;
+                let doubled = (b - a).cross(c - a);
+                let front = if skin.mirrored { -doubled } else { doubled }.normalize_or_zero();
+                (doubled.length() / 2.0, Lamp::triangle(*corners, front, radiance))
+            }
+            Shape::Sphere { center, radius, inside_out: false, .. } => {
+                let irradiance = [PI * radiance * radius * radius, 0.0];
+                (4.0 * PI * radius * radius, Lamp::ball(*center, *radius, irradiance))
+            }
             Shape::Sphere { .. } | Shape::Disk { .. } | Shape::Plane { .. } => continue,
         };
-        let power = PI * area * mean(material.emission);
-        found.push((primitive.name, Source { kind: Kind::Surface(index), power }));
+        let (power, lamp) = (PI * area * radiance, Some(lamp));
+        found.push((primitive.name, Source { kind: Kind::Surface(index), power, lamp }));
     }
     found.sort_by_key(|(name, _)| match *name {
         Name::Model { model, triangle } => (0, model, triangle),
@@ -165,6 +202,35 @@ fn surfaces(oracle: &Oracle) -> Vec<Source> {
         Name::Disk(index) | Name::Plane(index) => (3, index, 0),
     });
     found.into_iter().map(|(_, source)| source).collect()
+}
+
+/// Where a light of the scene is, and what it lights; directional lights have no place.
+fn lamp(oracle: &Oracle, light: &Light, reach: f64) -> Option<Lamp> {
+    let (position, axis, half_angle) = match light.kind {
+        LightKind::Point { position } => (position, DVec3::Z, PI),
+        LightKind::Spot { position, direction, beam_angle, .. } => {
+            (position, direction.normalize(), (beam_angle / 2.0).to_radians())
+        }
+        LightKind::Directional { .. } => return None,
+    };
+    let far = PI * mean(light.color) * attenuation(light, reach);
+    let falls = match light.attenuation {
+        Attenuation::None => false,
+        Attenuation::InverseSquare => true,
+        Attenuation::Polynomial { quadratic, .. } => quadratic > 0.0,
+    };
+    let irradiance = if falls { [far * reach * reach, 0.0] } else { [0.0, far] };
+    let radius = if oracle.is_ball(light) { light.radius } else { 0.0 };
+    let ball = Lamp::ball(position - oracle.view.camera.position, radius, irradiance);
+    Some(Lamp { axis, angles: [half_angle.min(PI), 0.0], ..ball })
+}
+
+/// The tree of the lights that have a place and a power.
+fn tree(list: &[Source], reach: f64) -> Option<LightTree> {
+    let is_in_tree = |source: &Source| source.power_among(Among::All) > 0.0;
+    let placed = list.iter().enumerate().filter(|(_, source)| is_in_tree(source));
+    let lamps = placed.filter_map(|(index, source)| Some((index, source.lamp.clone()?)));
+    LightTree::of(lamps.collect(), reach)
 }
 
 fn material<'a>(oracle: &'a Oracle, primitive: &Primitive) -> &'a Material {

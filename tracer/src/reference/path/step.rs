@@ -6,6 +6,7 @@ use super::super::bodies::Bodies;
 use super::super::camera::Ray;
 use super::super::surface::SurfacePoint;
 use super::PathOracle;
+use super::light_tree::Receiver;
 use super::numbers::Numbers;
 use super::parts::{Scattered, Unknown};
 use crate::sampler::Vertex;
@@ -24,6 +25,8 @@ pub(super) struct Path {
     pub density: f64,
     /// The transparent bodies around the ray.
     pub bodies: Bodies,
+    /// The last vertex.
+    pub from: Receiver,
 }
 
 /// The light of a sample.
@@ -51,7 +54,8 @@ impl Path {
     /// A path that begins with a ray of the camera.
     pub(super) fn begin(ray: Ray) -> Self {
         let bodies = Bodies::default();
-        Self { ray, starts_on: None, weight: DVec3::ONE, density: f64::INFINITY, bodies }
+        let from = Receiver { position: ray.origin, normal: DVec3::ZERO };
+        Self { ray, starts_on: None, weight: DVec3::ONE, density: f64::INFINITY, bodies, from }
     }
 }
 
@@ -101,7 +105,7 @@ impl PathOracle<'_> {
         if bounce == 0 {
             return self.oracle.background_of_camera(direction);
         }
-        let other = self.density_of_sky(self.sources.among(bounce - 1), direction);
+        let other = self.density_of_sky((self.sources.among(bounce - 1), &path.from), direction);
         let left = path.bodies.remaining_at_infinity(&self.oracle.scene.materials);
         path.weight * left * self.oracle.background(direction) * power_heuristic(path.density, other)
     }
@@ -114,7 +118,7 @@ impl PathOracle<'_> {
         }
         let among = self.sources.among(bounce - 1);
         let way = (path.ray.origin, path.ray.direction, surface.way);
-        let other = self.density_of_hit(among, surface.primitive, way);
+        let other = self.density_of_hit((among, &path.from), surface.primitive, way);
         path.weight * emission * power_heuristic(path.density, other)
     }
 
@@ -150,6 +154,7 @@ impl PathOracle<'_> {
             path.bodies
         };
         let ray = Ray { origin: surface.clear_origin(), direction, ..path.ray };
-        Some(Path { ray, starts_on: Some(surface.primitive), weight, density, bodies })
+        let from = Receiver { position: surface.position, normal: surface.ng };
+        Some(Path { ray, starts_on: Some(surface.primitive), weight, density, bodies, from })
     }
 }

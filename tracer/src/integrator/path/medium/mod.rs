@@ -12,7 +12,7 @@ use super::group::Group;
 use super::queue::Path;
 use super::selected::{BEFORE_LIGHT, sampled_light};
 use super::vertex::{Incoming, ROULETTE_FROM, arrays, vector};
-use crate::light::table::LightSamples;
+use crate::light::table::{LightSamples, Receivers};
 use crate::rays::{Ray, RaySource};
 use crate::sampler::{Dimension, Vertex};
 use crate::simd::vector::Vec3x16;
@@ -148,8 +148,8 @@ impl Group<'_> {
         watch: &mut W,
     ) {
         let points = Vec3x16::load(simd, &vertices.rounded);
-        let at = (points, vertices.lanes);
-        let Some(samples) = self.select_light(simd, bounce, at, incoming) else { return };
+        let receivers = Receivers { points, normals: Vec3x16::splat(simd, [0.0; 3]), lanes: vertices.lanes };
+        let Some(samples) = self.select_light(simd, bounce, &receivers, incoming) else { return };
         let phase = splat(simd, PHASE);
         let (mut light, lit) = sampled_light(simd, &samples, weight.scale(phase), phase);
         let mut visible = vertices.lanes & samples.live & lit;
@@ -193,6 +193,7 @@ impl Group<'_> {
         let at = self.numbers(simd, incoming, Dimension::of(bounce, Vertex::Direction));
         let (at, roulette) = (at.map(|number| number.to_array()), roulette.to_array());
         let weights = arrays(weight);
+        let mut leaving = 0;
         for lane in each_bit(vertices.lanes) {
             let mut weight = three!(channel => weights[channel][lane]);
             let most = weight[0].max(weight[1]).max(weight[2]);
@@ -215,7 +216,12 @@ impl Group<'_> {
                     sample: path.sample,
                 };
                 self.next.push(next);
+                leaving |= 1 << lane;
             }
+        }
+        if self.keeps_receivers {
+            let points = Vec3x16::load(simd, &vertices.rounded);
+            self.keep_receivers(points, Vec3x16::splat(simd, [0.0; 3]), leaving);
         }
     }
 }

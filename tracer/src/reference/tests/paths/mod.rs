@@ -115,3 +115,11 @@ fn single_paths_among_objects_that_move_are_those_of_the_oracle() {
 fn single_paths_through_glass_that_moves_are_those_of_the_oracle() {
     assert_same(&scenes::moving_glass(), seeded(0), 10, |_| {});
 }
+
+#[test]
+fn one_of_many_lamps_is_selected_as_in_the_oracle() {
+    for seed in [0, 12] {
+        assert_same(&scenes::many_lamps(), seeded(seed), 5, |_| {});
+    }
+    assert_same(&scenes::lamps_outdoors(), seeded(0), 5, |_| {});
+}

@@ -263,3 +263,43 @@ pub(super) fn moving_glass() -> Furnished {
     ];
     furnished
 }
+
+/// The room with a hundred small lamps: balls, triangles, lights with a radius, points and spots.
+pub(super) fn many_lamps() -> Furnished {
+    let mut furnished = diffuse_room();
+    let scene = &mut furnished.scene;
+    for i in 0..100_u32 {
+        let (s, c) = libm::sincos(f64::from(i) * 2.4);
+        let distance = 0.2 * f64::from(i + 1).sqrt();
+        let place = DVec3::new(distance * c, 1.0 + 0.4 * libm::sin(f64::from(i)), distance * s - 0.3);
+        let point = LightKind::Point { position: place };
+        let color = Vec3::new(0.01, 0.02, 0.015);
+        let falling = Light { attenuation: Attenuation::InverseSquare, ..light(point, color) };
+        match i % 5 {
+            0 | 1 => scene.spheres.push(ball(place, 0.02, 4)),
+            2 => {
+                let towards = DVec3::new(0.07 * s, -0.05, 0.03 * c);
+                let vertices = [place, place + DVec3::new(0.06, 0.01, 0.02), place + towards];
+                scene.triangles.push(Triangle { vertices, uvs: None, material: 2 });
+            }
+            3 => scene.lights.push(Light { radius: 0.03, ..falling }),
+            _ => {
+                let direction = (DVec3::NEG_Y - place * 0.3).normalize();
+                let kind = LightKind::Spot { position: place, direction, beam_angle: 80.0, penumbra: 20.0 };
+                scene.lights.push(Light { kind, ..falling });
+            }
+        }
+    }
+    furnished
+}
+
+/// The floor under the turned panorama, with many lamps.
+pub(super) fn lamps_outdoors() -> Furnished {
+    let mut furnished = outdoors();
+    for i in 0..30_u32 {
+        let (s, c) = libm::sincos(f64::from(i) * 2.4);
+        let place = DVec3::new(0.25 * f64::from(i).sqrt() * c, 0.3 + 0.01 * f64::from(i), 0.3 * s);
+        furnished.scene.spheres.push(ball(place, 0.05, 4));
+    }
+    furnished
+}

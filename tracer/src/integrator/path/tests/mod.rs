@@ -1,5 +1,7 @@
 //! Paths: the same bits however they are rendered, and pictures that follow from the equations by hand.
 
+mod many_lamps;
+
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
