@@ -24,11 +24,15 @@ pub(super) fn light_table(frame: &PreparedFrame) -> Option<LightTable> {
     if frame.features.emissive {
         frame.items.range().for_each(|item| add_item(frame, item, &mut sources));
     }
-    if let Background::Sky(sky) = &scene.background
-        && let SkyPicture::Panorama(texture) = sky.picture
-        && let Some(table) = SkyTable::new(&frame.textures()[texture as usize].0)
-    {
-        sources.add_sky(table, sky.strength);
+    if let Background::Sky(sky) = &scene.background {
+        let texture = |index: u32| &frame.textures()[index as usize].0;
+        let table = match sky.picture {
+            SkyPicture::Panorama(panorama) => SkyTable::of_panorama(texture(panorama)),
+            SkyPicture::Cubemap(faces) => SkyTable::of_cube_map(faces.map(texture)),
+        };
+        if let Some(table) = table {
+            sources.add_sky(table, sky.strength);
+        }
     }
     sources.into_table()
 }

@@ -65,7 +65,7 @@ impl Oracle {
 
 /// The face of a cube map that a direction sees, and the place on it from its top left corner: the table of section 8.13 of the
 /// OpenGL 4.6 specification.
-fn cube_face(d: DVec3) -> (usize, DVec2) {
+pub(super) fn cube_face(d: DVec3) -> (usize, DVec2) {
     let size = d.abs();
     let (face, s, t, major) = if size.x >= size.y && size.x >= size.z {
         if d.x > 0.0 { (0, -d.z, -d.y, size.x) } else { (1, d.z, -d.y, size.x) }

@@ -1,4 +1,4 @@
-//! Random places in a panorama, in proportion to the light that comes from there.
+//! Random places in a picture of a sky, in proportion to the light that comes from there.
 //!
 //! The probability is constant in each cell of a grid. A place is found by inverting the cumulative probabilities of the rows, and of
 //! the cells of the row, so that evenly spread numbers give evenly spread places (Pharr, Jakob and Humphreys, "Physically Based
@@ -30,7 +30,7 @@ pub(crate) struct Place {
 
 impl Distribution {
     /// The density that is proportional to weights of cells, row by row; `None` if all are 0.
-    fn new(weights: &[f32], columns: usize) -> Option<Self> {
+    pub(super) fn new(weights: &[f32], columns: usize) -> Option<Self> {
         let mut cells = Vec::with_capacity(weights.len());
         let mut of_rows = Vec::new();
         for row in weights.chunks_exact(columns) {

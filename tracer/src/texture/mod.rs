@@ -12,6 +12,7 @@
 //!   lookup            single lookups in f64, of alpha and normals
 //!   pyramid           smaller and smaller sizes, for surfaces far away
 //!   distribution      random places in the picture of a sky, by its light
+//!   face_light        those in faces of cube maps
 //!   uv                texture coordinates with and without whole repeats
 //! ```
 
@@ -19,6 +20,7 @@ mod alpha;
 pub(crate) mod bilinear;
 mod blob;
 mod distribution;
+mod face_light;
 mod lookup;
 mod map;
 mod pyramid;

@@ -13,9 +13,11 @@
 //!   triangle   points on triangles
 //!   ball       directions into the cone of a sphere
 //!   sky        directions to a sky, by its radiance
+//!   cube       those to a cube map
 //! ```
 
 mod ball;
+mod cube;
 mod delta;
 mod samples;
 mod select;
@@ -32,8 +34,9 @@ use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, each_bit, f32x16, splat, three};
 use ball::Ball;
 pub(crate) use samples::LightSamples;
+use samples::Selected;
 use select::Choice;
-use selector::{Many, Selected};
+use selector::Many;
 pub(crate) use sky::SkyTable;
 pub(crate) use sources::{Beam, Sources, SurfaceKey};
 pub(crate) use tree::{LEAST_COSINE, LEAST_DISTANCE, Layout, MIN_LIGHTS, Receiver};

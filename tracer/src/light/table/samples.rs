@@ -1,6 +1,27 @@
-//! Light of selected lights at sixteen points.
+//! Selected lights of sixteen points, and their light.
 
 use crate::simd::{LANES, Lanes};
+
+/// The sources that some points select.
+pub(super) struct Selected {
+    /// Bits of the points that select one.
+    pub lanes: u32,
+    pub sources: [u32; LANES],
+    pub probability: Lanes,
+}
+
+impl Selected {
+    pub(super) fn none() -> Self {
+        Self { lanes: 0, sources: [0; LANES], probability: Lanes::ZERO }
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, source: u32, probability: f32) {
+        self.lanes |= 1 << lane;
+        self.sources[lane] = source;
+        self.probability.0[lane] = probability;
+    }
+}
 
 /// Light that one selected light sends to each of sixteen points.
 pub(crate) struct LightSamples {

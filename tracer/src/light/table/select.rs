@@ -43,6 +43,15 @@ impl Choice {
         index.min(self.ends.len().saturating_sub(1)) as u32
     }
 
+    /// The source of a number in [0, 1), its probability, and the place of the number in its part, in [0, 1).
+    pub(super) fn select_and_rescale(&self, number: f32) -> (u32, f32, f32) {
+        let source = self.select(number);
+        let start = (source as usize).checked_sub(1).and_then(|before| self.ends.get(before));
+        let probability = self.probability(source);
+        let within = if probability > 0.0 { (number - start.unwrap_or(&0.0)) / probability } else { 0.0 };
+        (source, probability, within.clamp(0.0, 1.0 - f32::EPSILON / 2.0))
+    }
+
     /// The probability of a source.
     pub(super) fn probability(&self, source: u32) -> f32 {
         self.probability.get(source as usize).copied().unwrap_or(0.0)
@@ -62,6 +71,15 @@ mod tests {
         let sum: f32 = (0..5).map(|source| choice.probability(source)).sum();
         assert_eq!((sum, choice.probability(1)), (1.0, 0.0));
         assert_eq!(choice.select(1.0 - f32::EPSILON / 2.0), 3);
+    }
+
+    #[test]
+    fn numbers_are_rescaled_within_the_part_of_a_source() {
+        let choice = Choice::by_power(&[1.0, 0.0, 3.0]);
+        assert_eq!(choice.select_and_rescale(0.125), (0, 0.25, 0.5));
+        assert_eq!(choice.select_and_rescale(0.25), (2, 0.75, 0.0));
+        let (source, probability, rest) = choice.select_and_rescale(1.0 - f32::EPSILON / 2.0);
+        assert!((source, probability) == (2, 0.75) && rest > 0.99 && rest < 1.0);
     }
 
     #[test]

@@ -1,30 +1,10 @@
 //! The sources that sixteen points select.
 
+use super::samples::Selected;
 use super::select::Choice;
 use super::tree::{LightTree, Receiver};
 use super::{LightTable, Receivers, Selection};
 use crate::simd::{LANES, Lanes, Simd, each_bit};
-
-/// The sources that some points select.
-pub(super) struct Selected {
-    /// Bits of the points that select one.
-    pub lanes: u32,
-    pub sources: [u32; LANES],
-    pub probability: Lanes,
-}
-
-impl Selected {
-    pub(super) fn none() -> Self {
-        Self { lanes: 0, sources: [0; LANES], probability: Lanes::ZERO }
-    }
-
-    #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, source: u32, probability: f32) {
-        self.lanes |= 1 << lane;
-        self.sources[lane] = source;
-        self.probability.0[lane] = probability;
-    }
-}
 
 /// Many sources.
 #[derive(Clone, Debug)]

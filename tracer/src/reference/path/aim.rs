@@ -100,14 +100,9 @@ impl PathOracle<'_> {
     }
 
     fn aim_at_sky(&self, at: DVec2) -> Option<Aim> {
-        let place = self.sources.sky()?.place([at.x as f32, at.y as f32]);
-        // Rows begin at the bottom.
-        let [u, v] = place.at.map(f64::from);
-        let (sine, cosine) = libm::sincos(PI * (1.0 - v));
-        let (s, c) = libm::sincos(2.0 * PI * (u - 0.5) - self.sky_turn());
-        let direction = DVec3::new(sine * s, cosine, -sine * c);
+        let (in_picture, density) = self.sources.sky()?.sample(at)?;
+        let direction = turned(in_picture, -self.sky_turn());
         let radiance = self.oracle.background(direction);
-        let density = f64::from(place.density) / (2.0 * PI * PI * sine);
         Some(Aim {
             direction,
             distance: f64::INFINITY,
@@ -153,13 +148,9 @@ impl PathOracle<'_> {
 
     /// The density of a direction to the sky, with the probability of the sky.
     pub(super) fn density_of_sky(&self, (among, to): (Among, &Receiver), direction: DVec3) -> f64 {
-        let Some(light) = self.sources.sky() else { return 0.0 };
+        let Some(sky) = self.sources.sky() else { return 0.0 };
         let probability = self.sources.probability(among, to, |kind| matches!(kind, Kind::Sky(_)));
-        let sine = direction.x.hypot(direction.z);
-        let turn = libm::atan2(direction.x, -direction.z) + self.sky_turn();
-        let u = (0.5 + turn / (2.0 * PI)).rem_euclid(1.0);
-        let v = 1.0 - libm::acos(direction.y.clamp(-1.0, 1.0)) / PI;
-        probability * f64::from(light.density([u as f32, v as f32])) / (2.0 * PI * PI * sine)
+        probability * sky.density(turned(direction, self.sky_turn()))
     }
 
     /// Angle from the direction to the place in the picture, around +Y.
@@ -169,6 +160,13 @@ impl PathOracle<'_> {
             Background::Color(_) | Background::Gradient { .. } => 0.0,
         }
     }
+}
+
+/// A direction turned around +Y: -Z turns towards +X.
+fn turned(direction: DVec3, angle: f64) -> DVec3 {
+    let (s, c) = libm::sincos(angle);
+    let DVec3 { x, y, z } = direction;
+    DVec3::new(c * x - s * z, y, c * z + s * x)
 }
 
 /// Cosine of half of the angle in which a ball is seen; `None` from inside.

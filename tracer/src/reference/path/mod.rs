@@ -19,6 +19,7 @@
 //!   size         size of the scene, which powers of lights depend on
 //!   sources      the lights of paths, with their power
 //!   light_tree   one of many lights, by its place
+//!   sky_light    directions to the sky, by its light
 //!   aim          directions to a source, and their densities
 //!   parts        how a surface scatters light
 //!   arriving     light of lights that are aimed at
@@ -32,6 +33,7 @@ mod light_tree;
 mod numbers;
 mod parts;
 mod size;
+mod sky_light;
 mod sources;
 mod start;
 mod step;

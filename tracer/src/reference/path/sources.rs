@@ -2,7 +2,6 @@
 //! tree if there are many.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
@@ -10,9 +9,9 @@ use super::super::Oracle;
 use super::super::shading::attenuation;
 use super::super::shape::{Primitive, Shape};
 use super::light_tree::{Lamp, LightTree, Receiver};
+use super::sky_light::SkyLight;
 use crate::intersect::Primitive as Name;
-use crate::scene::{Attenuation, Background, Light, LightKind, Material, SkyPicture};
-use crate::texture::{Distribution, Texture};
+use crate::scene::{Attenuation, Background, Light, LightKind, Material};
 
 /// Most lights without extent whose light is computed at every first vertex.
 const ALL_AT_FIRST: usize = 16;
@@ -43,7 +42,7 @@ pub(super) enum Kind {
     Ball(usize),
     /// A light of the scene without extent.
     Point(usize),
-    Sky(Arc<Texture>),
+    Sky(SkyLight),
 }
 
 /// Which lights are selected from.
@@ -78,12 +77,9 @@ impl Sources {
             list.push(Source { kind, power, lamp: lamp(oracle, light, reach) });
         }
         list.extend(surfaces(oracle));
-        if let Some(panorama) = panorama(oracle)
-            && let Some(light) = panorama.light()
-        {
-            // The weights of the picture have the sines of its rows, whose mean is 2 / pi, and the channels added.
-            let power = PI * section * light.total() * (PI / 2.0) / 3.0 * strength(oracle);
-            list.push(Source { kind: Kind::Sky(Arc::clone(panorama)), power, lamp: None });
+        if let Some(sky) = SkyLight::of(oracle) {
+            let power = PI * section * sky.mean() * strength(oracle);
+            list.push(Source { kind: Kind::Sky(sky), power, lamp: None });
         }
         let without_extent = lights.iter().filter(|&&index| !oracle.is_ball(&scene.lights[index]));
         let all_at_first = without_extent.count() <= ALL_AT_FIRST;
@@ -126,10 +122,10 @@ impl Sources {
         outside + in_tree.sum::<f64>()
     }
 
-    /// The distribution of the light of the sky, if it is a light.
-    pub(super) fn sky(&self) -> Option<&Distribution> {
+    /// The sky, if it is a light.
+    pub(super) fn sky(&self) -> Option<&SkyLight> {
         self.list.iter().find_map(|source| match &source.kind {
-            Kind::Sky(texture) => texture.light(),
+            Kind::Sky(sky) => Some(sky),
             _ => None,
         })
     }
@@ -235,13 +231,6 @@ fn tree(list: &[Source], reach: f64) -> Option<LightTree> {
 
 fn material<'a>(oracle: &'a Oracle, primitive: &Primitive) -> &'a Material {
     &oracle.scene.materials[primitive.material as usize]
-}
-
-fn panorama(oracle: &Oracle) -> Option<&Arc<Texture>> {
-    let Background::Sky(sky) = &oracle.scene.background else { return None };
-    let SkyPicture::Panorama(index) = sky.picture else { return None };
-    let id = oracle.scene.textures[index as usize].texture;
-    oracle.textures.iter().find(|texture| texture.id() == id)
 }
 
 fn strength(oracle: &Oracle) -> f64 {

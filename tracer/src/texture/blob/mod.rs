@@ -99,6 +99,8 @@ pub struct Texture {
     pyramid: OnceLock<Pyramid>,
     /// Where the light of a panorama comes from, found when it is first needed.
     pub(super) light: OnceLock<Option<Distribution>>,
+    /// Where the light of a face of a cube map comes from, found when it is first needed.
+    pub(super) face_light: OnceLock<Option<Distribution>>,
 }
 
 /// Numbers of texels that a linear texture cannot hold as they are.
@@ -203,7 +205,8 @@ impl Texture {
         let id = TextureId(*blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes());
         let alpha = HEADER_BYTES + 3 * width as usize * height as usize;
         let (alpha, linear) = ((version == WITH_ALPHA).then_some(alpha), version == LINEAR);
-        Ok(Self { bytes, width, height, alpha, linear, id, pyramid: OnceLock::new(), light: OnceLock::new() })
+        let (light, face_light) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { bytes, width, height, alpha, linear, id, pyramid: OnceLock::new(), light, face_light })
     }
 
     /// The bytes as they are sent.

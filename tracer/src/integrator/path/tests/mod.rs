@@ -1,6 +1,7 @@
 //! Paths: the same bits however they are rendered, and pictures that follow from the equations by hand.
 
 mod many_lamps;
+mod skies;
 
 use std::sync::Arc;
 

@@ -28,7 +28,7 @@ mod tests;
 
 use glam::DVec3;
 
-use super::selector::Selected;
+use super::samples::Selected;
 use super::{Receivers, Selection};
 use crate::simd::{LANES, Lanes, Simd, SimdBase, each_bit, three};
 pub(super) use bound::{Bound, Strength};

@@ -94,6 +94,13 @@ fn single_paths_under_a_panorama_are_those_of_the_oracle() {
 }
 
 #[test]
+fn single_paths_under_a_cube_map_are_those_of_the_oracle() {
+    for seed in [0, 13] {
+        assert_same(&scenes::under_a_cube_map(), seeded(seed), 6, |_| {});
+    }
+}
+
+#[test]
 fn one_of_many_lights_is_selected_as_in_the_oracle() {
     assert_same(&scenes::many_lights(), seeded(0), 5, |_| {});
 }

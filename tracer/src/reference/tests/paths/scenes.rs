@@ -303,3 +303,24 @@ pub(super) fn lamps_outdoors() -> Furnished {
     }
     furnished
 }
+
+/// Balls on a floor under a turned cube map with a small sun, and a lamp.
+pub(super) fn under_a_cube_map() -> Furnished {
+    let mut furnished = outdoors();
+    let face = |index: u32| {
+        let pixels = (0..64).flat_map(|i| match (index, i) {
+            (2, 27) => [255, 250, 230],
+            (3, _) => [20, 15, 10],
+            (5, _) => [0; 3],
+            _ => [40 + 5 * index as u8, 60 + i as u8, 90],
+        });
+        RgbImage { width: 8, height: 8, pixels: pixels.collect() }
+    };
+    furnished.textures = (0..6).flat_map(|index| Texture::new(&face(index))).map(Arc::new).collect();
+    let scene = &mut furnished.scene;
+    scene.textures =
+        furnished.textures.iter().map(|face| TextureMap::new(face.id(), Filter::Bilinear)).collect();
+    let picture = SkyPicture::Cubemap([0, 1, 2, 3, 4, 5]);
+    scene.background = Background::Sky(Sky { picture, rotate: 35.0, strength: 1.5 });
+    furnished
+}
