@@ -36,8 +36,9 @@ pub(crate) use layout::Layout;
 use node::Node;
 pub(crate) use node::{LEAST_COSINE, LEAST_DISTANCE};
 
-/// Least number of lights in a tree: fewer are selected by their power.
-pub(crate) const MIN_LIGHTS: usize = 17;
+/// Least number of lights in a tree: fewer are selected by their power, at less cost. In a room with 12 lamps the error of the tree is
+/// a third of that of power, at the same number of samples, each of which takes a fifth longer.
+pub(crate) const MIN_LIGHTS: usize = 9;
 
 /// Bits of the index of a part in its node.
 const BITS: u32 = LANES.trailing_zeros();
