@@ -4,11 +4,13 @@ use std::fmt;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rcgen::{CertificateParams, KeyPair, PKCS_ECDSA_P256_SHA256};
+use rustls::ServerConfig;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, PrivatePkcs8KeyDer};
 
-use super::certificate;
+use super::{certificate, tls};
 use crate::KeyHash;
 
 /// Largest file that is read as a key, in bytes.
@@ -24,6 +26,8 @@ pub struct PrivateKey {
     pem: String,
     pkcs8: Vec<u8>,
     certificate: CertificateDer<'static>,
+    /// Configuration of the connections that this end accepts.
+    server_config: Arc<ServerConfig>,
     hash: KeyHash,
 }
 
@@ -116,8 +120,12 @@ impl PrivateKey {
 
     /// Certificate and key as TLS takes them.
     pub(super) fn tls_parts(&self) -> (Vec<CertificateDer<'static>>, PrivateKeyDer<'static>) {
-        let key = PrivatePkcs8KeyDer::from(self.pkcs8.clone());
-        (vec![self.certificate.clone()], PrivateKeyDer::Pkcs8(key))
+        tls_parts(&self.certificate, &self.pkcs8)
+    }
+
+    /// Configuration of the connections that this end accepts, made once.
+    pub(super) fn server_config(&self) -> &Arc<ServerConfig> {
+        &self.server_config
     }
 
     fn of_pair(pair: &KeyPair) -> Result<Self, PrivateKeyError> {
@@ -126,7 +134,10 @@ impl PrivateKey {
         params.not_after = rcgen::date_time_ymd(4096, 1, 1);
         let certificate = params.self_signed(pair).map_err(make_error)?.der().clone();
         let hash = certificate::key_hash(&certificate).map_err(make_error)?;
-        Ok(Self { pem: pair.serialize_pem(), pkcs8: pair.serialize_der(), certificate, hash })
+        let pkcs8 = pair.serialize_der();
+        let (chain, private) = tls_parts(&certificate, &pkcs8);
+        let server_config = tls::server_config(chain, private).map_err(make_error)?;
+        Ok(Self { pem: pair.serialize_pem(), pkcs8, certificate, server_config, hash })
     }
 
     /// Writes the key to a new file: first to a temporary file of the same folder, which then gets the name. Returns
@@ -153,6 +164,14 @@ impl PrivateKey {
         let _ = fs::remove_file(&temporary);
         linked.map_err(|source| file_error("write", path, source))
     }
+}
+
+fn tls_parts(
+    certificate: &CertificateDer<'static>,
+    pkcs8: &[u8],
+) -> (Vec<CertificateDer<'static>>, PrivateKeyDer<'static>) {
+    let key = PrivatePkcs8KeyDer::from(pkcs8.to_vec());
+    (vec![certificate.clone()], PrivateKeyDer::Pkcs8(key))
 }
 
 fn make_error(error: impl fmt::Display) -> PrivateKeyError {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use rustls::client::Resumption;
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, ring, verify_tls13_signature};
-use rustls::pki_types::{CertificateDer, ServerName, UnixTime};
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, ServerName, UnixTime};
 use rustls::server::NoServerSessionStorage;
 use rustls::server::danger::{ClientCertVerified, ClientCertVerifier};
 use rustls::time_provider::TimeProvider;
@@ -24,7 +24,8 @@ use crate::{KeyHash, ProtocolError};
 /// Name for the TLS library. It is not sent.
 const SERVER_NAME: &str = "rayfarm";
 
-/// Connects as the end that knows the other's key.
+/// Connects as the end that knows the other's key. The configuration is made for each connection, because it contains the
+/// expected key.
 ///
 /// # Errors
 /// Another key, a wrong signature, a peer without TLS 1.3, too many bytes, a failed transport.
@@ -69,23 +70,31 @@ pub(crate) async fn accept<S>(
 where
     S: AsyncRead + AsyncWrite + Unpin,
 {
-    let (chain, private) = key.tls_parts();
-    let config = ServerConfig::builder_with_details(provider(), Arc::new(NoClock))
-        .with_protocol_versions(&[&rustls::version::TLS13])
-        .map_err(|error| tls_error(&error))?
-        .with_client_cert_verifier(Arc::new(AnyKey { provider: provider() }))
-        .with_single_cert(chain, private);
-    let mut config = config.map_err(|error| tls_error(&error))?;
-    config.send_tls13_tickets = 0;
-    config.session_storage = Arc::new(NoServerSessionStorage {});
     let bounded = Bounded::new(stream, MAX_UNAUTHENTICATED_BYTES);
-    let stream =
-        TlsAcceptor::from(Arc::new(config)).accept(bounded).await.map_err(|error| tls_error(&error))?;
+    let acceptor = TlsAcceptor::from(Arc::clone(key.server_config()));
+    let stream = acceptor.accept(bounded).await.map_err(|error| tls_error(&error))?;
     let (_, session) = stream.get_ref();
     let certificates = session.peer_certificates().unwrap_or_default();
     let first = certificates.first().ok_or_else(|| tls_error(&Error::NoCertificatesPresented))?;
     let hash = certificate::key_hash(first).map_err(|error| tls_error(&error))?;
     Ok((stream.into(), hash))
+}
+
+/// Configuration of all connections that an end with this certificate and this key accepts.
+///
+/// # Errors
+/// A key that does not fit the certificate.
+pub(super) fn server_config(
+    chain: Vec<CertificateDer<'static>>,
+    private: PrivateKeyDer<'static>,
+) -> Result<Arc<ServerConfig>, Error> {
+    let mut config = ServerConfig::builder_with_details(provider(), Arc::new(NoClock))
+        .with_protocol_versions(&[&rustls::version::TLS13])?
+        .with_client_cert_verifier(Arc::new(AnyKey { provider: provider() }))
+        .with_single_cert(chain, private)?;
+    config.send_tls13_tickets = 0;
+    config.session_storage = Arc::new(NoServerSessionStorage {});
+    Ok(Arc::new(config))
 }
 
 fn tls_error(error: &dyn std::fmt::Display) -> ProtocolError {
