@@ -187,14 +187,14 @@ pub enum ProtocolError {
 }
 
 impl ProtocolError {
-    /// Whether a worker must not try again: another program at the address, or a refusal.
+    /// Whether a worker must not try again: a refusal by a master that has proved its key.
     ///
-    /// `encrypted`: whether the worker uses TLS. Then only a refusal is final, because only a refusal comes from an end
-    /// that has proved the master's key. Everything else may come from a false master.
+    /// `encrypted`: whether the worker uses TLS. Without it nothing is final, because a false master may have sent it. With
+    /// it only a refusal is final: it alone arrives after the proof of the key.
     pub fn is_final(&self, encrypted: bool) -> bool {
         match self {
-            Self::Refused { .. } => true,
-            Self::NotRayfarm { .. } | Self::SameRole { .. } | Self::Transport { .. } => !encrypted,
+            Self::Refused { .. } => encrypted,
+            Self::NotRayfarm { .. } | Self::SameRole { .. } | Self::Transport { .. } => false,
             Self::Version { .. } | Self::WrongKey { .. } | Self::WrongToken | Self::Tls { .. } => false,
             Self::Io { .. } | Self::Closed { .. } | Self::Deadline { .. } | Self::NotNow { .. } => false,
             Self::UnknownKind { .. } | Self::Unexpected { .. } | Self::TooLong { .. } => false,

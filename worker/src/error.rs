@@ -56,7 +56,7 @@ pub enum WorkerError {
 impl WorkerError {
     /// Whether a later attempt to connect can succeed.
     ///
-    /// `encrypted`: whether the worker connects through TLS. Then only a master that has proved its key ends the worker.
+    /// `encrypted`: whether the worker connects through TLS. Only a master that has proved its key ends a worker for good.
     pub(crate) fn is_transient(&self, encrypted: bool) -> bool {
         match self {
             Self::Resolve { .. } | Self::Connect { .. } | Self::Lost { .. } => true,

@@ -107,7 +107,7 @@ async fn two_masters_or_two_workers_are_reported() {
         as_worker(&mut b, &WorkerSecurity::Plain, &hello)
     );
     assert!(matches!(first.unwrap_err(), ProtocolError::SameRole { role: Role::Worker }));
-    assert!(second.unwrap_err().is_final(false));
+    assert!(!second.unwrap_err().is_final(false));
 }
 
 #[tokio::test]
@@ -121,7 +121,7 @@ async fn a_refusal_carries_its_reason() {
     );
     assert!(matches!(met, Err(ProtocolError::Refused { .. })));
     let error = welcome.unwrap_err();
-    assert!(error.is_final(false));
+    assert!(!error.is_final(false) && error.is_final(true));
     assert_eq!(error.to_string(), "refused by the master: the farm is full\\u{1b}[2J");
 }
 
@@ -155,7 +155,7 @@ async fn another_program_is_reported_at_both_ends() {
     server.write_all(b"HTTP/1.1 400 Bad Request\r\n").await.unwrap();
     let error = as_worker(&mut worker, &WorkerSecurity::Plain, &hello()).await.unwrap_err();
     let text = error.to_string();
-    assert!(error.is_final(false) && text.contains("no rayfarm master") && text.contains("HTTP"), "{text}");
+    assert!(!error.is_final(false) && text.contains("no rayfarm master") && text.contains("HTTP"), "{text}");
 }
 
 #[tokio::test(start_paused = true)]

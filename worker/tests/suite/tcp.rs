@@ -1,8 +1,13 @@
 //! Tests of the library with a master on 127.0.0.1.
 
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use rayfarm_protocol::transport::{JoinToken, MasterSecurity, MasterTrust, PrivateKey, WorkerSecurity};
 use rayfarm_protocol::{PROTOCOL_VERSION, Reconnect, ToMaster, ToWorker, handshake};
 use rayfarm_worker::{Share, ShutdownHandle, WorkerError, WorkerOptions, run};
 use tokio::io::AsyncWriteExt;
+use tokio::net::TcpListener;
 
 use crate::common::{Link, Stage, listen};
 
@@ -86,36 +91,78 @@ async fn without_reconnect_a_lost_master_is_an_error() {
     assert!(matches!(error, WorkerError::Connect { .. }) && error.to_string().contains(&address), "{error}");
 }
 
-#[tokio::test]
-async fn a_refusal_and_another_program_end_a_reconnecting_worker() {
-    let reconnecting = |address: &str| WorkerOptions { reconnect: true, ..options(address) };
-
-    let (listener, address) = listen().await;
-    let worker = tokio::spawn(run(reconnecting(&address), ShutdownHandle::new()));
+/// Accepts the next connection and sends bytes instead of a handshake. Returns the time of the connection.
+async fn answer(listener: &TcpListener, bytes: &[u8]) -> Instant {
     let mut stream = listener.accept().await.unwrap().0;
-    handshake::as_master(&mut stream, &rayfarm_protocol::transport::MasterSecurity::Plain, |_, _| {
-        Err("the farm is full".into())
-    })
-    .await
-    .unwrap_err();
+    let accepted = Instant::now();
+    stream.write_all(bytes).await.unwrap();
+    accepted
+}
+
+/// Accepts the next connection and refuses the worker.
+async fn refuse(listener: &TcpListener, security: &MasterSecurity) -> Instant {
+    let stream = listener.accept().await.unwrap().0;
+    let accepted = Instant::now();
+    let refused = handshake::as_master(stream, security, |_, _| Err("the farm is full".into()));
+    refused.await.unwrap_err();
+    accepted
+}
+
+fn other_version() -> Vec<u8> {
+    [b"RAYFARM\n".as_slice(), &(PROTOCOL_VERSION + 1).to_le_bytes(), &[1, 0]].concat()
+}
+
+#[tokio::test]
+async fn a_false_master_ends_a_worker_without_reconnect_only() {
+    // Another version, another program, and a refusal that no key has authenticated.
+    let version = (PROTOCOL_VERSION + 1).to_string();
+    for (bytes, part) in
+        [(other_version(), version.as_str()), (b"HTTP/1.1 400 Bad Request\r\n".to_vec(), "HTTP")]
+    {
+        let (listener, address) = listen().await;
+        let worker = tokio::spawn(run(options(&address), ShutdownHandle::new()));
+        answer(&listener, &bytes).await;
+        let text = worker.await.unwrap().unwrap_err().to_string();
+        assert!(text.contains(part) && text.contains(&address), "{text}");
+    }
+    let (listener, address) = listen().await;
+    let worker = tokio::spawn(run(options(&address), ShutdownHandle::new()));
+    refuse(&listener, &MasterSecurity::Plain).await;
     let text = worker.await.unwrap().unwrap_err().to_string();
     assert!(text.contains("the farm is full") && text.contains(&address), "{text}");
+}
 
-    let preamble = [b"RAYFARM\n".as_slice(), &(PROTOCOL_VERSION + 1).to_le_bytes(), &[1, 0]].concat();
-    for (preamble, part) in [
-        (preamble.as_slice(), format!("{}", PROTOCOL_VERSION + 1)),
-        (b"HTTP/1.1 400 Bad Request\r\n", "HTTP".to_owned()),
-    ] {
-        let (listener, address) = listen().await;
-        // Another version is retried: the master may be updated.
-        let reconnect = part == "HTTP";
-        let options = WorkerOptions { reconnect, ..options(&address) };
-        let worker = tokio::spawn(run(options, ShutdownHandle::new()));
-        let mut stream = listener.accept().await.unwrap().0;
-        stream.write_all(preamble).await.unwrap();
-        let text = worker.await.unwrap().unwrap_err().to_string();
-        assert!(text.contains(&part), "{text}");
-    }
+#[tokio::test]
+async fn a_false_master_is_retried_with_a_growing_delay_until_the_true_one_answers() {
+    let (listener, address) = listen().await;
+    let shutdown = ShutdownHandle::new();
+    let worker = tokio::spawn(run(WorkerOptions { reconnect: true, ..options(&address) }, shutdown.clone()));
+    let first = answer(&listener, &other_version()).await;
+    let second = answer(&listener, b"HTTP/1.1 400 Bad Request\r\n").await;
+    let third = refuse(&listener, &MasterSecurity::Plain).await;
+    // Delays of 0.5 s and 1 s, each less up to a quarter.
+    let (delay, next) = (second - first, third - second);
+    assert!(delay >= Duration::from_millis(370) && next >= Duration::from_millis(740), "{delay:?}, {next:?}");
+    let mut link = Link::accept(&listener).await;
+    link.check_frame(&Stage::new(), 0, 0.0).await;
+    shutdown.stop();
+    assert!(matches!(link.receive(&Stage::new()).await, Some(ToMaster::Disconnect { .. })));
+    worker.await.unwrap().unwrap();
+}
+
+#[tokio::test]
+async fn a_refusal_of_the_master_with_the_expected_key_ends_a_worker() {
+    let (listener, address) = listen().await;
+    let trust = Arc::new(MasterTrust::new(PrivateKey::generate().unwrap(), JoinToken::random().unwrap()));
+    let key = Arc::new(PrivateKey::generate().unwrap());
+    let security = WorkerSecurity::join(key, &trust.join_line(address.clone()));
+    let options = WorkerOptions { reconnect: true, security, ..options(&address) };
+    let worker = tokio::spawn(run(options, ShutdownHandle::new()));
+    // The false master comes first.
+    answer(&listener, &other_version()).await;
+    refuse(&listener, &MasterSecurity::Tls(trust)).await;
+    let text = worker.await.unwrap().unwrap_err().to_string();
+    assert!(text.contains("the farm is full"), "{text}");
 }
 
 #[tokio::test]
