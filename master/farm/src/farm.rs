@@ -74,6 +74,8 @@ impl Farm {
         let clock = driver.clone();
         let stopped = stop.clone();
         tokio::spawn(async move { clock.keep_time(stopped).await });
+        let (keys, stopped) = (driver.clone(), stop.clone());
+        tokio::spawn(async move { keys.keep_share_keys_new(stopped).await });
         if let Some(renderer) = renderer {
             let settled = driver.clone();
             let report = move |event| settled.handle(event);
@@ -160,6 +162,12 @@ impl Farm {
     #[cfg(test)]
     pub(crate) fn on_decode(&self, hook: impl Fn() + Send + Sync + 'static) {
         self.driver.on_decode(hook);
+    }
+
+    /// Gives each worker that serves assets a new key.
+    #[cfg(test)]
+    pub(crate) fn renew_share_keys(&self) {
+        self.driver.renew_share_keys();
     }
 
     /// Disconnects all workers and waits until the local ones have exited; those that do not within three seconds are killed.

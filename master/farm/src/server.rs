@@ -144,10 +144,10 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     let Admitted { worker, hello, identity, stream } = admitted;
     let Hello { name, threads, simd, software, .. } = hello.clone();
     tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
-    let limit = BodyLimit::closed();
+    let (limit, key) = (BodyLimit::closed(), stream.peer_key());
     let (sender, receiver, traffic) = session::spawn_limited::<_, ToWorker, ToMaster>(stream, limit.clone());
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
-    driver.join(worker, Session::new(hello, identity, address, sender.clone(), traffic, limit));
+    driver.join(worker, Session::new(hello, identity, address, key, sender.clone(), traffic, limit));
     let ended = tokio::select! {
         ended = receive(driver, worker, receiver, request) => ended,
         () = send_assets(driver, worker, &sender, requests) => Err(SessionError::Closed),

@@ -9,7 +9,7 @@ use super::{FrameAnnounce, Message, Reconnect};
 use crate::envelope::{Envelope, Kind};
 use crate::limits::{MAX_ASSET_BYTES, MAX_CHUNK_BYTES, MAX_FRAME_SIDE, MAX_VIEW_BYTES};
 use crate::token::{ShareKey, Token};
-use crate::{AssetId, FrameId, Lease, PixelFormat, ProtocolError};
+use crate::{AssetId, FrameId, KeyHash, Lease, PixelFormat, ProtocolError};
 
 /// Message from a master to a worker.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,13 +47,18 @@ pub enum ToWorker {
         size: u64,
         /// Address at which that worker listens.
         peer: SocketAddr,
-        /// Token of the asset at that worker.
+        /// Hash of that worker's public key. `None` where connections are plain.
+        peer_key: Option<KeyHash>,
+        /// Token of the asset at that worker, for the receiver of this message.
         token: Token,
     },
     /// Replies to [`crate::ToMaster::Sharing`]: the worker may serve assets to requests whose token is made of this key.
+    /// Sent again at an interval: tokens of the generation before the previous one are invalid then.
     ShareKey {
-        /// The key of this session.
+        /// The key of this generation.
         key: ShareKey,
+        /// Number of the generation. It grows by one with each key.
+        generation: u64,
     },
     /// Reports that the master does not have a requested asset.
     AssetUnknown {
@@ -101,10 +106,10 @@ impl Message for ToWorker {
             Self::AssetBegin { id, size } => encode_control(Kind::AssetBegin, &(id, checked_size(*size)?)),
             Self::AssetChunk { id, offset, bytes } => encode_chunk(*id, *offset, bytes),
             Self::AssetUnknown { id } => encode_control(Kind::AssetUnknown, id),
-            Self::AssetFrom { id, size, peer, token } => {
-                encode_control(Kind::AssetFrom, &(id, checked_size(*size)?, peer, token))
+            Self::AssetFrom { id, size, peer, peer_key, token } => {
+                encode_control(Kind::AssetFrom, &(id, checked_size(*size)?, peer, peer_key, token))
             }
-            Self::ShareKey { key } => encode_control(Kind::ShareKey, key),
+            Self::ShareKey { key, generation } => encode_control(Kind::ShareKey, &(key, generation)),
             Self::Ping { nonce } => encode_control(Kind::Ping, nonce),
             Self::Drain => Envelope::new(Kind::Drain, &[], Bytes::new()),
             Self::Disconnect { reason, reconnect } => encode_disconnect(reason, *reconnect),
@@ -123,10 +128,13 @@ impl Message for ToWorker {
             Kind::AssetChunk => decode_chunk(body)?,
             Kind::AssetUnknown => Self::AssetUnknown { id: decode_control(kind, &body)? },
             Kind::AssetFrom => {
-                let (id, size, peer, token) = decode_control(kind, &body)?;
-                Self::AssetFrom { id, size: checked_size(size)?, peer, token }
+                let (id, size, peer, peer_key, token) = decode_control(kind, &body)?;
+                Self::AssetFrom { id, size: checked_size(size)?, peer, peer_key, token }
             }
-            Kind::ShareKey => Self::ShareKey { key: decode_control(kind, &body)? },
+            Kind::ShareKey => {
+                let (key, generation) = decode_control(kind, &body)?;
+                Self::ShareKey { key, generation }
+            }
             Kind::Ping => Self::Ping { nonce: decode_control(kind, &body)? },
             Kind::Drain => expect_empty(kind, &body).map(|()| Self::Drain)?,
             Kind::Disconnect => {

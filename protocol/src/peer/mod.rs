@@ -10,10 +10,16 @@
 //! ```
 //!
 //! A worker serves an asset only for its [`Token`], which the master computes from a [`ShareKey`] that only the master and
-//! this worker have. There is no preamble: the master has checked that both workers have its own version.
+//! this worker have, and from the key of the worker that requests the asset. There is no preamble: the master has checked
+//! that both workers have its own version.
+//!
+//! Workers that join their master through TLS use TLS between each other as well, with their own keys: see [`connect`] and
+//! [`accept`].
 
 #[cfg(feature = "transport")]
 mod io;
+#[cfg(feature = "transport")]
+mod secure;
 
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
@@ -22,6 +28,8 @@ use crate::AssetId;
 
 #[cfg(feature = "transport")]
 pub use io::{receive_reply, receive_request, send_reply, send_request};
+#[cfg(feature = "transport")]
+pub use secure::{accept, connect};
 
 pub use crate::token::{ShareKey, Token};
 

@@ -6,8 +6,8 @@ use rayfarm_protocol::envelope::{Kind, read_body, read_header};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::peer::{PeerRequest, ShareKey, Token, send_request};
 use rayfarm_protocol::{
-    AssetId, Encoding, FrameAnnounce, FrameId, Hello, PROTOCOL_VERSION, PixelFormat, PixelsHeader, Reconnect,
-    ToMaster, ToWorker, Welcome, codec, limits,
+    AssetId, Encoding, FrameAnnounce, FrameId, Hello, KeyHash, PROTOCOL_VERSION, PixelFormat, PixelsHeader,
+    Reconnect, ToMaster, ToWorker, Welcome, codec, limits,
 };
 
 use crate::common::{lease, pixels, wire};
@@ -60,11 +60,14 @@ async fn messages_to_a_worker() {
     golden(chunk, &[&[43, 0, 0, 0, 0x14, 0, 0, 0], &ID.0, &number, b"xyz"]).await;
     golden(ToWorker::AssetUnknown { id: ID }, &[&[32, 0, 0, 0, 0x15, 0, 0, 0], &ID.0]).await;
     let peer = ([10, 0, 0, 7], 0x1234).into();
-    let from = ToWorker::AssetFrom { id: ID, size: 5, peer, token: Token([0xcd; 32]) };
+    let from = |peer_key| ToWorker::AssetFrom { id: ID, size: 5, peer, peer_key, token: Token([0xcd; 32]) };
     let v4: &[u8] = &[0, 0, 0, 0, 10, 0, 0, 7, 0x34, 0x12];
-    golden(from, &[&[82, 0, 0, 0, 0x16, 0, 0, 0], &ID.0, &number, v4, &[0xcd; 32]]).await;
-    let key = ToWorker::ShareKey { key: ShareKey([0xef; 32]) };
-    golden(key, &[&[32, 0, 0, 0, 0x17, 0, 0, 0], &[0xef; 32]]).await;
+    golden(from(None), &[&[83, 0, 0, 0, 0x16, 0, 0, 0], &ID.0, &number, v4, &[0], &[0xcd; 32]]).await;
+    let head = [115, 0, 0, 0, 0x16, 0, 0, 0];
+    let key = Some(KeyHash([0xab; 32]));
+    golden(from(key), &[&head, &ID.0, &number, v4, &[1], &[0xab; 32], &[0xcd; 32]]).await;
+    let key = ToWorker::ShareKey { key: ShareKey([0xef; 32]), generation: 5 };
+    golden(key, &[&[40, 0, 0, 0, 0x17, 0, 0, 0], &[0xef; 32], &number]).await;
     golden(ToWorker::Ping { nonce: 5 }, &[&[8, 0, 0, 0, 0x30, 0, 0, 0], &number]).await;
     golden(ToWorker::Drain, &[&[0, 0, 0, 0, 0x32, 0, 0, 0]]).await;
     let disconnect = ToWorker::Disconnect { reason: "hé".into(), reconnect: Reconnect::Now };
@@ -123,9 +126,22 @@ async fn a_request_of_a_worker_and_its_token() {
     send_request(&mut bytes, &request).await.unwrap();
     let parts: [&[u8]; 4] = [&[72, 0, 0, 0, 0x40, 0, 0, 0], &ID.0, &[0xcd; 32], &[5, 0, 0, 0, 0, 0, 0, 0]];
     assert_eq!(bytes, parts.concat());
-    let token = Token::new(&ShareKey([0; 32]), ID);
-    assert_eq!(token, Token(blake3::keyed_hash(&[0; 32], &ID.0).into()));
-    assert_ne!(token, Token::new(&ShareKey([1; 32]), ID));
+    let key = ShareKey([0; 32]);
+    let token = Token::new(&key, ID, None, 3);
+    let hashed = |requester: [u8; 32]| [&ID.0[..], &requester, &[3, 0, 0, 0, 0, 0, 0, 0]].concat();
+    assert_eq!(token, Token(blake3::keyed_hash(&key.0, &hashed([0; 32])).into()));
+    let requester = Some(KeyHash([7; 32]));
+    let bound = Token::new(&key, ID, requester, 3);
+    assert_eq!(bound, Token(blake3::keyed_hash(&key.0, &hashed([7; 32])).into()));
+    for other in [
+        Token::new(&ShareKey([1; 32]), ID, requester, 3),
+        Token::new(&key, AssetId([0; 32]), requester, 3),
+        Token::new(&key, ID, Some(KeyHash([8; 32])), 3),
+        Token::new(&key, ID, requester, 4),
+        token,
+    ] {
+        assert_ne!(bound, other);
+    }
     assert_eq!(format!("{token:?} {:?}", ShareKey([1; 32])), "Token(..) ShareKey(..)");
 }
 

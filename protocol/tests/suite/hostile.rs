@@ -162,11 +162,16 @@ fn malformed_bodies_are_refused_with_the_rule() {
     need[39..].copy_from_slice(&[0, 2]);
     malformed(Kind::NeedAsset, &need);
     assert!(malformed(Kind::Sharing, &[0, 0]).contains("port 0"));
-    let mut from = vec![0; 82];
+    let mut from = vec![0; 83];
     from[39] = 1;
     assert!(malformed(Kind::AssetFrom, &from).contains("72057594037927936"));
     from[39] = 0;
     from[40] = 9;
+    malformed(Kind::AssetFrom, &from);
+    from[40] = 0;
+    assert!(ToWorker::from_body(Kind::AssetFrom, Bytes::copy_from_slice(&from)).is_ok());
+    // Neither a plain peer nor one with a key.
+    from[50] = 2;
     malformed(Kind::AssetFrom, &from);
 
     let mut begin = vec![0; 40];

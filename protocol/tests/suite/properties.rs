@@ -7,7 +7,7 @@ use rayfarm_protocol::message::Message;
 use rayfarm_protocol::peer::{ShareKey, Token};
 use rayfarm_protocol::session::spawn;
 use rayfarm_protocol::{
-    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, Lease, PROTOCOL_VERSION, PixelFormat,
+    AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, KeyHash, Lease, PROTOCOL_VERSION, PixelFormat,
     PixelsHeader, ToMaster, ToWorker, Welcome, codec, handshake, limits,
 };
 use rayfarm_text::printable;
@@ -58,15 +58,22 @@ fn to_worker() -> impl Strategy<Value = ToWorker> {
             bytes
         }),
         ids().prop_map(|id| ToWorker::AssetUnknown { id }),
-        (ids(), 0..=limits::MAX_ASSET_BYTES, any::<std::net::SocketAddr>(), any::<[u8; 32]>()).prop_map(
-            |(id, size, peer, token)| ToWorker::AssetFrom {
+        (
+            ids(),
+            0..=limits::MAX_ASSET_BYTES,
+            any::<std::net::SocketAddr>(),
+            any::<Option<[u8; 32]>>(),
+            any::<[u8; 32]>()
+        )
+            .prop_map(|(id, size, peer, peer_key, token)| ToWorker::AssetFrom {
                 id,
                 size,
                 peer: without_scope(peer),
+                peer_key: peer_key.map(KeyHash),
                 token: Token(token)
-            }
-        ),
-        any::<[u8; 32]>().prop_map(|key| ToWorker::ShareKey { key: ShareKey(key) }),
+            }),
+        any::<([u8; 32], u64)>()
+            .prop_map(|(key, generation)| ToWorker::ShareKey { key: ShareKey(key), generation }),
         any::<u64>().prop_map(|nonce| ToWorker::Ping { nonce }),
         Just(ToWorker::Drain),
     ]

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rayfarm_protocol::transport::Connection;
+use rayfarm_protocol::transport::{Connection, WorkerSecurity};
 use rayfarm_protocol::{Hello, Welcome, address, handshake, tcp};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinSet;
@@ -15,7 +15,7 @@ use super::options::{DiskCacheOptions, Share, WorkerOptions};
 use super::outage_log::{Outage, OutageLog};
 use super::target::Target;
 use crate::error::WorkerError;
-use crate::peer::{PeerCache, PeerServer, serve_peers};
+use crate::peer::{PeerCache, PeerClient, PeerServer, serve_peers};
 use crate::render_pool::RenderPool;
 use crate::renderer::Renderer;
 use crate::scenes::{BuildPool, DiskCache, DiskWriter, SceneLoader};
@@ -124,7 +124,8 @@ async fn run_sessions<R: Renderer>(
                 let begun = Instant::now();
                 // Aborted when it is dropped, at the end of the session.
                 let mut peer_tasks = JoinSet::new();
-                let config = session_config(options, stream.get_ref(), &mut peer_tasks).await;
+                let config =
+                    session_config(options, &target.security, stream.get_ref(), &mut peer_tasks).await;
                 let end = run_session(stream, config, persistent, shutdown).await;
                 if begun.elapsed() > MIN_SESSION {
                     backoff.reset();
@@ -178,6 +179,7 @@ async fn run_sessions<R: Renderer>(
 /// Selects the settings of a session. Within one machine, memory is faster than LZ4, and than most disks.
 async fn session_config(
     options: &WorkerOptions,
+    security: &WorkerSecurity,
     stream: &TcpStream,
     tasks: &mut JoinSet<()>,
 ) -> SessionConfig {
@@ -194,24 +196,29 @@ async fn session_config(
         Share::Off => None,
     };
     let peer_server = match at {
-        Some(at) => start_peer_server(at, tasks).await,
+        Some(at) => start_peer_server(at, security, tasks).await,
         None => None,
     };
     SessionConfig {
         compress: options.compress.unwrap_or(!within_machine),
         uses_disk,
         peer_server,
+        peer_client: PeerClient { security: security.clone(), within_machine },
         max_segment_bytes: options.max_segment_bytes,
     }
 }
 
 /// Starts to serve assets to other workers. A failure is logged and only makes their transfers slower.
-async fn start_peer_server(at: SocketAddr, tasks: &mut JoinSet<()>) -> Option<PeerServer> {
+async fn start_peer_server(
+    at: SocketAddr,
+    security: &WorkerSecurity,
+    tasks: &mut JoinSet<()>,
+) -> Option<PeerServer> {
     let bound = TcpListener::bind(at).await;
     match bound.and_then(|listener| listener.local_addr().map(|address| (listener, address.port()))) {
         Ok((listener, port)) => {
             let cache = Arc::new(PeerCache::default());
-            tasks.spawn(serve_peers(listener, Arc::clone(&cache)));
+            tasks.spawn(serve_peers(listener, Arc::clone(&cache), security.clone()));
             Some(PeerServer { port, cache })
         }
         Err(error) => {

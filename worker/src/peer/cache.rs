@@ -4,13 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use rayfarm_protocol::AssetId;
 use rayfarm_protocol::limits::{MAX_PEER_CACHE_BYTES, PEER_CACHE_TIME};
-use rayfarm_protocol::peer::{PeerRequest, ShareKey, Token};
+use rayfarm_protocol::peer::{PeerRequest, ShareKey};
+use rayfarm_protocol::{AssetId, KeyHash};
 use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 
 use super::PartialAsset;
+use super::share_keys::ShareKeys;
 
 /// Assets of one session with the master, partial or complete, by id. The master's tokens give access to them.
 #[derive(Debug, Default)]
@@ -33,8 +34,8 @@ pub(super) enum Lookup {
 
 #[derive(Debug, Default)]
 struct Inner {
-    /// Key of the current session's tokens.
-    key: Option<ShareKey>,
+    /// Keys of the current session's tokens.
+    keys: ShareKeys,
     expected: BTreeSet<AssetId>,
     assets: BTreeMap<AssetId, Entry>,
 }
@@ -52,9 +53,11 @@ impl PeerCache {
         *self.lock() = Inner::default();
     }
 
-    /// Sets the key of the session's tokens.
-    pub(crate) fn set_key(&self, key: ShareKey) {
-        self.lock().key = Some(key);
+    /// Sets the next key of the session's tokens. Tokens of the key before the previous one are invalid then.
+    pub(crate) fn set_key(&self, generation: u64, key: ShareKey) {
+        if let Err(why) = self.lock().keys.set(generation, key) {
+            tracing::warn!("the master's key for tokens of assets is ignored: {why}");
+        }
     }
 
     /// Records that an asset was requested from the master.
@@ -76,10 +79,10 @@ impl PeerCache {
         self.inserted.notified()
     }
 
-    /// Looks up the asset of a request and checks the token.
-    pub(super) fn lookup(&self, request: &PeerRequest) -> Lookup {
+    /// Looks up the asset of a request and checks the token. `client`: hash of the requesting worker's public key.
+    pub(super) fn lookup(&self, request: &PeerRequest, client: Option<KeyHash>) -> Lookup {
         let mut inner = self.lock();
-        if inner.key.is_none_or(|key| Token::new(&key, request.id) != request.token) {
+        if !inner.keys.allow(request, client) {
             return Lookup::Denied;
         }
         let is_expected = inner.expected.contains(&request.id);
@@ -128,6 +131,8 @@ impl Inner {
 
 #[cfg(test)]
 mod tests {
+    use rayfarm_protocol::peer::Token;
+
     use super::*;
 
     const KEY: ShareKey = ShareKey([3; 32]);
@@ -140,11 +145,11 @@ mod tests {
     }
 
     fn request(key: &ShareKey, id: AssetId) -> PeerRequest {
-        PeerRequest { id, token: Token::new(key, id), offset: 0 }
+        PeerRequest { id, token: Token::new(key, id, None, 0), offset: 0 }
     }
 
     fn is_found(cache: &PeerCache, key: &ShareKey, id: AssetId) -> bool {
-        matches!(cache.lookup(&request(key, id)), Lookup::Found(_))
+        matches!(cache.lookup(&request(key, id), None), Lookup::Found(_))
     }
 
     #[test]
@@ -154,17 +159,17 @@ mod tests {
         cache.insert(a, bytes);
         cache.insert(b, others);
         assert!(!is_found(&cache, &KEY, a), "there is no key yet");
-        cache.set_key(KEY);
+        cache.set_key(0, KEY);
         assert!(is_found(&cache, &KEY, a) && is_found(&cache, &KEY, b));
         assert!(!is_found(&cache, &ShareKey([4; 32]), a));
-        let wrong = PeerRequest { token: Token::new(&KEY, b), ..request(&KEY, a) };
-        assert!(matches!(cache.lookup(&wrong), Lookup::Denied));
+        let wrong = PeerRequest { token: Token::new(&KEY, b, None, 0), ..request(&KEY, a) };
+        assert!(matches!(cache.lookup(&wrong, None), Lookup::Denied));
         let expected = request(&KEY, AssetId([9; 32]));
-        assert!(matches!(cache.lookup(&expected), Lookup::Denied));
+        assert!(matches!(cache.lookup(&expected, None), Lookup::Denied));
         cache.expect(expected.id);
-        assert!(matches!(cache.lookup(&expected), Lookup::Expected));
+        assert!(matches!(cache.lookup(&expected, None), Lookup::Expected));
         let wrong = PeerRequest { token: wrong.token, ..expected };
-        assert!(matches!(cache.lookup(&wrong), Lookup::Denied));
+        assert!(matches!(cache.lookup(&wrong, None), Lookup::Denied));
         cache.reset();
         assert!(!is_found(&cache, &KEY, a));
     }
@@ -172,7 +177,7 @@ mod tests {
     #[test]
     fn unused_and_abandoned_assets_are_evicted_and_partial_ones_are_kept() {
         let cache = PeerCache::default();
-        cache.set_key(KEY);
+        cache.set_key(0, KEY);
         let (a, bytes) = complete(1, 5);
         cache.insert(a, bytes);
         let partial = PartialAsset::new(5).unwrap();

@@ -5,17 +5,31 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::{MAX_PEER_KEEPALIVES, PEER_CONNECT_TIMEOUT};
-use rayfarm_protocol::peer::{PeerReply, PeerRequest, Token, receive_reply, send_request};
-use rayfarm_protocol::{AssetId, ProtocolError};
+use rayfarm_protocol::peer::{self, PeerReply, PeerRequest, Token, receive_reply, send_request};
+use rayfarm_protocol::transport::WorkerSecurity;
+use rayfarm_protocol::{AssetId, KeyHash, ProtocolError};
 use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio::net::TcpStream;
 use tokio::sync::mpsc;
+
+use super::address_rules;
 
 /// Another worker that serves an asset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PeerSource {
     pub(crate) address: SocketAddr,
+    /// Hash of its public key. `None` where connections are plain.
+    pub(crate) key: Option<KeyHash>,
     pub(crate) token: Token,
+}
+
+/// Settings of the connections to other workers.
+#[derive(Clone, Debug)]
+pub(crate) struct PeerClient {
+    /// Whether connections use TLS, and with which key.
+    pub(crate) security: WorkerSecurity,
+    /// Whether the master is on this machine, and so may name addresses of it.
+    pub(crate) within_machine: bool,
 }
 
 /// Event of a transfer from another worker.
@@ -27,23 +41,38 @@ pub(crate) enum PeerEvent {
     Failed { id: AssetId, why: String },
 }
 
-/// Fetches an asset of `size` bytes and sends its chunks to `events` as they arrive.
-pub(crate) async fn fetch_from_peer(
-    id: AssetId,
-    size: u64,
-    source: PeerSource,
-    events: mpsc::Sender<PeerEvent>,
-) {
-    let connecting = tokio::time::timeout(PEER_CONNECT_TIMEOUT, TcpStream::connect(source.address));
-    let failure = match connecting.await {
-        Ok(Ok(stream)) => fetch_over(stream, id, size, source.token, &events).await.err(),
-        Ok(Err(error)) => Some(error.to_string()),
-        Err(_) => Some(format!("no connection within {} s", PEER_CONNECT_TIMEOUT.as_secs())),
-    };
-    if let Some(why) = failure {
-        let why = format!("the transfer from {} failed: {why}", source.address);
-        // The receiver is closed where the session has ended.
-        let _ = events.send(PeerEvent::Failed { id, why }).await;
+impl PeerClient {
+    /// Fetches an asset of `size` bytes and sends its chunks to `events` as they arrive.
+    pub(crate) async fn fetch(
+        self,
+        id: AssetId,
+        size: u64,
+        source: PeerSource,
+        events: mpsc::Sender<PeerEvent>,
+    ) {
+        if let Err(why) = self.try_fetch(id, size, source, &events).await {
+            let why = format!("the transfer from {} failed: {why}", source.address);
+            // The receiver is closed where the session has ended.
+            let _ = events.send(PeerEvent::Failed { id, why }).await;
+        }
+    }
+
+    async fn try_fetch(
+        &self,
+        id: AssetId,
+        size: u64,
+        source: PeerSource,
+        events: &mpsc::Sender<PeerEvent>,
+    ) -> Result<(), String> {
+        address_rules::check(source.address, self.within_machine)?;
+        let connecting = tokio::time::timeout(PEER_CONNECT_TIMEOUT, TcpStream::connect(source.address));
+        let stream = match connecting.await {
+            Ok(connected) => connected.map_err(|error| error.to_string())?,
+            Err(_) => return Err(format!("no connection within {} s", PEER_CONNECT_TIMEOUT.as_secs())),
+        };
+        let connected = peer::connect(stream, &self.security, source.key).await;
+        let stream = connected.map_err(|error| error.to_string())?;
+        fetch_over(stream, id, size, source.token, events).await
     }
 }
 

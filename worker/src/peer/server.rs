@@ -5,21 +5,26 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use rayfarm_protocol::limits::{
-    MAX_CHUNK_BYTES, MAX_PEER_CLIENTS, MAX_PEER_KEEPALIVES, PEER_KEEPALIVE_INTERVAL,
+    FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES, MAX_PEER_CLIENTS, MAX_PEER_KEEPALIVES, PEER_KEEPALIVE_INTERVAL,
 };
-use rayfarm_protocol::peer::{PeerReply, PeerRequest, receive_request, send_reply};
-use rayfarm_protocol::{AssetId, ProtocolError};
-use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
-use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
+use rayfarm_protocol::peer::{self, PeerReply, PeerRequest, receive_request, send_reply};
+use rayfarm_protocol::transport::{Connection, WorkerSecurity};
+use rayfarm_protocol::{AssetId, KeyHash, ProtocolError};
+use tokio::io::{AsyncWrite, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::cache::Lookup;
+use super::pending::{Pending, Place};
 use super::{PartialAsset, PeerCache};
 
 /// Delay after a failed accept, so that a lasting failure does not become a busy loop.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(100);
+
+/// Most connections with a valid token, served and waiting.
+const MAX_CONNECTIONS: usize = 64;
 
 /// A running peer server: where it listens, and what it serves.
 #[derive(Clone, Debug)]
@@ -28,21 +33,31 @@ pub(crate) struct PeerServer {
     pub(crate) cache: Arc<PeerCache>,
 }
 
+/// What all connections of a server share.
+struct Shared {
+    cache: Arc<PeerCache>,
+    security: WorkerSecurity,
+    /// Places of connections with a valid token.
+    connections: Semaphore,
+    /// Places of transfers.
+    transfers: Semaphore,
+}
+
 /// Accepts and serves other workers until the future is dropped.
-pub(crate) async fn serve_peers(listener: TcpListener, cache: Arc<PeerCache>) {
-    let permits = Arc::new(Semaphore::new(MAX_PEER_CLIENTS));
+pub(crate) async fn serve_peers(listener: TcpListener, cache: Arc<PeerCache>, security: WorkerSecurity) {
+    let shared = Arc::new(Shared {
+        cache,
+        security,
+        connections: Semaphore::new(MAX_CONNECTIONS),
+        transfers: Semaphore::new(MAX_PEER_CLIENTS),
+    });
+    let pending = Pending::default();
     let mut connections = JoinSet::new();
     loop {
-        let permit = Arc::clone(&permits).acquire_owned().await;
         match listener.accept().await {
             Ok((stream, address)) => {
-                let cache = Arc::clone(&cache);
-                // Every message is flushed as a whole, so there is nothing to gather.
-                let _ = stream.set_nodelay(true);
-                connections.spawn(async move {
-                    serve_connection(stream, address, &cache).await;
-                    drop(permit);
-                });
+                let (shared, place) = (Arc::clone(&shared), pending.enter(address.ip()));
+                connections.spawn(async move { serve_connection(stream, address, place, &shared).await });
             }
             Err(error) => {
                 tracing::debug!("cannot accept a connection of another worker: {error}");
@@ -53,42 +68,104 @@ pub(crate) async fn serve_peers(listener: TcpListener, cache: Arc<PeerCache>) {
     }
 }
 
-async fn serve_connection(
-    mut stream: impl AsyncRead + AsyncWrite + Unpin,
-    address: SocketAddr,
-    cache: &PeerCache,
-) {
-    if let Err(error) = serve_request(&mut stream, cache).await {
+async fn serve_connection(stream: TcpStream, address: SocketAddr, place: Place, shared: &Shared) {
+    let accepted = tokio::select! {
+        biased;
+        () = place.closed() => return,
+        accepted = accept(stream, shared) => accepted,
+    };
+    drop(place);
+    let served = match accepted {
+        Ok(Accepted { mut stream, request, client, connection: Some(_connection) }) => {
+            serve_request(&mut stream, &request, client, shared).await
+        }
+        Ok(Accepted { mut stream, request, .. }) => refuse(&mut stream, request.id).await,
+        Err(error) => Err(error),
+    };
+    if let Err(error) = served {
         tracing::debug!("the transfer of an asset to {address} failed: {error}");
     }
 }
 
-/// Receives one request, sends its asset as the bytes arrive, and closes. An abandoned asset closes the connection early.
+/// A connection whose request has arrived.
+struct Accepted<'a> {
+    stream: Connection<TcpStream>,
+    request: PeerRequest,
+    /// Hash of the other worker's public key, with TLS.
+    client: Option<KeyHash>,
+    /// The place of a connection with a valid token. `None`: the token is wrong, or there is no place.
+    connection: Option<SemaphorePermit<'a>>,
+}
+
+/// Shakes hands and receives the request.
+async fn accept(stream: TcpStream, shared: &Shared) -> Result<Accepted<'_>, ProtocolError> {
+    // Every message is flushed as a whole, so there is nothing to gather.
+    let _ = stream.set_nodelay(true);
+    let late = ProtocolError::Deadline { what: "sending its first byte", limit: FIRST_BYTE_DEADLINE };
+    let first = timeout(FIRST_BYTE_DEADLINE, stream.peek(&mut [0])).await.map_err(|_| late)?;
+    first.map_err(|source| ProtocolError::Io { doing: "waiting for a request", source })?;
+    let mut stream = peer::accept(stream, &shared.security).await?;
+    let client = stream.peer_key();
+    let request = receive_request(&mut stream).await?;
+    let is_valid = !matches!(shared.cache.lookup(&request, client), Lookup::Denied);
+    let connection = if is_valid { shared.connections.try_acquire().ok() } else { None };
+    Ok(Accepted { stream, request, client, connection })
+}
+
+/// Sends the requested asset as its bytes arrive, and closes. An abandoned asset closes the connection early.
 async fn serve_request(
-    stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
-    cache: &PeerCache,
+    stream: &mut (impl AsyncWrite + Unpin),
+    request: &PeerRequest,
+    client: Option<KeyHash>,
+    shared: &Shared,
 ) -> Result<(), ProtocolError> {
-    let request = receive_request(stream).await?;
-    match wait_for_asset(stream, &request, cache).await? {
-        Some(asset) => {
-            send_reply(stream, request.id, PeerReply::Begin { size: asset.size() as u64 }).await?;
-            let offset = usize::try_from(request.offset).unwrap_or(usize::MAX);
-            send_chunks(stream, request.id, &asset, offset).await?;
-        }
-        None => send_reply(stream, request.id, PeerReply::Unknown).await?,
-    }
+    let Some(_transfer) = wait_for_transfer(stream, request.id, shared).await? else {
+        return refuse(stream, request.id).await;
+    };
+    let Some(asset) = wait_for_asset(stream, request, client, &shared.cache).await? else {
+        return refuse(stream, request.id).await;
+    };
+    send_reply(stream, request.id, PeerReply::Begin { size: asset.size() as u64 }).await?;
+    let offset = usize::try_from(request.offset).unwrap_or(usize::MAX);
+    send_chunks(stream, request.id, &asset, offset).await?;
+    close(stream).await
+}
+
+/// Replies that the asset is not served, and closes.
+async fn refuse(stream: &mut (impl AsyncWrite + Unpin), id: AssetId) -> Result<(), ProtocolError> {
+    send_reply(stream, id, PeerReply::Unknown).await?;
+    close(stream).await
+}
+
+async fn close(stream: &mut (impl AsyncWrite + Unpin)) -> Result<(), ProtocolError> {
     stream.shutdown().await.map_err(|source| ProtocolError::Io { doing: "sending", source })
+}
+
+/// Waits until one of the transfers has ended, with keepalives. Returns `None` where none ends in time.
+async fn wait_for_transfer<'a>(
+    stream: &mut (impl AsyncWrite + Unpin),
+    id: AssetId,
+    shared: &'a Shared,
+) -> Result<Option<SemaphorePermit<'a>>, ProtocolError> {
+    for _ in 0..MAX_PEER_KEEPALIVES {
+        match timeout(PEER_KEEPALIVE_INTERVAL, shared.transfers.acquire()).await {
+            Ok(permit) => return Ok(permit.ok()),
+            Err(_) => send_reply(stream, id, PeerReply::Waiting).await?,
+        }
+    }
+    Ok(None)
 }
 
 /// Waits until the transfer of the requested asset to this worker begins. Returns `None` for a denied request.
 async fn wait_for_asset(
     stream: &mut (impl AsyncWrite + Unpin),
     request: &PeerRequest,
+    client: Option<KeyHash>,
     cache: &PeerCache,
 ) -> Result<Option<Arc<PartialAsset>>, ProtocolError> {
     for _ in 0..MAX_PEER_KEEPALIVES {
         let inserted = cache.inserted();
-        match cache.lookup(request) {
+        match cache.lookup(request, client) {
             Lookup::Found(asset) => return Ok(Some(asset)),
             Lookup::Denied => return Ok(None),
             Lookup::Expected => {}

@@ -14,7 +14,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::idle_timeout::{CHECK_INTERVAL, IdleTimeout};
 use super::state::{Effect, SessionState, Work, WorkResult};
 use super::work::{compile_with_permit, do_work};
-use crate::peer::{PeerEvent, PeerServer, fetch_from_peer};
+use crate::peer::{PeerClient, PeerEvent, PeerServer};
 use crate::render_pool::{JobReply, PoolJob, RenderPool};
 use crate::renderer::Renderer;
 use crate::scenes::{BuildPool, DiskWriter, SceneLoader, SceneWork};
@@ -53,6 +53,8 @@ pub(crate) struct SessionConfig {
     pub(crate) uses_disk: bool,
     /// The server of assets for other workers, if any.
     pub(crate) peer_server: Option<PeerServer>,
+    /// How assets are fetched from other workers.
+    pub(crate) peer_client: PeerClient,
     /// Largest pixels of a segment that are rendered, in bytes; `None` for the bound of the protocol.
     pub(crate) max_segment_bytes: Option<usize>,
 }
@@ -100,6 +102,7 @@ where
         work: JoinSet::new(),
         fetches: JoinSet::new(),
         peer_server: config.peer_server,
+        peer_client: config.peer_client,
         compress: config.compress,
         shutdown,
         traffic,
@@ -148,6 +151,7 @@ struct SessionRunner<'a, R: Renderer> {
     /// Transfers from other workers.
     fetches: JoinSet<()>,
     peer_server: Option<PeerServer>,
+    peer_client: PeerClient,
     compress: bool,
     shutdown: &'a ShutdownHandle,
     traffic: Arc<Traffic>,
@@ -253,16 +257,17 @@ impl<R: Renderer> SessionRunner<'_, R> {
                 }
             }
             Effect::FetchFromPeer { id, size, source } => {
-                self.fetches.spawn(fetch_from_peer(id, size, source, peer_events.clone()));
+                let client = self.peer_client.clone();
+                self.fetches.spawn(client.fetch(id, size, source, peer_events.clone()));
             }
             Effect::Serve(id, asset) => {
                 if let Some(server) = &self.peer_server {
                     server.cache.insert(id, asset);
                 }
             }
-            Effect::SetShareKey(key) => {
+            Effect::SetShareKey { generation, key } => {
                 if let Some(server) = &self.peer_server {
-                    server.cache.set_key(key);
+                    server.cache.set_key(generation, key);
                 }
             }
             Effect::Render { lease, rows, frame, arrived } => {

@@ -30,8 +30,8 @@ pub(super) enum Effect<R: Renderer> {
     FetchFromPeer { id: AssetId, size: u64, source: PeerSource },
     /// Serve an asset to other workers.
     Serve(AssetId, Arc<PartialAsset>),
-    /// Set the key of the tokens that give access to served assets.
-    SetShareKey(ShareKey),
+    /// Set the next key of the tokens that give access to served assets.
+    SetShareKey { generation: u64, key: ShareKey },
     /// Render a lease.
     Render { lease: Lease, rows: Range<u32>, frame: Arc<ReadyFrame<R::Frame>>, arrived: Instant },
     /// Cancel the leases of all frames before this one.
@@ -102,10 +102,13 @@ impl<'a, R: Renderer> SessionState<'a, R> {
             ToWorker::AssetBegin { id, size } => self.loader.handle_asset_begin(id, size),
             ToWorker::AssetChunk { id, offset, bytes } => self.loader.handle_asset_chunk(id, offset, &bytes),
             ToWorker::AssetUnknown { id } => self.loader.handle_asset_unknown(id),
-            ToWorker::AssetFrom { id, size, peer, token } => {
-                self.loader.handle_asset_from(id, size, PeerSource { address: peer, token });
+            ToWorker::AssetFrom { id, size, peer, peer_key, token } => {
+                let source = PeerSource { address: peer, key: peer_key, token };
+                self.loader.handle_asset_from(id, size, source);
             }
-            ToWorker::ShareKey { key } => self.effects.push_back(Effect::SetShareKey(key)),
+            ToWorker::ShareKey { key, generation } => {
+                self.effects.push_back(Effect::SetShareKey { generation, key });
+            }
             ToWorker::Ping { nonce } => self.effects.push_back(Effect::Pong(nonce)),
             ToWorker::Drain => self.effects.push_back(Effect::Drain),
             ToWorker::Disconnect { reason, reconnect } => {

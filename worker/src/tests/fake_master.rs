@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use bytes::Bytes;
 use rayfarm_protocol::session::{self, Receiver, Sender};
+use rayfarm_protocol::transport::WorkerSecurity;
 use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease, PixelFormat, ToMaster, ToWorker};
 use tokio::task::JoinHandle;
 
 use super::{FakeRenderer, HEIGHT, WIDTH};
-use crate::peer::PeerServer;
+use crate::peer::{PeerClient, PeerServer};
 use crate::session::{PersistentState, SessionConfig, SessionEnd, run_session};
 use crate::shutdown::ShutdownHandle;
 
@@ -32,7 +33,8 @@ pub(super) struct FakeMaster {
 impl FakeMaster {
     /// Starts a session with a worker of this state.
     pub(super) fn start(worker: PersistentState<FakeRenderer>, assets: &[&[u8]]) -> Self {
-        Self::start_with_peers(worker, assets, None)
+        let plain = PeerClient { security: WorkerSecurity::Plain, within_machine: true };
+        Self::start_with_peers(worker, assets, None, plain)
     }
 
     /// Starts a session with a worker that serves assets to other workers.
@@ -40,6 +42,7 @@ impl FakeMaster {
         mut worker: PersistentState<FakeRenderer>,
         assets: &[&[u8]],
         peer_server: Option<PeerServer>,
+        peer_client: PeerClient,
     ) -> Self {
         let (ours, theirs) = tokio::io::duplex(1 << 16);
         let shutdown = ShutdownHandle::new();
@@ -49,6 +52,7 @@ impl FakeMaster {
                 compress: false,
                 uses_disk: worker.disk.is_some(),
                 peer_server,
+                peer_client,
                 max_segment_bytes: None,
             };
             let end = run_session(theirs, config, &mut worker, &worker_shutdown).await;

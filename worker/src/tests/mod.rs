@@ -5,6 +5,7 @@ mod disk;
 mod fake_master;
 mod fake_renderer;
 mod peers;
+mod secure_peers;
 mod sessions;
 
 use std::path::Path;

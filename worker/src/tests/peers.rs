@@ -8,43 +8,46 @@ use std::time::Duration;
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
 use rayfarm_protocol::peer::{PeerReply, PeerRequest, ShareKey, Token, receive_reply, send_request};
+use rayfarm_protocol::transport::WorkerSecurity;
 use rayfarm_protocol::{AssetId, ToMaster, ToWorker};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::task::JoinHandle;
 
 use super::{FakeMaster, LARGE_CACHE, expected, lease, persistent, scene};
-use crate::peer::{PartialAsset, PeerCache, PeerServer, serve_peers};
+use crate::peer::{PartialAsset, PeerCache, PeerClient, PeerServer, serve_peers};
 
-const KEY: ShareKey = ShareKey([8; 32]);
+pub(super) const KEY: ShareKey = ShareKey([8; 32]);
 
 /// Time limit of each wait, far above what it takes.
 const TEST_LIMIT: Duration = Duration::from_secs(60);
 
-async fn within_limit<T>(work: impl Future<Output = T>) -> T {
+pub(super) async fn within_limit<T>(work: impl Future<Output = T>) -> T {
     tokio::time::timeout(TEST_LIMIT, work).await.expect("the test's time limit is over")
 }
 
 /// A mesh of several chunks.
-fn mesh() -> Vec<u8> {
+pub(super) fn mesh() -> Vec<u8> {
     b"mesh".iter().copied().chain((0..3 * MAX_CHUNK_BYTES + 1234).map(|n| ((n * n) >> 3) as u8)).collect()
 }
 
 /// Starts a peer server, which runs until the task is aborted.
-async fn start_server() -> (PeerServer, SocketAddr, JoinHandle<()>) {
+pub(super) async fn start_server(security: WorkerSecurity) -> (PeerServer, SocketAddr, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
     let cache = Arc::new(PeerCache::default());
-    let task = tokio::spawn(serve_peers(listener, Arc::clone(&cache)));
+    let task = tokio::spawn(serve_peers(listener, Arc::clone(&cache), security));
     (PeerServer { port: address.port(), cache }, address, task)
 }
 
 /// Starts a worker with a peer server. Its master has sent a key and announced a frame with this mesh.
 async fn start_worker(body: &[u8], mesh: &[u8]) -> (FakeMaster, SocketAddr, JoinHandle<()>) {
-    let (server, address, task) = start_server().await;
-    let mut master = FakeMaster::start_with_peers(persistent(1, LARGE_CACHE).0, &[body, mesh], Some(server));
+    let (server, address, task) = start_server(WorkerSecurity::Plain).await;
+    let client = PeerClient { security: WorkerSecurity::Plain, within_machine: true };
+    let worker = persistent(1, LARGE_CACHE).0;
+    let mut master = FakeMaster::start_with_peers(worker, &[body, mesh], Some(server), client);
     let port = address.port();
     assert_eq!(within_limit(master.receive()).await, Some(ToMaster::Sharing { port }));
-    master.send(ToWorker::ShareKey { key: KEY }).await;
+    master.send(ToWorker::ShareKey { key: KEY, generation: 0 }).await;
     announce_frame(&mut master, body, mesh).await;
     (master, address, task)
 }
@@ -78,7 +81,8 @@ async fn start_client(
 ) -> (FakeMaster, SocketAddr, JoinHandle<()>) {
     let (master, address, task) = start_worker(body, mesh).await;
     let (id, size) = (AssetId::of(mesh), mesh.len() as u64);
-    master.send(ToWorker::AssetFrom { id, size, peer, token: Token::new(key, id) }).await;
+    let token = Token::new(key, id, None, 0);
+    master.send(ToWorker::AssetFrom { id, size, peer, peer_key: None, token }).await;
     (master, address, task)
 }
 
@@ -86,7 +90,7 @@ async fn start_client(
 async fn begin_transfer(address: SocketAddr, id: AssetId) -> TcpStream {
     loop {
         let mut stream = TcpStream::connect(address).await.unwrap();
-        let request = PeerRequest { id, token: Token::new(&KEY, id), offset: 0 };
+        let request = PeerRequest { id, token: Token::new(&KEY, id, None, 0), offset: 0 };
         send_request(&mut stream, &request).await.unwrap();
         loop {
             match within_limit(receive_reply(&mut stream, id)).await.unwrap() {
@@ -146,7 +150,7 @@ async fn a_request_before_the_first_byte_waits_for_it() {
     let id = AssetId::of(&mesh);
     let (mut first, address, _first) = start_worker(&body, &mesh).await;
     let mut stream = TcpStream::connect(address).await.unwrap();
-    let request = PeerRequest { id, token: Token::new(&KEY, id), offset: 0 };
+    let request = PeerRequest { id, token: Token::new(&KEY, id, None, 0), offset: 0 };
     send_request(&mut stream, &request).await.unwrap();
     assert_eq!(within_limit(receive_reply(&mut stream, id)).await.unwrap(), PeerReply::Waiting);
     let (mut second, ..) = start_client(&body, &mesh, address, &KEY).await;
@@ -182,18 +186,25 @@ async fn after_the_loss_of_a_peer_the_master_sends_the_rest() {
 }
 
 #[tokio::test]
-async fn wrong_bytes_wrong_tokens_and_closed_ports_lead_to_a_transfer_from_the_master() {
+async fn wrong_bytes_tokens_and_addresses_lead_to_a_transfer_from_the_master() {
     let mesh = mesh();
     let body = scene(1, &[&mesh]);
     let id = AssetId::of(&mesh);
-    let (server, address, _task) = start_server().await;
-    server.cache.set_key(KEY);
+    let (server, address, _task) = start_server(WorkerSecurity::Plain).await;
+    server.cache.set_key(0, KEY);
     let wrong_bytes = PartialAsset::new(mesh.len()).unwrap();
     wrong_bytes.append(&vec![1; mesh.len()]);
     wrong_bytes.finish().unwrap();
     server.cache.insert(id, wrong_bytes);
     let closed = TcpListener::bind("127.0.0.1:0").await.unwrap().local_addr().unwrap();
-    for (peer, key) in [(address, KEY), (address, ShareKey([9; 32])), (closed, KEY)] {
+    let (service, group) = ([127, 0, 0, 1], [224, 0, 0, 251]);
+    for (peer, key) in [
+        (address, KEY),
+        (address, ShareKey([9; 32])),
+        (closed, KEY),
+        ((service, 80).into(), KEY),
+        ((group, 7200).into(), KEY),
+    ] {
         let (mut master, ..) = start_client(&body, &mesh, peer, &key).await;
         assert_eq!(within_limit(master.receive_request()).await, (id, 0, true), "{peer} {key:?}");
         master.send_asset(id, 0).await;

@@ -4,9 +4,11 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
+use rayfarm_protocol::transport::WorkerSecurity;
 use rayfarm_protocol::{FrameId, Reconnect, ToMaster, ToWorker};
 
 use super::{FakeMaster, HEIGHT, LARGE_CACHE, SLOW_SCENE, WIDTH, expected, lease, persistent, scene, until};
+use crate::peer::PeerClient;
 use crate::session::{SessionConfig, SessionEnd, run_session};
 use crate::shutdown::ShutdownHandle;
 
@@ -346,8 +348,13 @@ async fn a_closed_connection_and_invalid_bytes_are_reported() {
     use tokio::io::AsyncWriteExt;
     let (mut ours, theirs) = tokio::io::duplex(1 << 10);
     ours.write_all(b"HTTP/1.1 200 OK\r\n\r\n").await.unwrap();
-    let config =
-        SessionConfig { compress: false, uses_disk: false, peer_server: None, max_segment_bytes: None };
+    let config = SessionConfig {
+        compress: false,
+        uses_disk: false,
+        peer_server: None,
+        peer_client: PeerClient { security: WorkerSecurity::Plain, within_machine: true },
+        max_segment_bytes: None,
+    };
     let end = run_session(theirs, config, &mut persistent(1, LARGE_CACHE).0, &ShutdownHandle::new()).await;
     assert!(matches!(&end, SessionEnd::Lost(why) if why.contains("unknown type")), "{end:?}");
 }

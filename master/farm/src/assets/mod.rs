@@ -1,6 +1,7 @@
 //! The assets of a scene, which workers fetch once and keep: the scene body, its meshes and its textures, each under the
 //! hash of its bytes. And their routing and transfers.
 
+pub(crate) mod peer_endpoint;
 pub(crate) mod routing;
 pub(crate) mod transfers;
 

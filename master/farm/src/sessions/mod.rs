@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use rayfarm_protocol::peer::ShareKey;
-use rayfarm_protocol::{AssetId, ToWorker};
+use rayfarm_protocol::{AssetId, KeyHash, ToWorker};
 use rayfarm_scheduler::{Reconnect, WorkerId};
 use tokio::task::JoinHandle;
 
@@ -36,6 +35,18 @@ pub(crate) struct Sessions {
     ended: ByteCount,
     bans: Bans,
     pub(crate) routing: AssetRouting,
+}
+
+/// A worker from which another one is to fetch an asset.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AssetPeer {
+    pub(crate) worker: WorkerId,
+    /// Address of its peer server.
+    pub(crate) address: SocketAddr,
+    /// Hash of its public key, where connections use TLS.
+    pub(crate) key: Option<KeyHash>,
+    /// Generation of the key of which a token is made now.
+    pub(crate) generation: u64,
 }
 
 /// A message could not be queued: the worker does not read its messages, or its session has ended.
@@ -141,20 +152,25 @@ impl Sessions {
         self.bans.banned()
     }
 
-    /// The peer server from which a worker is to fetch an asset, with its key; `None`: from the master.
+    /// The worker from which a worker is to fetch an asset; `None`: from the master.
     pub(crate) fn asset_peer(
         &mut self,
         now: Duration,
         worker: WorkerId,
         id: AssetId,
         again: bool,
-    ) -> Option<(SocketAddr, ShareKey)> {
+    ) -> Option<AssetPeer> {
         // A worker on this machine serves on a loopback address, which other machines cannot reach.
         let is_local =
             |id: WorkerId| self.sessions.get(&id).map(|session| session.address.ip().is_loopback());
         let local = is_local(worker);
         match self.routing.route(now, worker, id, again, |other| is_local(other) == local) {
-            AssetSource::Worker(from) => self.sessions.get(&from)?.peer_server,
+            AssetSource::Worker(from) => {
+                let Session { peer_server, key, .. } = self.sessions.get(&from)?;
+                let server = peer_server.as_ref()?;
+                let (address, generation) = (server.address, server.token_generation(now));
+                Some(AssetPeer { worker: from, address, key: *key, generation })
+            }
             AssetSource::Master => None,
         }
     }

@@ -4,13 +4,13 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayfarm_protocol::peer::ShareKey;
 use rayfarm_protocol::session::{BodyLimit, Sender, Traffic};
-use rayfarm_protocol::{Hello, Reconnect, ToWorker};
+use rayfarm_protocol::{Hello, KeyHash, Reconnect, ToWorker};
 use tokio::task::JoinHandle;
 
 use super::identity::Identity;
 use super::lease_book::LeaseBook;
+use crate::assets::peer_endpoint::PeerEndpoint;
 use crate::assets::transfers::Transfers;
 
 /// Time limit for sending the messages that are queued when a session ends, the disconnect message included.
@@ -22,11 +22,13 @@ pub(crate) struct Session {
     pub(crate) hello: Hello,
     pub(crate) identity: Identity,
     pub(crate) address: SocketAddr,
+    /// Hash of its public key, where the connection uses TLS. A local worker has one, too.
+    pub(crate) key: Option<KeyHash>,
     pub(crate) leases: LeaseBook,
     /// Why it last failed to render a frame.
     pub(crate) last_failure: Option<String>,
-    /// Address at which the worker serves assets to other workers, and the key of its tokens.
-    pub(crate) peer_server: Option<(SocketAddr, ShareKey)>,
+    /// Where the worker serves assets to other workers.
+    pub(crate) peer_server: Option<PeerEndpoint>,
     /// Assets that it has requested.
     pub(crate) transfers: Transfers,
     pub(super) sender: Sender<ToWorker>,
@@ -43,6 +45,7 @@ impl Session {
         hello: Hello,
         identity: Identity,
         address: SocketAddr,
+        key: Option<KeyHash>,
         sender: Sender<ToWorker>,
         traffic: Arc<Traffic>,
         pixels: BodyLimit,
@@ -51,6 +54,7 @@ impl Session {
             hello,
             identity,
             address,
+            key,
             leases: LeaseBook::default(),
             last_failure: None,
             peer_server: None,

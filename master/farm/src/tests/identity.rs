@@ -1,4 +1,11 @@
-//! Commands identify workers by number, although names are not unique.
+//! Commands identify workers by number, although names are not unique. With TLS, workers are identified by their keys.
+
+use std::sync::Arc;
+
+use rayfarm_protocol::ProtocolError;
+use rayfarm_protocol::transport::{
+    Connection, JoinToken, MasterSecurity, MasterTrust, PrivateKey, WorkerSecurity,
+};
 
 use super::*;
 
@@ -99,5 +106,60 @@ async fn local_workers_are_restarted_when_they_are_allowed() {
     assert_eq!(farm.control().allow("local-1"), 1);
     until(&farm, |status| status.local_exited == 1 && lines(&tickets).len() == 3).await;
     fake_worker::start_named(farm.address(), &ticket, Script::Correct).await;
+    farm.shut_down().await;
+}
+
+/// A farm with TLS.
+async fn secure_farm() -> (Farm, Arc<MasterTrust>) {
+    let trust = Arc::new(MasterTrust::new(PrivateKey::generate().unwrap(), JoinToken::random().unwrap()));
+    let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
+    let security = MasterSecurity::Tls(Arc::clone(&trust));
+    let options = FarmOptions { listen, security, ..FarmOptions::default() };
+    let drawn = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
+    (Farm::start(options, drawn).await.unwrap(), trust)
+}
+
+/// Security of a worker with a new key.
+fn new_worker(trust: &MasterTrust) -> WorkerSecurity {
+    WorkerSecurity::join(Arc::new(PrivateKey::generate().unwrap()), &trust.join_line("host:1"))
+}
+
+/// Joins through TLS. The session lasts as long as the result.
+async fn join(
+    farm: &Farm,
+    name: &str,
+    security: &WorkerSecurity,
+) -> Result<Connection<TcpStream>, ProtocolError> {
+    let stream = TcpStream::connect(farm.address()).await.unwrap();
+    let (simd, software) = ("none".into(), "test".into());
+    let hello = Hello { name: name.into(), threads: 1, simd, software, tags: Vec::new() };
+    handshake::as_worker(stream, security, &hello).await.map(|(connection, _)| connection)
+}
+
+#[tokio::test]
+async fn a_ban_of_a_key_holds_under_each_name_and_for_no_other_key() {
+    let (farm, trust) = secure_farm().await;
+    let (one, other) = (new_worker(&trust), new_worker(&trust));
+    // Two workers of one name on one machine.
+    let first = join(&farm, "twin", &one).await.unwrap();
+    until_workers(&farm, 1).await;
+    let _second = join(&farm, "twin", &other).await.unwrap();
+    until_workers(&farm, 2).await;
+    let ids: Vec<u64> = farm.status().workers.iter().map(|worker| worker.id).collect();
+    farm.control().ban(ids[0], "enough").unwrap();
+    until_workers(&farm, 1).await;
+    assert_eq!(farm.status().workers[0].id, ids[1], "the other worker stays");
+    drop(first);
+
+    for name in ["twin", "renamed", "local-1"] {
+        let error = join(&farm, name, &one).await.unwrap_err();
+        assert!(error.to_string().contains("is banned") && error.is_final(true), "{error}");
+    }
+    let _third = join(&farm, "twin", &new_worker(&trust)).await.unwrap();
+    until_workers(&farm, 2).await;
+
+    assert!(farm.control().allow_worker(ids[0]));
+    let _first = join(&farm, "renamed", &one).await.unwrap();
+    until_workers(&farm, 3).await;
     farm.shut_down().await;
 }
