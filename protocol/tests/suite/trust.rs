@@ -1,15 +1,16 @@
 //! Handshakes through TLS: keys, tokens, other transports, relays, replays and limits.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use proptest::prelude::*;
+use rayfarm_protocol::envelope::Kind;
 use rayfarm_protocol::handshake::{Refusal, as_master, as_worker};
 use rayfarm_protocol::transport::{
     Connection, JoinLine, JoinToken, MasterSecurity, MasterTrust, PrivateKey, PrivateKeyError, WorkerSecurity,
 };
 use rayfarm_protocol::{
-    Hello, KeyHash, PROTOCOL_VERSION, ProtocolError, ToMaster, ToWorker, Welcome, limits, session,
+    Hello, KeyHash, PROTOCOL_VERSION, ProtocolError, ToMaster, ToWorker, Welcome, limits, peer, session,
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
@@ -157,6 +158,46 @@ async fn a_relay_with_its_own_key_learns_no_proof() {
     assert!(matches!(joined, Err(ProtocolError::WrongKey { theirs, .. }) if theirs == own.key_hash()));
 }
 
+/// Begins TLS with both ends under a key of its own, and passes on what each sends. The preambles are not changed.
+async fn relay_decrypted(
+    mut worker: DuplexStream,
+    mut master: DuplexStream,
+    own: &WorkerSecurity,
+    master_key: KeyHash,
+) {
+    let (mut from_worker, mut from_master) = ([0; 12], [0; 12]);
+    worker.read_exact(&mut from_worker).await.unwrap();
+    master.write_all(&from_worker).await.unwrap();
+    master.read_exact(&mut from_master).await.unwrap();
+    worker.write_all(&from_master).await.unwrap();
+    let (worker, master) =
+        tokio::join!(peer::accept(worker, own), peer::connect(master, own, Some(master_key)));
+    // Each end closes without a word of TLS where it fails, which is an error of the copy.
+    let _ = tokio::io::copy_bidirectional(&mut worker.unwrap(), &mut master.unwrap()).await;
+}
+
+#[tokio::test]
+async fn a_proof_that_is_relayed_to_another_tls_session_is_wrong() {
+    let (trust, master, _) = farm();
+    let (_, _, relay_security) = farm();
+    // The worst case: the user has pasted a line with the key of the relay and the token of the farm.
+    let worker = WorkerSecurity::Tls {
+        key: Arc::new(PrivateKey::generate().unwrap()),
+        master: relay_security.key_hash().unwrap(),
+        token: trust.token(),
+    };
+    let ((a, relay_a), (relay_b, b)) = (duplex(PIPE_BYTES), duplex(PIPE_BYTES));
+    let hello = hello();
+    let (met, joined, ()) = tokio::join!(
+        as_master(a, &master, reject_all),
+        as_worker(b, &worker, &hello),
+        relay_decrypted(relay_b, relay_a, &relay_security, trust.key_hash()),
+    );
+    assert!(matches!(met, Err(ProtocolError::WrongToken)), "{met:?}");
+    let error = joined.unwrap_err();
+    assert!(error.to_string().contains("token"), "{error}");
+}
+
 #[tokio::test]
 async fn a_changed_record_ends_the_session() {
     let (_, master, worker) = farm();
@@ -261,6 +302,52 @@ fn errors_of_a_join_line_name_the_wrong_part_and_not_the_token() {
     let line: JoinLine = format!("rf1:[fe80::1%eth0]:1:{key}:{token}").parse().unwrap();
     assert_eq!(line.address, "[fe80::1%eth0]:1");
     assert!(!format!("{line:?}").contains(&token));
+}
+
+/// Keys for all cases of a property.
+static FARM: LazyLock<(Arc<MasterTrust>, MasterSecurity, WorkerSecurity)> = LazyLock::new(farm);
+
+/// The error of a master whose peer sends these bytes after preambles and TLS.
+fn error_of_master(bytes: &[u8]) -> ProtocolError {
+    let (trust, master, worker) = &*FARM;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+    runtime.block_on(async {
+        let (a, mut b) = duplex(1 << 16);
+        let sending = async {
+            let preamble = [b"RAYFARM\n".as_slice(), &PROTOCOL_VERSION.to_le_bytes(), &[2, 1]].concat();
+            b.write_all(&preamble).await.unwrap();
+            b.read_exact(&mut [0; 12]).await.unwrap();
+            let mut stream = peer::connect(b, worker, Some(trust.key_hash())).await.unwrap();
+            let _ = stream.write_all(bytes).await;
+            let _ = stream.shutdown().await;
+            // A refusal has room in the pipe.
+            let _ = stream.read_to_end(&mut Vec::new()).await;
+        };
+        tokio::join!(as_master(a, master, reject_all), sending).0.unwrap_err()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn arbitrary_proofs_of_any_length_are_wrong(proof in prop::collection::vec(any::<u8>(), 0..=64)) {
+        let head = (proof.len() as u32).to_le_bytes();
+        let error = error_of_master(&[&head[..], &[Kind::Proof as u8, 0, 0, 0], &proof].concat());
+        let is_expected = match proof.len() {
+            length if length > limits::PROOF_BYTES => matches!(error, ProtocolError::TooLong { .. }),
+            _ => matches!(error, ProtocolError::WrongToken),
+        };
+        prop_assert!(is_expected, "{} bytes: {}", proof.len(), error);
+    }
+
+    #[test]
+    fn arbitrary_bytes_instead_of_a_proof_end_the_handshake(
+        bytes in prop::collection::vec(any::<u8>(), 0..3000),
+    ) {
+        let error = error_of_master(&bytes);
+        prop_assert!(!error.is_final(true), "{}", error);
+    }
 }
 
 proptest! {
