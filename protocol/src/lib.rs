@@ -42,6 +42,8 @@
 
 #[cfg(feature = "transport")]
 pub mod address;
+#[cfg(feature = "transport")]
+pub mod admission;
 pub mod codec;
 mod cost;
 pub mod envelope;

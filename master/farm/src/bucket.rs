@@ -2,30 +2,55 @@
 
 use std::time::Instant;
 
-/// A token bucket.
+/// Limit of a rate of events.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rate {
+    /// Events at once.
+    pub(crate) burst: f64,
+    /// Events per second in the long run.
+    pub(crate) per_second: f64,
+}
+
+/// The events that a [`Rate`] still allows.
 #[derive(Debug)]
 pub(crate) struct Bucket {
-    most: f64,
-    per_second: f64,
+    rate: Rate,
     left: f64,
     at: Instant,
 }
 
 impl Bucket {
-    /// A full bucket: `most` events at once, `per_second` in the long run.
-    pub(crate) fn new((most, per_second): (f64, f64), at: Instant) -> Self {
-        Self { most, per_second, left: most, at }
+    /// A full bucket.
+    pub(crate) fn new(rate: Rate, now: Instant) -> Self {
+        Self { rate, left: rate.burst, at: now }
     }
 
-    /// Takes a token. `None`: the bucket is empty.
-    pub(crate) fn take(&mut self, now: Instant) -> Option<()> {
-        let filled = now.duration_since(self.at).as_secs_f64() * self.per_second;
-        self.left = (self.left + filled).min(self.most);
+    /// Whether another event is allowed, which is counted then.
+    pub(crate) fn take(&mut self, now: Instant) -> bool {
+        let filled = now.saturating_duration_since(self.at).as_secs_f64() * self.rate.per_second;
+        self.left = (self.left + filled).min(self.rate.burst);
         self.at = now;
-        if self.left < 1.0 {
-            return None;
+        let is_allowed = self.left >= 1.0;
+        if is_allowed {
+            self.left -= 1.0;
         }
-        self.left -= 1.0;
-        Some(())
+        is_allowed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn the_rate_holds_in_the_long_run() {
+        let start = Instant::now();
+        let mut bucket = Bucket::new(Rate { burst: 10.0, per_second: 2.0 }, start);
+        // 100 attempts a second for 50 seconds: the burst, and two a second.
+        let times = (0..5000).map(|step| start + Duration::from_millis(10 * step));
+        let allowed = times.filter(|&now| bucket.take(now)).count();
+        assert!((108..=110).contains(&allowed), "{allowed}");
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use rayfarm_protocol::admission::Place;
 use rayfarm_protocol::limits::{FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES};
 use rayfarm_protocol::session::{self, BodyLimit, Receiver, SendError, Sender};
 use rayfarm_protocol::transport::Connection;
@@ -17,8 +18,9 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
-use crate::admission::{Admission, Place, RefusalLog};
+use crate::bucket::Rate;
 use crate::driver::{AnswerError, Driver};
+use crate::line_budget::{LineBudget, more};
 use crate::sessions::Session;
 use crate::sessions::budget::{Budget, OverBudget};
 use crate::sessions::identity::Identity;
@@ -27,6 +29,8 @@ use crate::sessions::identity::Identity;
 const MAX_ASSET_REQUESTS: usize = 4096;
 /// Delay after a failed accept, which usually means that file descriptors have run out.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(100);
+/// Log lines about failed accepts.
+const ACCEPT_LINES: Rate = Rate { burst: 4.0, per_second: 0.1 };
 
 /// An error that ends a session.
 #[derive(Debug, thiserror::Error)]
@@ -50,8 +54,7 @@ pub(crate) async fn accept(
     sessions: TaskTracker,
     stop: CancellationToken,
 ) {
-    let admission = Admission::default();
-    let refusals = Arc::new(RefusalLog::new(Instant::now()));
+    let mut failures = LineBudget::new(ACCEPT_LINES, Instant::now());
     loop {
         let accepted = tokio::select! {
             () = stop.cancelled() => return,
@@ -60,14 +63,14 @@ pub(crate) async fn accept(
         match accepted {
             Ok((stream, address)) => {
                 // Without a place the connection is closed: its host has as many that are not silent.
-                let Some(place) = admission.enter(address.ip()) else { continue };
-                let (driver, stop, refusals) = (driver.clone(), stop.clone(), refusals.clone());
+                let Some(place) = driver.door.enter(address.ip()) else { continue };
+                let (driver, stop) = (driver.clone(), stop.clone());
                 sessions.spawn(async move {
                     let session = async {
                         let admitted = tokio::select! {
                             biased;
                             () = place.closed() => None,
-                            admitted = shake_hands(&driver, stream, address, &place, &refusals) => admitted,
+                            admitted = shake_hands(&driver, stream, address, &place) => admitted,
                         };
                         drop(place);
                         if let Some(admitted) = admitted {
@@ -81,7 +84,9 @@ pub(crate) async fn accept(
                 });
             }
             Err(error) => {
-                tracing::warn!("cannot accept a connection: {error}; retrying");
+                if let Some(left_out) = failures.next(Instant::now()) {
+                    tracing::warn!("cannot accept a connection: {error}; retrying{}", more(left_out));
+                }
                 tokio::time::sleep(ACCEPT_RETRY_DELAY).await;
             }
         }
@@ -102,10 +107,14 @@ async fn shake_hands(
     stream: TcpStream,
     address: SocketAddr,
     place: &Place,
-    refusals: &RefusalLog,
 ) -> Option<Admitted> {
     if let Err(error) = tcp::configure(&stream) {
         tracing::debug!("{address}: cannot send small messages at once: {error}");
+    }
+    let door = &driver.door;
+    let delay = door.backoff.delay(address.ip(), Instant::now());
+    if !delay.is_zero() {
+        tokio::time::sleep(delay).await;
     }
     // A connection that never sends is no news: port scanners and health checks do that.
     if !matches!(timeout(FIRST_BYTE_DEADLINE, stream.peek(&mut [0])).await, Ok(Ok(1))) {
@@ -122,18 +131,22 @@ async fn shake_hands(
         }
     };
     match handshake::as_master(stream, &driver.security, decide).await {
-        Ok((stream, hello)) => admitted.map(|(worker, identity)| {
-            // A ticket is never displayed.
-            let hello = Hello { name: identity.name(), ..hello };
-            Admitted { worker, hello, identity, stream }
-        }),
+        Ok((stream, hello)) => {
+            door.backoff.succeeded(address.ip());
+            admitted.map(|(worker, identity)| {
+                // A ticket is never displayed.
+                let hello = Hello { name: identity.name(), ..hello };
+                Admitted { worker, hello, identity, stream }
+            })
+        }
         // The worker retries every few seconds.
         Err(error @ ProtocolError::NotNow { .. }) => {
             tracing::debug!("{address} is refused: {error}");
             None
         }
         Err(error) => {
-            refusals.log(address, &error);
+            door.backoff.failed(address.ip(), Instant::now());
+            door.refusals.log(address, &error);
             None
         }
     }
@@ -143,23 +156,30 @@ async fn shake_hands(
 async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     let Admitted { worker, hello, identity, stream } = admitted;
     let Hello { name, threads, simd, software, .. } = hello.clone();
-    tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}");
+    let left_out = driver.door.log_lines.next(address.ip(), Instant::now());
+    if let Some(left_out) = left_out {
+        let more = more(left_out);
+        tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}{more}");
+    }
+    let is_logged = left_out.is_some();
     let (limit, key) = (BodyLimit::closed(), stream.peer_key());
     let (sender, receiver, traffic) = session::spawn_limited::<_, ToWorker, ToMaster>(stream, limit.clone());
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
-    driver.join(worker, Session::new(hello, identity, address, key, sender.clone(), traffic, limit));
+    driver.join(worker, Session::new(hello, identity, address, key, sender.clone(), traffic, limit, is_logged));
     let ended = tokio::select! {
-        ended = receive(driver, worker, receiver, request) => ended,
+        ended = receive(driver, worker, address, receiver, request) => ended,
         () = send_assets(driver, worker, &sender, requests) => Err(SessionError::Closed),
     };
     match ended {
         Ok(reason) => {
-            tracing::info!("{worker} ({name}, {address}) leaves: {reason}");
+            if is_logged {
+                tracing::info!("{worker} ({name}, {address}) leaves: {reason}");
+            }
             driver.leave(worker, "disconnected in order");
         }
         Err(error) => {
             // A session that the driver has ended is logged already.
-            if driver.is_connected(worker) {
+            if is_logged && driver.is_connected(worker) {
                 tracing::warn!("{worker} ({name}, {address}) is lost: {error}");
             }
             driver.leave(worker, &error.to_string());
@@ -174,15 +194,23 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
 async fn receive(
     driver: &Driver,
     worker: WorkerId,
+    address: SocketAddr,
     mut receiver: Receiver<ToMaster>,
     request: mpsc::Sender<(AssetId, u64)>,
 ) -> Result<String, SessionError> {
     let mut budget = Budget::new(Instant::now());
+    let mut has_delivered = false;
     while let Some(message) = receiver.recv().await {
         let message = message?;
-        budget.count(&message, Instant::now())?;
+        budget.count(&message, |id| driver.assets.get(id).is_some(), Instant::now())?;
         match message {
-            ToMaster::Pixels { header, bytes } => driver.pixels(worker, header, &bytes)?,
+            ToMaster::Pixels { header, bytes } => {
+                driver.pixels(worker, header, &bytes)?;
+                if !has_delivered {
+                    has_delivered = true;
+                    driver.door.add_known(address.ip());
+                }
+            }
             ToMaster::NeedAsset { id, offset, again } => {
                 if !driver.asset_requested(worker, id, offset, again) {
                     request.try_send((id, offset)).map_err(|_| SessionError::TooManyRequests)?;
@@ -191,9 +219,9 @@ async fn receive(
             ToMaster::Sharing { port } => driver.add_peer_server(worker, port),
             ToMaster::HaveAsset { id } => driver.asset_received(worker, id),
             ToMaster::Pong { nonce, progressed } => {
-                driver.handle(Event::Pong { worker, nonce, progressed });
+                driver.pong(worker, nonce, progressed)?;
             }
-            ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason),
+            ToMaster::Failed { frame, reason } => driver.failed(worker, frame, reason)?,
             ToMaster::Drain => driver.handle(Event::WorkerDrains { worker }),
             ToMaster::Disconnect { reason } => return Ok(reason),
         }

@@ -29,6 +29,10 @@ pub struct FarmStatus {
     pub verification: Option<Verification>,
     /// Progress of the scene's transfer to the workers that wait for it.
     pub transfers: TransferStatus,
+    /// Connections in their handshake.
+    pub pending: usize,
+    /// Connections that were closed in their handshake, or not looked at, because others took their places.
+    pub refused: u64,
     /// Sums over the run.
     pub totals: RunTotals,
 }

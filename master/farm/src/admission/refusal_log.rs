@@ -1,49 +1,36 @@
-//! Log lines about refused connections, at a bounded rate: an unauthenticated peer must not fill a disk with them.
+//! Log lines about refused connections of all hosts, at a bounded rate: an unauthenticated peer must not fill a disk with them.
 
 use std::fmt::Display;
 use std::net::SocketAddr;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use crate::bucket::Bucket;
+use crate::bucket::Rate;
+use crate::line_budget::{LineBudget, more};
 
-/// Lines at once, and per second.
-const LINES: (f64, f64) = (20.0, 1.0);
+/// Log lines about refused connections.
+const LINES: Rate = Rate { burst: 20.0, per_second: 1.0 };
 
 /// Log of refused connections.
 #[derive(Debug)]
-pub(crate) struct RefusalLog(Mutex<State>);
-
-#[derive(Debug)]
-struct State {
-    lines: Bucket,
-    left_out: u64,
-}
+pub(crate) struct RefusalLog(Mutex<LineBudget>);
 
 impl RefusalLog {
     pub(crate) fn new(now: Instant) -> Self {
-        Self(Mutex::new(State { lines: Bucket::new(LINES, now), left_out: 0 }))
+        Self(Mutex::new(LineBudget::new(LINES, now)))
     }
 
     /// Logs a refusal, or counts it.
     pub(crate) fn log(&self, address: SocketAddr, error: &dyn Display) {
-        if let Some(left_out) = self.count(Instant::now()) {
-            let more =
-                if left_out == 0 { String::new() } else { format!(" ({left_out} others were not logged)") };
-            tracing::warn!("{address} is refused: {error}{more}");
+        match self.count(Instant::now()) {
+            Some(left_out) => tracing::warn!("{address} is refused: {error}{}", more(left_out)),
+            None => tracing::debug!("{address} is refused: {error}"),
         }
     }
 
     /// Whether a refusal is to be logged, with the number of those that were not logged before.
     fn count(&self, now: Instant) -> Option<u64> {
-        let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match state.lines.take(now) {
-            Some(()) => Some(std::mem::take(&mut state.left_out)),
-            None => {
-                state.left_out += 1;
-                None
-            }
-        }
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).next(now)
     }
 }
 
@@ -58,7 +45,7 @@ mod tests {
         let start = Instant::now();
         let log = RefusalLog::new(start);
         let logged = (0..1000).filter(|_| log.count(start) == Some(0)).count();
-        assert_eq!(logged as f64, LINES.0);
+        assert_eq!(logged as f64, LINES.burst);
         assert_eq!(log.count(start + Duration::from_secs(1)), Some(980));
         assert_eq!(log.count(start + Duration::from_secs(1)), None);
         assert_eq!(log.count(start + Duration::from_secs(2)), Some(1));

@@ -1,6 +1,6 @@
 //! Replies of workers: pixels for the picture, pixels to verify, failures.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::{Cost, FrameId, Lease, PixelsHeader};
@@ -11,6 +11,8 @@ use rayfarm_tracer::scene::{FrameView, MAX_LIGHTS, MAX_SHADOW_SAMPLES};
 use super::Driver;
 use super::reply::Reply;
 use crate::framebuffer::{Misfit, Written};
+use crate::line_budget::more;
+use crate::sessions::causes::PongStatus;
 use crate::sessions::lease_book::LeaseStatus;
 use crate::verification::SegmentDigest;
 
@@ -20,6 +22,12 @@ pub(crate) enum AnswerError {
     /// The worker does not hold the lease.
     #[error("it sent pixels of {0}, which it does not hold")]
     NotHeld(Lease),
+    /// It reports a failure without a cause.
+    #[error("it reports more failures than it was sent frames and segments")]
+    Failures,
+    /// It sends pongs without pings.
+    #[error("it sends pongs that answer no ping")]
+    Pongs,
     /// The pixels do not fit the lease.
     #[error("its pixels do not fit: {0}")]
     Misfit(#[from] Misfit),
@@ -93,21 +101,46 @@ impl Driver {
         std::mem::take(&mut inner.uncomputed)
     }
 
+    /// Handles a pong.
+    ///
+    /// # Errors
+    /// More than a few pongs that answer no open ping.
+    pub(crate) fn pong(&self, worker: WorkerId, nonce: u64, progressed: bool) -> Result<(), AnswerError> {
+        let mut inner = self.lock();
+        let Some(session) = inner.sessions.get_mut(worker) else { return Ok(()) };
+        match session.causes.pong(nonce) {
+            PongStatus::Open => self.drive(&mut inner, Event::Pong { worker, nonce, progressed }),
+            PongStatus::Stray => {}
+            PongStatus::TooMany => return Err(AnswerError::Pongs),
+        }
+        Ok(())
+    }
+
     /// Handles a worker's report that it cannot render a frame.
-    pub(crate) fn failed(&self, worker: WorkerId, frame: FrameId, reason: String) {
+    ///
+    /// # Errors
+    /// More failures than frames and leases were sent.
+    pub(crate) fn failed(&self, worker: WorkerId, frame: FrameId, reason: String) -> Result<(), AnswerError> {
         let mut inner = self.lock();
         if let Some(session) = inner.sessions.get_mut(worker) {
+            if !session.causes.failed() {
+                return Err(AnswerError::Failures);
+            }
             session.leases.fail(frame);
             let name = &session.hello.name;
             // The same reason for each frame of a moving camera is one line.
-            if session.last_failure.as_ref() == Some(&reason) {
-                tracing::debug!("{worker} ({name}) cannot render frame {frame} for the same reason");
-            } else {
-                tracing::warn!("{worker} ({name}) cannot render frame {frame}: {reason}");
+            let is_new = session.last_failure.as_ref() != Some(&reason);
+            match is_new.then(|| session.failure_lines.next(Instant::now())).flatten() {
+                Some(left_out) => {
+                    let more = more(left_out);
+                    tracing::warn!("{worker} ({name}) cannot render frame {frame}: {reason}{more}");
+                }
+                None => tracing::debug!("{worker} ({name}) cannot render frame {frame}: {reason}"),
             }
             session.last_failure = Some(reason);
         }
         self.drive(&mut inner, Event::WorkerFailed { worker, frame });
+        Ok(())
     }
 }
 

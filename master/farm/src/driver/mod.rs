@@ -27,7 +27,9 @@ mod workers;
 
 use crate::accounting::pace::Pace;
 use crate::accounting::{Accounts, TimelineSink};
+use crate::admission::Door;
 use crate::assets::Assets;
+use crate::descriptors;
 use crate::error::FarmError;
 use crate::finished::FinishedFrame;
 use crate::format::wire_format;
@@ -66,6 +68,10 @@ pub(crate) struct Driver {
     pub(crate) security: MasterSecurity,
     /// The secret names of local workers.
     pub(crate) tickets: Tickets,
+    /// Connections before their sessions.
+    pub(crate) door: Door,
+    /// Most workers at a time.
+    max_workers: usize,
 }
 
 struct Inner {
@@ -161,6 +167,8 @@ impl Driver {
             security: options.security.clone(),
             tickets: Tickets::new(secret.as_ref(), options.local_workers),
             secret,
+            door: Door::default(),
+            max_workers: descriptors::max_workers(),
         })
     }
 

@@ -10,7 +10,7 @@ use rayfarm_scheduler::{Action, Cost, Event, Reconnect, WorkerId};
 use super::{Driver, Inner, Request};
 use crate::error::FarmError;
 use crate::finished::FinishedFrame;
-use crate::sessions::{SendFailed, Session};
+use crate::sessions::SendFailed;
 
 impl Driver {
     /// Performs an action. Events that follow from it at once are appended to `events`.
@@ -36,6 +36,9 @@ impl Driver {
                 let requested = inner.requests.get(&frame).map(|request| &request.announce);
                 let announce = requested.or_else(|| inner.open_segments.announce(frame)).cloned();
                 if let Some(announce) = announce {
+                    if let Some(session) = inner.sessions.get_mut(worker) {
+                        session.causes.allow_failure();
+                    }
                     events.extend(send(inner, worker, ToWorker::Frame(announce)));
                 }
             }
@@ -43,6 +46,7 @@ impl Driver {
                 let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
                     session.pixels.allow(bytes);
+                    session.causes.allow_failure();
                     session.leases.grant(lease);
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
@@ -54,7 +58,9 @@ impl Driver {
                 }
             }
             Action::Ping { worker, nonce } => {
-                inner.sessions.get_mut(worker).into_iter().for_each(Session::note_ping);
+                if let Some(session) = inner.sessions.get_mut(worker) {
+                    session.note_ping(nonce);
+                }
                 events.extend(send(inner, worker, ToWorker::Ping { nonce }));
             }
             Action::Drain { worker } => events.extend(send(inner, worker, ToWorker::Drain)),
@@ -71,6 +77,7 @@ impl Driver {
                 let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
                     session.pixels.allow(bytes);
+                    session.causes.allow_failure();
                     session.leases.verify(lease);
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }

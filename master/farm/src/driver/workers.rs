@@ -12,8 +12,6 @@ use crate::sessions::identity::{Identity, host};
 use crate::sessions::{PastWorker, Session};
 use crate::status::{BannedWorker, FarmStatus, RunTotals, WorkerStatus};
 
-/// Workers that are admitted.
-const MAX_WORKERS: usize = 1024;
 /// Most workers of one other host that have delivered nothing yet.
 const MAX_UNPROVEN_OF_HOST: usize = 128;
 
@@ -101,7 +99,7 @@ impl Driver {
             )));
         }
         let count = inner.sessions.len();
-        if count < MAX_WORKERS {
+        if count < self.max_workers {
             return None;
         }
         let oldest = unproven(&inner).map(|(worker, _)| worker).next();
@@ -150,7 +148,10 @@ impl Driver {
         let progress = inner.scheduler.progress();
         let part =
             progress.map_or(0.0, |progress| f64::from(progress.rows_done) / f64::from(progress.rows.max(1)));
+        let (pending, refused) = self.door.counts();
         FarmStatus {
+            pending,
+            refused,
             transfers: transfers(&inner),
             totals: self.totals(&inner, part),
             workers: workers.collect(),

@@ -6,29 +6,35 @@ use std::time::Instant;
 
 use rayfarm_protocol::{AssetId, ToMaster};
 
-use crate::bucket::Bucket;
+use crate::bucket::{Bucket, Rate};
 
-/// Small messages at once, and per second. A scene with thousands of textures is requested at once.
-const MESSAGES: (f64, f64) = (8192.0, 200.0);
-/// Failures at once, and per second: at most one for each announced frame, and a master announces few frames beyond 60 a second.
-const FAILURES: (f64, f64) = (128.0, 60.0);
+/// Small messages. A scene with thousands of textures is requested at once.
+const MESSAGES: Rate = Rate { burst: 8192.0, per_second: 200.0 };
+/// Failures: at most one for each announced frame, and a master announces few frames beyond 60 a second.
+const FAILURES: Rate = Rate { burst: 128.0, per_second: 60.0 };
 /// Requests for one asset: the first, and some after failed transfers.
 const REQUESTS_OF_ASSET: u32 = 4;
-/// Assets that one session requests.
-const MAX_ASSETS: usize = 65_536;
+/// Requests for assets that the scene does not have.
+const MAX_UNKNOWN: u32 = 64;
 
 /// A worker sends more than its work needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum OverBudget {
     /// Too many messages.
-    #[error("it sends more than {} messages per second in addition to pixels", MESSAGES.1)]
+    #[error("it sends more than {} messages per second in addition to pixels", MESSAGES.per_second)]
     Messages,
     /// Too many failures.
-    #[error("it reports more than {} failures per second", FAILURES.1)]
+    #[error("it reports more than {} failures per second", FAILURES.per_second)]
     Failures,
-    /// Too many requests for one asset, or for different ones.
-    #[error("it requests an asset more than {REQUESTS_OF_ASSET} times, or more than {MAX_ASSETS} assets")]
+    /// Too many requests for one asset.
+    #[error("it requests an asset more than {REQUESTS_OF_ASSET} times")]
     Requests,
+    /// Too many requests for unknown assets.
+    #[error("it requests more than {MAX_UNKNOWN} assets that the scene does not have")]
+    Unknown,
+    /// A report about an asset that it has not requested, or has reported before.
+    #[error("it reports an asset as received that it has not requested")]
+    Reports,
 }
 
 /// The budget of one session.
@@ -36,7 +42,9 @@ pub(crate) enum OverBudget {
 pub(crate) struct Budget {
     messages: Bucket,
     failures: Bucket,
-    requests: BTreeMap<AssetId, u32>,
+    /// Numbers of requests and of reports about assets of the scene.
+    assets: BTreeMap<AssetId, (u32, u32)>,
+    unknown: u32,
 }
 
 impl Budget {
@@ -44,30 +52,48 @@ impl Budget {
         Self {
             messages: Bucket::new(MESSAGES, now),
             failures: Bucket::new(FAILURES, now),
-            requests: BTreeMap::new(),
+            assets: BTreeMap::new(),
+            unknown: 0,
         }
     }
 
-    /// Counts a message.
+    /// Counts a message. `has_asset` tells whether the scene has an asset.
     ///
     /// # Errors
     /// A message beyond the budget.
-    pub(crate) fn count(&mut self, message: &ToMaster, now: Instant) -> Result<(), OverBudget> {
+    pub(crate) fn count(
+        &mut self,
+        message: &ToMaster,
+        has_asset: impl Fn(AssetId) -> bool,
+        now: Instant,
+    ) -> Result<(), OverBudget> {
         if matches!(message, ToMaster::Pixels { .. }) {
             return Ok(());
         }
-        self.messages.take(now).ok_or(OverBudget::Messages)?;
+        within(self.messages.take(now), OverBudget::Messages)?;
         match message {
-            ToMaster::Failed { .. } => self.failures.take(now).ok_or(OverBudget::Failures),
-            ToMaster::NeedAsset { id, .. } => {
-                let is_full = self.requests.len() >= MAX_ASSETS && !self.requests.contains_key(id);
-                let requests = self.requests.entry(*id).or_default();
+            ToMaster::Failed { .. } => within(self.failures.take(now), OverBudget::Failures),
+            ToMaster::NeedAsset { id, .. } if has_asset(*id) => {
+                let (requests, _) = self.assets.entry(*id).or_default();
                 *requests += 1;
-                if is_full || *requests > REQUESTS_OF_ASSET { Err(OverBudget::Requests) } else { Ok(()) }
+                within(*requests <= REQUESTS_OF_ASSET, OverBudget::Requests)
+            }
+            ToMaster::NeedAsset { .. } => {
+                self.unknown += 1;
+                within(self.unknown <= MAX_UNKNOWN, OverBudget::Unknown)
+            }
+            ToMaster::HaveAsset { id } => {
+                let (requests, reports) = self.assets.get_mut(id).ok_or(OverBudget::Reports)?;
+                *reports += 1;
+                within(reports <= requests, OverBudget::Reports)
             }
             _ => Ok(()),
         }
     }
+}
+
+fn within(is_within: bool, error: OverBudget) -> Result<(), OverBudget> {
+    if is_within { Ok(()) } else { Err(error) }
 }
 
 #[cfg(test)]
@@ -78,17 +104,21 @@ mod tests {
 
     use super::*;
 
+    fn any(_: AssetId) -> bool {
+        true
+    }
+
     #[test]
     fn a_flood_ends_and_a_steady_rate_does_not() {
         let start = Instant::now();
         let mut budget = Budget::new(start);
         let pong = ToMaster::Pong { nonce: 0, progressed: false };
-        let flood = (0..).take_while(|_| budget.count(&pong, start).is_ok()).take(100_000).count();
-        assert_eq!(flood as f64, MESSAGES.0);
-        assert_eq!(budget.count(&pong, start), Err(OverBudget::Messages));
+        let flood = (0..).take_while(|_| budget.count(&pong, any, start).is_ok()).take(100_000).count();
+        assert_eq!(flood as f64, MESSAGES.burst);
+        assert_eq!(budget.count(&pong, any, start), Err(OverBudget::Messages));
         for step in 1..10_000 {
             let now = start + Duration::from_millis(10 * step);
-            assert_eq!(budget.count(&pong, now), Ok(()), "100 a second");
+            assert_eq!(budget.count(&pong, any, now), Ok(()), "100 a second");
         }
     }
 
@@ -97,13 +127,42 @@ mod tests {
         let now = Instant::now();
         let mut budget = Budget::new(now);
         let failed = ToMaster::Failed { frame: FrameId(1), reason: "no".to_owned() };
-        let flood = (0..).take_while(|_| budget.count(&failed, now).is_ok()).take(100_000).count();
-        assert_eq!(flood as f64, FAILURES.0);
+        let flood = (0..).take_while(|_| budget.count(&failed, any, now).is_ok()).take(100_000).count();
+        assert_eq!(flood as f64, FAILURES.burst);
         let need = |byte| ToMaster::NeedAsset { id: AssetId([byte; 32]), offset: 0, again: true };
         for _ in 0..REQUESTS_OF_ASSET {
-            assert_eq!(budget.count(&need(1), now), Ok(()));
+            assert_eq!(budget.count(&need(1), any, now), Ok(()));
         }
-        assert_eq!(budget.count(&need(1), now), Err(OverBudget::Requests));
-        assert_eq!(budget.count(&need(2), now), Ok(()));
+        assert_eq!(budget.count(&need(1), any, now), Err(OverBudget::Requests));
+        assert_eq!(budget.count(&need(2), any, now), Ok(()));
+    }
+
+    #[test]
+    fn unknown_assets_take_no_memory_and_are_bounded() {
+        let now = Instant::now();
+        let mut budget = Budget::new(now);
+        for number in 0..MAX_UNKNOWN {
+            let need = ToMaster::NeedAsset { id: AssetId([number as u8; 32]), offset: 0, again: false };
+            assert_eq!(budget.count(&need, |_| false, now), Ok(()));
+        }
+        let need = ToMaster::NeedAsset { id: AssetId([200; 32]), offset: 0, again: false };
+        assert_eq!(budget.count(&need, |_| false, now), Err(OverBudget::Unknown));
+        assert!(budget.assets.is_empty());
+    }
+
+    #[test]
+    fn an_asset_is_reported_as_often_as_it_is_requested() {
+        let now = Instant::now();
+        let mut budget = Budget::new(now);
+        let id = AssetId([1; 32]);
+        let (need, have) = (ToMaster::NeedAsset { id, offset: 0, again: false }, ToMaster::HaveAsset { id });
+        assert_eq!(budget.count(&have, any, now), Err(OverBudget::Reports));
+        for _ in 0..2 {
+            assert_eq!(budget.count(&need, any, now), Ok(()));
+            assert_eq!(budget.count(&have, any, now), Ok(()));
+            assert_eq!(budget.count(&have, any, now), Err(OverBudget::Reports));
+            // The refused report is counted, so one more request makes up for it.
+            assert_eq!(budget.count(&need, any, now), Ok(()));
+        }
     }
 }

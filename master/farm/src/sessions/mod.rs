@@ -12,6 +12,7 @@ pub(crate) mod addresses;
 mod bans;
 pub(crate) mod budget;
 mod byte_count;
+pub(crate) mod causes;
 pub(crate) mod identity;
 pub(crate) mod lease_book;
 mod session;
@@ -100,10 +101,16 @@ impl Sessions {
         Err(SendFailed)
     }
 
-    /// Logs as a warning that the master ends a session.
+    /// Logs as a warning that the master ends a session, where its beginning was logged.
     pub(crate) fn log_disconnect(&self, worker: WorkerId, reason: &str) {
-        if let Some(Session { hello, address, .. }) = self.sessions.get(&worker) {
-            tracing::warn!("{worker} ({}, {address}) is disconnected: {reason}", hello.name);
+        match self.sessions.get(&worker) {
+            Some(Session { hello, address, is_logged: true, .. }) => {
+                tracing::warn!("{worker} ({}, {address}) is disconnected: {reason}", hello.name);
+            }
+            Some(Session { hello, address, .. }) => {
+                tracing::debug!("{worker} ({}, {address}) is disconnected: {reason}", hello.name);
+            }
+            None => {}
         }
     }
 

@@ -2,19 +2,25 @@
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rayfarm_protocol::session::{BodyLimit, Sender, Traffic};
 use rayfarm_protocol::{Hello, KeyHash, Reconnect, ToWorker};
 use tokio::task::JoinHandle;
 
+use super::causes::Causes;
 use super::identity::Identity;
 use super::lease_book::LeaseBook;
 use crate::assets::peer_endpoint::PeerEndpoint;
 use crate::assets::transfers::Transfers;
+use crate::bucket::Rate;
+use crate::line_budget::LineBudget;
 
 /// Time limit for sending the messages that are queued when a session ends, the disconnect message included.
 const DISCONNECT_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// Log lines about failures of one worker.
+const FAILURE_LINES: Rate = Rate { burst: 8.0, per_second: 0.2 };
 
 /// A connected worker.
 pub(crate) struct Session {
@@ -35,6 +41,12 @@ pub(crate) struct Session {
     pub(super) traffic: Arc<Traffic>,
     /// Limit of the pixels that it may send.
     pub(crate) pixels: BodyLimit,
+    /// What it may report.
+    pub(crate) causes: Causes,
+    /// Log lines about its failures.
+    pub(crate) failure_lines: LineBudget,
+    /// Whether its beginning was logged, and its end will be.
+    pub(crate) is_logged: bool,
     /// Numbers of bytes that had arrived at the last two pings, the earlier one first.
     received_at_pings: [u64; 2],
 }
@@ -49,6 +61,7 @@ impl Session {
         sender: Sender<ToWorker>,
         traffic: Arc<Traffic>,
         pixels: BodyLimit,
+        is_logged: bool,
     ) -> Self {
         Self {
             hello,
@@ -62,12 +75,16 @@ impl Session {
             sender,
             traffic,
             pixels,
+            causes: Causes::default(),
+            failure_lines: LineBudget::new(FAILURE_LINES, Instant::now()),
+            is_logged,
             received_at_pings: [0; 2],
         }
     }
 
-    /// Notes that a ping is sent now.
-    pub(crate) fn note_ping(&mut self) {
+    /// Notes that a ping of this number is sent now.
+    pub(crate) fn note_ping(&mut self, nonce: u64) {
+        self.causes.ping(nonce);
         let [_, last] = self.received_at_pings;
         self.received_at_pings = [last, self.traffic.received_bytes()];
     }
