@@ -30,7 +30,8 @@ impl Layout {
     /// nothing but the centres.
     pub(crate) fn new(centers: &[DVec3]) -> Self {
         let mut layout = Self { order: (0..centers.len() as u32).collect(), nodes: Vec::new() };
-        let mut waiting: Vec<Range<usize>> = vec![0..centers.len()];
+        let all = 0..centers.len();
+        let mut waiting = vec![all];
         // Nodes are numbered in the order in which they wait.
         let mut next = 0;
         while next < waiting.len() {
