@@ -21,9 +21,9 @@ use tokio_util::task::TaskTracker;
 use crate::bucket::Rate;
 use crate::driver::{AnswerError, Driver};
 use crate::line_budget::{LineBudget, more};
-use crate::sessions::Session;
 use crate::sessions::budget::{Budget, OverBudget};
 use crate::sessions::identity::Identity;
+use crate::sessions::{Link, Session};
 
 /// Asset requests of a worker that wait to be served.
 const MAX_ASSET_REQUESTS: usize = 4096;
@@ -165,7 +165,8 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
     let (limit, key) = (BodyLimit::closed(), stream.peer_key());
     let (sender, receiver, traffic) = session::spawn_limited::<_, ToWorker, ToMaster>(stream, limit.clone());
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
-    driver.join(worker, Session::new(hello, identity, address, key, sender.clone(), traffic, limit, is_logged));
+    let link = Link { address, key, sender: sender.clone(), traffic, pixels: limit };
+    driver.join(worker, Session::new(hello, identity, link, is_logged));
     let ended = tokio::select! {
         ended = receive(driver, worker, address, receiver, request) => ended,
         () = send_assets(driver, worker, &sender, requests) => Err(SessionError::Closed),

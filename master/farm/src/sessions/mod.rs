@@ -23,7 +23,7 @@ use identity::Identity;
 
 pub(crate) use bans::PastWorker;
 pub(crate) use byte_count::ByteCount;
-pub(crate) use session::Session;
+pub(crate) use session::{Link, Session};
 
 /// Workers whose failures an error message lists.
 const MAX_LISTED_FAILURES: usize = 4;

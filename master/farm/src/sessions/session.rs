@@ -22,6 +22,17 @@ const DISCONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Log lines about failures of one worker.
 const FAILURE_LINES: Rate = Rate { burst: 8.0, per_second: 0.2 };
 
+/// The connection of a session.
+pub(crate) struct Link {
+    pub(crate) address: SocketAddr,
+    /// Hash of the worker's public key, where the connection uses TLS. A local worker has one, too.
+    pub(crate) key: Option<KeyHash>,
+    pub(crate) sender: Sender<ToWorker>,
+    pub(crate) traffic: Arc<Traffic>,
+    /// Limit of the pixels that the worker may send.
+    pub(crate) pixels: BodyLimit,
+}
+
 /// A connected worker.
 pub(crate) struct Session {
     /// The worker's introduction. Its name is the one to display, never a ticket.
@@ -53,16 +64,8 @@ pub(crate) struct Session {
 
 impl Session {
     /// A session after its handshake.
-    pub(crate) fn new(
-        hello: Hello,
-        identity: Identity,
-        address: SocketAddr,
-        key: Option<KeyHash>,
-        sender: Sender<ToWorker>,
-        traffic: Arc<Traffic>,
-        pixels: BodyLimit,
-        is_logged: bool,
-    ) -> Self {
+    pub(crate) fn new(hello: Hello, identity: Identity, link: Link, is_logged: bool) -> Self {
+        let Link { address, key, sender, traffic, pixels } = link;
         Self {
             hello,
             identity,
