@@ -26,7 +26,11 @@ def main():
     arguments = parser.parse_args()
     mi, variant = _mitsuba(arguments.variant, arguments.threads)
     scene = neutral.load(arguments.stem)
-    loaded = mi.load_dict(description(mi, scene))
+    if variant.startswith("llvm"):
+        import metallic_roughness
+
+        metallic_roughness.register()
+    loaded = mi.load_dict(description(mi, scene, variant))
     integrator = mi.load_dict({"type": "path", "max_depth": scene.max_depth + 1})
     pixels = scene.width * scene.height
     per_pass = max(1, min(arguments.samples, PATHS_PER_PASS // pixels))
@@ -72,13 +76,13 @@ def _mitsuba(variant, threads):
     return mi, variant
 
 
-def description(mi, scene):
+def description(mi, scene, variant):
     """The dictionary that `mitsuba.load_dict` takes."""
     found = {"type": "scene", "sensor": _sensor(mi, scene)}
     sky = _sky(mi, scene.sky)
     if sky:
         found["sky"] = sky
-    materials = {name: _bsdf(material) for name, material in scene.materials.items()}
+    materials = {name: _bsdf(material, variant) for name, material in scene.materials.items()}
     for number, (name, triangles) in enumerate(scene.meshes.items()):
         found[f"mesh{number}"] = _mesh(mi, f"mesh{number}", triangles, materials[name], scene.materials[name])
     for number, ball in enumerate(scene.balls):
@@ -116,12 +120,16 @@ def _emitter(material):
     return {"emitter": {"type": "area", "radiance": _rgb(material.emission)}} if material.emits() else {}
 
 
-def _bsdf(material):
+def _bsdf(material, variant):
     if material.kind == "glass":
         return {"type": "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
     if material.kind == "mirror":
         inner = {"type": "conductor", "material": "none", "specular_reflectance": _rgb(material.color)}
+    elif material.kind == "rough" and variant.startswith("llvm"):
+        base = dict(zip(("red", "green", "blue"), material.color))
+        return {"type": "metallic-roughness", "metallic": material.metallic, "roughness": material.roughness, "ior": material.ior} | base
     elif material.kind == "rough":
+        # Another model: materials in Python are slow without LLVM.
         inner = {"type": "principled", "base_color": _rgb(material.color), "metallic": material.metallic,
                  "roughness": material.roughness, "eta": material.ior}
     else:

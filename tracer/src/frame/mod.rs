@@ -9,7 +9,9 @@
 //!   affine     the maps
 //!   instance   placed meshes
 //!   motion     objects that move while the shutter is open
+//!   placing    primitives in eye space
 //!   passage    how light passes items along shadow rays
+//!   sky        what rays that hit nothing see
 //!   rounding   error bounds of placed geometry
 //!   few        the primitives of scenes with few of them
 //!   sources    the lights that paths select from
@@ -22,7 +24,9 @@ mod few;
 mod instance;
 mod motion;
 mod passage;
+mod placing;
 mod rounding;
+mod sky;
 mod sources;
 mod volumes;
 
@@ -35,8 +39,7 @@ use crate::cancel::{IsCancelled, go_on, never};
 use crate::compile::{CompileError, CompiledScene, Item, Items, disk_reach, transformed_bounds};
 use crate::light::EyeLight;
 use crate::light::table::LightTable;
-use crate::rotation::sin_cos_degrees;
-use crate::scene::{Background, Camera, Filter, FrameView, Light, Scene, SceneFeatures, TextureMap};
+use crate::scene::{Background, Filter, FrameView, Light, Scene, SceneFeatures, TextureMap};
 use crate::shape::{EyeDisk, EyePlane, EyeSphere};
 use crate::simd::{self, Level};
 use crate::texture::Texture;
@@ -47,11 +50,11 @@ pub(crate) use camera::{CameraRays, FisheyeRay, FisheyeRays, ParallelRays, Pinho
 pub(crate) use few::{Few, FewSphere, FewTriangle};
 pub(crate) use instance::Instance;
 use instance::ToEye;
-use motion::Sweep;
 pub(crate) use motion::{Motions, MovingItem, Pose};
 use passage::Passage;
-use rounding::placement_rounding;
-pub(crate) use rounding::{F64_ERROR, corner_rounding, mesh_rounding};
+use placing::{coarsest, disks, planes, spheres, triangles, unit_of};
+pub(crate) use rounding::{F64_ERROR, corner_rounding};
+use sky::{seen_background, sky_rotation};
 pub(crate) use volumes::{EyeBoundary, EyeVolume};
 
 /// Padding of the boxes of the scene's tree, in eye units: rays are rounded to `f32` near them.
@@ -181,7 +184,7 @@ impl PreparedFrame {
             nodes: Vec::new(),
             passages: Vec::new(),
             has_translucent_items: false,
-            features: scene.features().at(&view.quality),
+            features: features_of(&scene, view),
             level: simd::best(),
             scene,
         };
@@ -322,19 +325,10 @@ impl PreparedFrame {
     }
 }
 
-/// World units per eye unit: the power of two next to the distance from the camera to the far end of all finite primitives.
-/// Scaling the world by a power of two scales the unit by the same factor.
-fn unit_of(scene: &CompiledScene, camera: &Camera, sweeps: &[Sweep]) -> f64 {
-    let swept = sweeps.iter().map(|sweep| sweep.bounds);
-    let reach = match scene.bounds().into_iter().chain(swept).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) {
-        Some((lo, hi)) => (lo - camera.position).abs().max((hi - camera.position).abs()).max_element(),
-        None => (camera.look_at - camera.position).length(),
-    };
-    if !(reach > 0.0 && reach.is_finite()) {
-        return 1.0;
-    }
-    let (_, exponent) = libm::frexp(reach);
-    libm::exp2(f64::from(exponent))
+/// The features that the frame of a view shows.
+fn features_of(scene: &CompiledScene, view: &FrameView) -> SceneFeatures {
+    let features = scene.features().at(&view.quality);
+    SceneFeatures { rough_textured: features.rough_textured && view.integrator.path().is_some(), ..features }
 }
 
 fn lights(scene: &CompiledScene, view: &FrameView, to_eye: &ToEye) -> Vec<EyeLight> {
@@ -350,63 +344,4 @@ fn lights(scene: &CompiledScene, view: &FrameView, to_eye: &ToEye) -> Vec<EyeLig
     };
     let place = |light: &Light| EyeLight::new(&cast(light), |world| to_eye.point(world), to_eye.unit);
     source.lights.iter().map(place).collect()
-}
-
-fn seen_background(scene: &Scene) -> Background {
-    if scene.background_visible { scene.background } else { Background::Color(Vec3::ZERO) }
-}
-
-fn sky_rotation(scene: &Scene) -> [f32; 2] {
-    let Background::Sky(sky) = scene.background else { return [0.0, 1.0] };
-    let (sin, cos) = sin_cos_degrees(sky.rotate);
-    [sin as f32, cos as f32]
-}
-
-fn spheres(scene: &Scene, to_eye: &ToEye) -> Vec<EyeSphere> {
-    let place = |sphere: &crate::scene::Sphere| EyeSphere {
-        center: to_eye.point(sphere.center),
-        radius: sphere.radius / to_eye.unit,
-    };
-    scene.spheres.iter().map(place).collect()
-}
-
-fn triangles(scene: &Scene, to_eye: &ToEye) -> Vec<EyeTriangle> {
-    let place = |triangle: &crate::scene::Triangle| {
-        let corners @ [a, b, c] = triangle.vertices.map(|vertex| to_eye.point(vertex));
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let cut = triangle.uvs.is_some() && scene.materials[triangle.material as usize].cutout.is_some();
-        let error = placement_rounding(&triangle.vertices, &corners, to_eye.unit);
-        EyeTriangle { corners, normal, error, cut }
-    };
-    scene.triangles.iter().map(place).collect()
-}
-
-fn planes(scene: &Scene, to_eye: &ToEye) -> Vec<EyePlane> {
-    scene.planes.iter().map(|plane| plane_through(plane.point, plane.normal, to_eye)).collect()
-}
-
-fn disks(scene: &Scene, to_eye: &ToEye) -> Vec<EyeDisk> {
-    let place = |disk: &crate::scene::Disk| EyeDisk {
-        center: to_eye.point(disk.center),
-        radius: disk.radius / to_eye.unit,
-        plane: plane_through(disk.center, disk.normal, to_eye),
-    };
-    scene.disks.iter().map(place).collect()
-}
-
-fn plane_through(point: DVec3, normal: DVec3, to_eye: &ToEye) -> EyePlane {
-    let (normal, placed) = (normal.normalize_or_zero(), to_eye.point(point));
-    let error = placement_rounding(&[point], &[placed], to_eye.unit);
-    EyePlane { normal, offset: normal.dot(placed), error }
-}
-
-fn coarsest<'a>(
-    instances: &[Instance],
-    triangles: &[EyeTriangle],
-    planes: impl Iterator<Item = &'a EyePlane>,
-) -> f64 {
-    let of_instances = instances.iter().map(|instance| mesh_rounding(&instance.linear) + instance.error);
-    let of_triangles = triangles.iter().map(|triangle| triangle.error);
-    let of_planes = planes.map(|plane| plane.error);
-    of_instances.chain(of_triangles).chain(of_planes).fold(0.0, f64::max)
 }

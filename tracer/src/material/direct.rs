@@ -22,11 +22,16 @@ use super::{MAX_EXPONENT, Material, MetallicRoughness};
 
 impl Material {
     /// A metallic-roughness material: its diffuse colour remains the base colour, and the other terms are those of
-    /// [`Material::shown_directly`].
+    /// [`Material::shown_directly`]. With a texture, c_t is the most that any of its texels transmits.
     #[must_use]
     pub fn with_metallic_roughness(self, model: MetallicRoughness) -> Self {
         let material = Self { metallic_roughness: Some(model), ..self };
-        Self { diffuse: self.diffuse, checker: self.checker, ..material.shown_directly() }
+        let shown = Self { diffuse: self.diffuse, checker: self.checker, ..material.shown_directly() };
+        if model.texture.is_some() {
+            // Where the texture has no metal.
+            return Self { transmit: self.diffuse * model.transmission, ..shown };
+        }
+        shown
     }
 
     /// The material as the direct integrator shows it: itself, unless it is metallic-roughness.

@@ -65,8 +65,8 @@ pub struct MetallicRoughness {
     pub transmission: f32,
     /// Factor of the reflectance of what is not metal, from 0 to 1.
     pub specular_factor: f32,
-    /// Texture whose green is a factor of the roughness and whose blue is one of the share of metal, an index into
-    /// [`crate::scene::Scene::textures`]. Valid only on geometry with texture coordinates.
+    /// Texture whose green is a factor of the roughness and whose blue is one of the share of metal, each its byte / 255, an index into
+    /// [`crate::scene::Scene::textures`]. Valid only on geometry with texture coordinates. Only the path integrator shows it.
     pub texture: Option<u32>,
 }
 
@@ -137,6 +137,11 @@ impl Material {
         let normals = self.normal_map.map(|map| map.texture);
         let rough = self.metallic_roughness.and_then(|model| model.texture);
         [self.texture, self.cutout, self.emission_texture, normals, rough].into_iter().flatten()
+    }
+
+    /// Whether a texture has its roughness and its share of metal.
+    pub fn has_rough_texture(&self) -> bool {
+        self.metallic_roughness.is_some_and(|model| model.texture.is_some())
     }
 
     /// Whether it needs texture coordinates: it has a texture, or a checker pattern that is laid in them.

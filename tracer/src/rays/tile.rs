@@ -96,6 +96,8 @@ pub(crate) struct TileRays {
     pub union: [f32; 4],
     /// Error bound of x and y.
     pub error: f32,
+    /// Whether all places are on a grid with step 1, at whole numbers plus a half: boxes and triangles between them can be dropped.
+    pub on_grid: bool,
 }
 
 impl TileRays {
@@ -124,7 +126,7 @@ impl TileRays {
     /// A tile without rays.
     pub(crate) fn empty() -> Self {
         let nowhere = [Lanes::ZERO; BLOCKS];
-        Self { x: nowhere, y: nowhere, bounds: [Lanes::ZERO; 4], union: [0.0; 4], error: 0.0 }
+        Self { x: nowhere, y: nowhere, bounds: [Lanes::ZERO; 4], union: [0.0; 4], error: 0.0, on_grid: true }
     }
 
     /// Computes the rectangles around the live rays (a bit a lane).

@@ -27,6 +27,13 @@ impl Oracle {
         if material.vertex_colors { diffuse * surface.vertex_color } else { diffuse }
     }
 
+    /// Factors of the roughness and of the share of metal.
+    pub(super) fn rough_factors(&self, surface: &SurfacePoint) -> [f64; 2] {
+        let texture = self.material(surface).metallic_roughness.and_then(|model| model.texture);
+        let shares = texture.and_then(|index| self.shares(self.scene.textures[index as usize], surface.uv));
+        shares.map_or([1.0; 2], |shares| [shares.y, shares.z])
+    }
+
     /// Light that the front of the surface emits.
     pub(super) fn emission(&self, surface: &SurfacePoint) -> DVec3 {
         let material = self.material(surface);

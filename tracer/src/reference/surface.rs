@@ -79,4 +79,11 @@ impl SurfacePoint {
     pub(super) fn clear_origin(&self) -> DVec3 {
         self.position + self.ng * (2.0 * self.coincidence)
     }
+
+    /// Origin of the refracted ray of a path. A ray that started before coincident surfaces has crossed one of them and meets the other
+    /// one here: behind it, the first is not crossed again. `near` is a distance that only such rays end within.
+    pub(super) fn refraction_origin(&self, near: f64) -> DVec3 {
+        let is_second = self.coincidence == 0.0 && self.way * self.ng.dot(self.direction).abs() <= near;
+        if is_second { self.position - self.ng * near } else { self.clear_origin() }
+    }
 }

@@ -1,4 +1,4 @@
-//! Filters of textures: texels around sixteen points, in linear light.
+//! Filters of textures: texels around sixteen points, as colours in linear light or as shares.
 
 use super::footprint::Footprint;
 use crate::scene::{Tiling, Wrap};
@@ -24,6 +24,20 @@ fn position<S: Simd>(simd: S, wrap: Wrap, coordinate: f32x16<S>, size: f32x16<S>
     share * size
 }
 
+/// The numbers of the bytes of a texel: a colour in linear light by [`srgb::decoded`], or [`SHARES`].
+pub(super) type Decoded = [f32; 256];
+
+/// The shares that the bytes of a texel without a colour are.
+pub(super) static SHARES: Decoded = {
+    let mut shares = [0.0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        shares[byte] = byte as f32 / 255.0;
+        byte += 1;
+    }
+    shares
+};
+
 /// The texel that contains each point.
 #[inline(always)]
 pub(super) fn nearest<S: Simd>(
@@ -32,11 +46,11 @@ pub(super) fn nearest<S: Simd>(
     wrap: Wrap,
     [u, v]: [f32x16<S>; 2],
     lanes: u32,
+    decoded: &Decoded,
 ) -> Vec3x16<S> {
     let [width, height] = [texture.width(), texture.height()];
     let x = position(simd, wrap, u, splat(simd, width as f32)).to_array();
     let y = position(simd, wrap, v, splat(simd, height as f32)).to_array();
-    let decoded = srgb::decoded();
     let mut color = [Lanes::ZERO; 3];
     for lane in each_bit(lanes) {
         // The conversion rounds down, and maps NaN to 0.
@@ -56,9 +70,10 @@ pub(super) fn bilinear<S: Simd>(
     wrap: Wrap,
     uv: [f32x16<S>; 2],
     lanes: u32,
+    decoded: &Decoded,
 ) -> Vec3x16<S> {
     let size = [splat(simd, texture.width() as f32), splat(simd, texture.height() as f32)];
-    around(simd, size, wrap, uv, lanes, |_, x, y| texture.texel(x, y))
+    around(simd, size, (wrap, uv), lanes, decoded, |_, x, y| texture.texel(x, y))
 }
 
 /// The four texels around each point in pictures of the given sizes, weighted by nearness; `texel` has the lane, the column and
@@ -67,14 +82,13 @@ pub(super) fn bilinear<S: Simd>(
 fn around<S: Simd>(
     simd: S,
     [width, height]: [f32x16<S>; 2],
-    wrap: Wrap,
-    [u, v]: [f32x16<S>; 2],
+    (wrap, [u, v]): (Wrap, [f32x16<S>; 2]),
     lanes: u32,
+    decoded: &Decoded,
     texel: impl Fn(usize, u32, u32) -> [u8; 3],
 ) -> Vec3x16<S> {
     let columns = Axis::wrapped(simd, wrap, position(simd, wrap, u, width), width);
     let rows = Axis::wrapped(simd, wrap, position(simd, wrap, v, height), height);
-    let decoded = srgb::decoded();
     mean(simd, &columns, &rows, lanes, |lane, x, y| texel(lane, x, y).map(|code| decoded[usize::from(code)]))
 }
 
@@ -134,5 +148,7 @@ fn of_levels<S: Simd>(
         size[1].0[lane] = height as f32;
     }
     let size = [size[0].load(simd), size[1].load(simd)];
-    around(simd, size, wrap, uv, lanes, |lane, x, y| texture.texel_of_level(levels[lane] as u32, x, y))
+    around(simd, size, (wrap, uv), lanes, srgb::decoded(), |lane, x, y| {
+        texture.texel_of_level(levels[lane] as u32, x, y)
+    })
 }

@@ -9,7 +9,7 @@
 //!   group          the lanes of a block that hit one item
 //!   terminator     origins of shadow rays on smooth surfaces
 //!   uv             texture coordinates
-//!   texel          factors of colours by textures, vertex colours and patterns
+//!   texel          factors of colours by textures, vertex colours and patterns, of roughness and metal by textures
 //!   filter         texels around a point
 //!   footprint      how much of a texture a sample shows
 //!   vertex_color   vertex colours
@@ -300,11 +300,12 @@ impl Surfaces {
         material: u32,
     ) {
         let frame = group.rays.frame();
-        if !frame.features.textured {
+        let features = &frame.features;
+        if !(features.textured || features.rough_textured) {
             return;
         }
         let material = &frame.scene().materials[material as usize];
-        if material.texture.is_some() || material.emission_texture.is_some() {
+        if material.texture.is_some() || material.emission_texture.is_some() || material.has_rough_texture() {
             let footprint = self.footprint(group, hits);
             self.texture_exactly(group.rays, (group.block, group.lanes), hits, footprint);
         }

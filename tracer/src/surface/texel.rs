@@ -1,22 +1,25 @@
-//! Factors of the diffuse colour and of the emission at surface points: by textures, vertex colours and patterns. They are found
-//! once a point for all lights.
+//! Factors of the diffuse colour, of the emission, and of roughness and metal at surface points: by textures, vertex colours and patterns.
+//! They are found once a point for all lights.
 
 use glam::Vec3;
 
 use super::Surfaces;
-use super::filter::{bilinear, nearest, trilinear};
+use super::filter::{SHARES, bilinear, nearest, trilinear};
 use super::uv::PointUvs;
 use crate::frame::PreparedFrame;
 use crate::rays::{BLOCKS, TileColors};
 use crate::scene::Filter;
 use crate::simd::vector::Vec3x16;
-use crate::simd::{Indices, LANES, Lanes, Simd, dispatch, mask_of, select, three};
+use crate::simd::{Indices, LANES, Lanes, Simd, dispatch, f32x16, mask_of, select, three};
+use crate::srgb;
 
-/// Factors of the diffuse colours and the emission of a tile; 1 without a texture.
+/// Factors of the diffuse colours, the emission, the roughness and the metal of a tile; 1 without a texture.
 pub(super) struct Texels {
     diffuse: TileColors,
     /// Only in scenes with emissive materials.
     emission: Option<Box<TileColors>>,
+    /// Green is the factor of the roughness, and blue that of the share of metal. Only in frames with textures of them.
+    shares: Option<Box<TileColors>>,
 }
 
 const WHITE: [Lanes; 3] = [Lanes([1.0; LANES]); 3];
@@ -25,9 +28,11 @@ impl Texels {
     /// Factors for a scene; `None` if it has neither textures nor vertex colours nor patterns.
     pub(super) fn for_scene(frame: &PreparedFrame) -> Option<Box<Self>> {
         let features = &frame.features;
-        (features.textured || features.vertex_colors || features.checkered).then(|| {
+        let colored = features.textured || features.vertex_colors || features.checkered;
+        (colored || features.rough_textured).then(|| {
             let emission = features.emissive.then(|| Box::new([WHITE; BLOCKS]));
-            Box::new(Self { diffuse: [WHITE; BLOCKS], emission })
+            let shares = features.rough_textured.then(|| Box::new([WHITE; BLOCKS]));
+            Box::new(Self { diffuse: [WHITE; BLOCKS], emission, shares })
         })
     }
 
@@ -36,6 +41,9 @@ impl Texels {
         self.diffuse[block] = WHITE;
         if let Some(emission) = &mut self.emission {
             emission[block] = WHITE;
+        }
+        if let Some(shares) = &mut self.shares {
+            shares[block] = WHITE;
         }
     }
 
@@ -75,6 +83,11 @@ impl Texels {
             }
             if let (Some(map), Some(emission)) = (material.emission_texture, &mut self.emission) {
                 look_up(simd, frame, map, uv, same, &mut emission[block]);
+            }
+            if let (Some(model), Some(shares)) = (&material.metallic_roughness, &mut self.shares)
+                && let Some(map) = model.texture
+            {
+                look_up_shares(frame, map, uv, same, &mut shares[block]);
             }
         }
     }
@@ -124,7 +137,7 @@ fn look_up<S: Simd>(
     let (texture, map) = &frame.textures()[map as usize];
     let (at, wrap) = (uv.laid(simd, &map.tiling), map.tiling.wrap);
     let color = match (frame.filter_of(map), uv.footprint()) {
-        (Filter::Nearest, _) => nearest(simd, texture, wrap, at, lanes),
+        (Filter::Nearest, _) => nearest(simd, texture, wrap, at, lanes, srgb::decoded()),
         (Filter::Trilinear, Some(footprint)) => {
             let mut stored = [Lanes::ZERO; 2];
             stored[0].store(at[0]);
@@ -132,10 +145,34 @@ fn look_up<S: Simd>(
             let color = trilinear(frame.level, (texture, &map.tiling), &stored, footprint, lanes);
             Vec3x16::load(simd, &color)
         }
-        (Filter::Bilinear | Filter::Trilinear, _) => bilinear(simd, texture, wrap, at, lanes),
+        (Filter::Bilinear | Filter::Trilinear, _) => {
+            bilinear(simd, texture, wrap, at, lanes, srgb::decoded())
+        }
     };
-    let (mask, before) = (mask_of(simd, lanes), Vec3x16::load(simd, colors));
-    Vec3x16(three!(i => select(mask, color.0[i], before.0[i]))).store(colors);
+    put(simd, lanes, color, colors);
+}
+
+/// Looks up one texture of shares for some lanes of a block. Smaller pictures are made of colours and are not used: the trilinear filter
+/// is the bilinear one. Dispatched again, and not inlined: the code of colours stays dense.
+#[inline(never)]
+fn look_up_shares(frame: &PreparedFrame, map: u32, uv: &PointUvs, lanes: u32, shares: &mut [Lanes; 3]) {
+    let (texture, map) = &frame.textures()[map as usize];
+    let wrap = map.tiling.wrap;
+    dispatch!(frame.level, simd => {
+        let at = uv.laid(simd, &map.tiling);
+        let found = match frame.filter_of(map) {
+            Filter::Nearest => nearest(simd, texture, wrap, at, lanes, &SHARES),
+            Filter::Bilinear | Filter::Trilinear => bilinear(simd, texture, wrap, at, lanes, &SHARES),
+        };
+        put(simd, lanes, found, shares);
+    });
+}
+
+/// Puts numbers into some lanes.
+#[inline(always)]
+fn put<S: Simd>(simd: S, lanes: u32, new: Vec3x16<S>, stored: &mut [Lanes; 3]) {
+    let (mask, before) = (mask_of(simd, lanes), Vec3x16::load(simd, stored));
+    Vec3x16(three!(i => select(mask, new.0[i], before.0[i]))).store(stored);
 }
 
 impl Surfaces {
@@ -155,5 +192,12 @@ impl Surfaces {
             None => emission,
             Some(texels) => emission.mul(Vec3x16::load(simd, &texels[block])),
         }
+    }
+    /// Factors of the roughness and of the share of metal in a block; `None` in frames without textures of them.
+    #[inline(always)]
+    pub(crate) fn rough_factors<S: Simd>(&self, simd: S, block: usize) -> Option<[f32x16<S>; 2]> {
+        let shares = self.texels.as_ref()?.shares.as_ref()?;
+        let [_, roughness, metal] = &shares[block];
+        Some([roughness.load(simd), metal.load(simd)])
     }
 }

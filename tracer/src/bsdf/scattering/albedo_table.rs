@@ -2,12 +2,12 @@
 //! computes the integrals again.
 
 /// Steps between the first and the last row, and between the first and the last column.
-pub(super) const STEPS: usize = 16;
+pub(crate) const STEPS: usize = 16;
 
 /// Scale s, and the terms a and b of the share that the lobe leaves.
 #[rustfmt::skip]
 #[expect(clippy::approx_constant, reason = "a number of the table is near the logarithm of 2 by chance")]
-pub(super) const TABLE: [[[f32; 3]; STEPS + 1]; STEPS + 1] = [
+pub(crate) const TABLE: [[[f32; 3]; STEPS + 1]; STEPS + 1] = [
     [
         [1.0, 0.0, 0.0], [1.0, 0.0194, 0.0], [1.0, 0.0757, 0.0], [1.0, 0.1638, 0.0], [1.0, 0.2758, 0.0],
         [1.0, 0.4018, 0.0], [1.0, 0.5313, 0.0], [1.0, 0.6543, 0.0], [1.0, 0.7627, 0.0], [1.0, 0.8507, 0.0],

@@ -23,7 +23,7 @@
 //! mirror               c_r R, with `fresnel` c_r Fx R; added to the diffuse part, whose colour stays
 //! glass                max(c_r, c_t) Fx R + c_t (1 - Fx) T; `thin`: T goes straight through, and Fx is that of a sheet
 //! metallic-roughness   m f1 F(base) + (1 - m) (1 - t) (k f1 F(d) + base c(v) c(l) / (pi C)) + (1 - m) t (p Fx + base (1 - Fx) T)
-//!                      with alpha = roughness^2, d = ((ior - 1) / (ior + 1))^2, k = specular_factor, c = 1 - k E the share that the
+//!                      with alpha = roughness^2 (both roughness and m times their texels), d = ((ior - 1) / (ior + 1))^2, k = specular_factor, c = 1 - k E the share that the
 //!                      dielectric leaves, and C its mean
 //! ```
 //!
@@ -41,6 +41,8 @@ mod recipe;
 mod smooth;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use albedo_table::{STEPS, TABLE};
 
 use crate::frame::PreparedFrame;
 use crate::simd::vector::Vec3x16;
@@ -157,6 +159,9 @@ fn gather_parts<S: Simd>(
                 let next = recipe_of(index);
                 any |= next.is_more_than_diffuse();
                 recipe.put(simd, mask_of(simd, same), &next);
+            }
+            if let Some(factors) = surfaces.rough_factors(simd, block) {
+                recipe.multiply(factors);
             }
             any.then(|| Box::new(Parts::new(simd, &recipe, *base, setting)))
         },

@@ -115,4 +115,10 @@ impl<S: Simd> Recipe<f32x16<S>> {
             |old, number| select(lanes, splat(simd, number), old),
         );
     }
+    /// Multiplies the roughness and the share of metal.
+    #[inline(always)]
+    pub(super) fn multiply(&mut self, [roughness, metal]: [f32x16<S>; 2]) {
+        self.alpha *= roughness * roughness;
+        self.metallic *= metal;
+    }
 }

@@ -74,6 +74,7 @@ pub(super) fn places<S: Simd>(
         rays.x[block].store(corner(|(column, _)| column) + across);
         rays.y[block].store(corner(|(_, row)| row) + along);
     }
+    rays.on_grid = false;
     rays.bound(simd, live);
 }
 

@@ -45,6 +45,25 @@ impl Group<'_> {
         }
     }
 
+    /// Where the refracted ray of a path starts: exactly on the surface, whose primitive it does not hit again, so that it hits bodies that
+    /// touch the surface. Where surfaces coincide it starts before both of them and crosses the other one next, and then starts behind both.
+    pub(super) fn refraction_origin(&self, block: usize, lane: usize) -> Option<DVec3> {
+        let (hits, surface) = (&self.hits[block], &self.surfaces.blocks[block]);
+        let ray = self.batch.ray(block, lane);
+        let met = self.moving.as_ref().map_or(ray, |moving| moving.ray_at_rest(block, lane));
+        let t = self.frame.t_of(&met, hits.primitive(lane)?, self.batch.starts_on(block, lane))?;
+        let ng = DVec3::from_array(three!(axis => f64::from(surface.ng[axis].0[lane])));
+        let apart = 4.0 * self.frame.coarsest;
+        let before = if hits.coincident >> lane & 1 == 1 {
+            apart
+        } else if t * ng.dot(ray.direction).abs() <= 2.0 * apart {
+            -apart
+        } else {
+            0.0
+        };
+        Some(ray.origin + ray.direction * t + ng * before)
+    }
+
     /// Multiplies the weights of paths by the share of light that is left after their way inside of a body.
     #[inline(never)]
     pub(super) fn absorb<S: Simd>(&self, simd: S, block: usize, hit: u32, incoming: &mut Incoming<S>) {
@@ -71,6 +90,7 @@ impl Group<'_> {
             incoming.weight = incoming.weight.mul(Vec3x16::load(simd, &left));
         }
     }
+
     /// Light from ahead of paths, or of their hits, times the share that is left after ways that end at no surface; `ways` in eye units.
     #[inline(never)]
     pub(super) fn absorbed_ahead<S: Simd>(

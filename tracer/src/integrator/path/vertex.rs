@@ -235,11 +235,6 @@ impl Group<'_> {
             weight = weight.scale(splat(simd, 1.0) / survival);
         }
         let side = self.surfaces.to_shadow_origins(simd, block, along);
-        let side = if through == 0 {
-            side
-        } else {
-            select(mask_of(simd, through), -self.surfaces.blocks[block].bias.load(simd), side)
-        };
         let points = Vec3x16::load(simd, &self.surfaces.blocks[block].point);
         let origins = points.add(setting.geometric.scale(side));
         let (origins, directions) = (arrays(origins), arrays(scattered.direction));
@@ -256,6 +251,7 @@ impl Group<'_> {
             };
             if through >> lane & 1 == 1 {
                 next.media = self.media_behind(block, lane);
+                next.ray.origin = self.refraction_origin(block, lane).unwrap_or(next.ray.origin);
             }
             self.next.push(next);
         }

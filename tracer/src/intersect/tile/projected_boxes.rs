@@ -113,16 +113,17 @@ impl ProjectedBoxes {
         boxes
     }
 
-    /// Bits of the boxes that may contain a ray of the tile, given the rectangle around all rays.
+    /// Bits of the boxes that may contain a ray of the tile.
     #[inline(always)]
-    pub(super) fn overlapping<S: Simd, I: NodeFilter<S>>(&self, simd: S, union: [f32; 4]) -> u32 {
+    pub(super) fn overlapping<S: Simd, I: NodeFilter<S>>(&self, simd: S, rays: &TileRays) -> u32 {
+        let union = rays.union;
         let [x_from, x_to] = [self.sides[0].load(simd), self.sides[1].load(simd)];
         let [y_from, y_to] = [self.sides[2].load(simd), self.sides[3].load(simd)];
         let mut overlap = x_from.simd_le(splat(simd, union[1]))
             & x_to.simd_ge(splat(simd, union[0]))
             & y_from.simd_le(splat(simd, union[3]))
             & y_to.simd_ge(splat(simd, union[2]));
-        if I::ON_GRID {
+        if I::ON_GRID && rays.on_grid {
             // Rays are at whole numbers plus a half.
             let half = splat(simd, 0.5);
             overlap &=

@@ -74,7 +74,7 @@ fn cover_leaf<S: Simd, Q: TileQuery<S>>(
     let crossing = simd.vectorize(
         #[inline(always)]
         || {
-            let crossing = if Q::ON_GRID {
+            let crossing = if Q::ON_GRID && rays.on_grid {
                 projected.project::<S, true>(simd, leaf, projection, rays, least_closeness)
             } else {
                 projected.project::<S, false>(simd, leaf, projection, rays, least_closeness)

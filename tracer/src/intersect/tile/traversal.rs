@@ -12,7 +12,7 @@ use crate::simd::{Indices, Lanes, Simd, SimdBase, bits, each_bit, prefetch, sele
 
 /// The boxes that matter to a query.
 pub(super) trait NodeFilter<S: Simd> {
-    /// Whether rays are on a grid with step 1, so that boxes and triangles between them can be dropped.
+    /// Whether rays may be on a grid with step 1 (see [`crate::rays::TileRays::on_grid`]), so that boxes and triangles between them can be dropped.
     const ON_GRID: bool;
 
     /// Whether rays are parallel and start at depth 0, so that boxes behind it can be dropped.
@@ -126,7 +126,7 @@ impl<'a> NodeTester<'a> {
             // A box that reaches behind the projection has no rectangle.
             wanted &= !crossing | in_frustum(simd, node, &Frustum::new(projection, rays.union));
         }
-        wanted &= crossing | boxes.overlapping::<S, F>(simd, rays.union);
+        wanted &= crossing | boxes.overlapping::<S, F>(simd, rays);
         if filter.is_from_plane() {
             wanted &= in_front(simd, node, &self.rows[2], projection.error[1]);
         }

@@ -7,10 +7,9 @@
 //! ```
 //!
 //! L_e at a hit has the weight of multiple importance sampling by the power heuristic (Veach 1997), and so has the light of one light that
-//! is selected at each vertex. Besides the scene, three things are shared with the integrator: the random numbers, the piecewise constant
-//! distribution of the light of a sky, and which of many lights are together in a tree. All directions, densities, values and weights are computed here.
-//!
-//! Surfaces are diffuse, mirrors, glass, sheets, emitters, and sums of these. Rough reflection is missing: such paths have no result.
+//! is selected at each vertex. Besides the scene, four things are shared with the integrator: the random numbers, the piecewise constant
+//! distribution of the light of a sky, which of many lights are together in a tree, and the table of the energy of rough reflection. All
+//! directions, densities, values and weights are computed here.
 //!
 //! ```text
 //!   numbers      random numbers of a sample
@@ -22,14 +21,22 @@
 //!   sky_light    directions to the sky, by its light
 //!   aim          directions to a source, and their densities
 //!   parts        how a surface scatters light
+//!   interface    the share of light that glass reflects
+//!   lobe         rough reflection, and what it leaves
+//!   facets       microfacets
+//!   energy       energy of rough reflection
 //!   arriving     light of lights that are aimed at
 //!   step         a path from vertex to vertex
 //! ```
 
 mod aim;
 mod arriving;
+mod energy;
+mod facets;
 mod hemisphere;
+mod interface;
 mod light_tree;
+mod lobe;
 mod numbers;
 mod parts;
 mod size;
@@ -67,20 +74,19 @@ impl PathOracle<'_> {
         Numbers::new(&self.settings, [x, y], number).time()
     }
 
-    /// Linear RGB of sample `number` of pixel (x, y), before it is bounded and rounded to the steps of [`crate::PixelSums`]. `None` if
-    /// the path meets a material with rough reflection.
-    pub fn radiance(&self, x: u32, y: u32, number: u32) -> Option<[f64; 3]> {
+    /// Linear RGB of sample `number` of pixel (x, y), before it is bounded and rounded to the steps of [`crate::PixelSums`].
+    pub fn radiance(&self, x: u32, y: u32, number: u32) -> [f64; 3] {
         let numbers = Numbers::new(&self.settings, [x, y], number);
         let CameraRay { ray, in_picture } = self.camera_ray([x, y], &numbers);
         if !in_picture {
-            return Some(self.oracle.background_of_camera(ray.direction).to_array());
+            return self.oracle.background_of_camera(ray.direction).to_array();
         }
         let mut sum = Sum::new(f64::from(self.settings.clamp_indirect));
         let mut path = Some(Path::begin(ray));
         for bounce in 0..=u32::from(self.oracle.view.quality.max_depth) {
             let Some(current) = path else { break };
-            path = self.advance(bounce, current, &numbers, &mut sum).ok()?;
+            path = self.advance(bounce, current, &numbers, &mut sum);
         }
-        Some(sum.total.to_array())
+        sum.total.to_array()
     }
 }

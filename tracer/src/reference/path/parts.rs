@@ -1,36 +1,52 @@
-//! How a surface scatters light: diffuse reflection, a mirror direction and a refracted direction.
+//! How a surface scatters light: diffuse and rough reflection, a mirrored direction, a refracted direction, refraction by microfacets.
 //!
-//! One part is selected at random in proportion to the light that it scatters. F is the exact Fresnel share:
+//! One part is selected at random in proportion to an estimate of the light that it scatters. F is the exact Fresnel share:
 //!
 //! ```text
-//! diffuse   c_d / pi
+//! diffuse   c_d / pi, below a lobe what that leaves
+//! lobe      see `lobe`
 //! mirror    c_r R, with `fresnel` c_r F R
 //! glass     max(c_r, c_t) F R + c_t (1 - F) T
+//! frosted   (1 - F) T at random microfacets
 //! ```
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::super::optics;
 use super::super::surface::SurfacePoint;
 use super::PathOracle;
 use super::hemisphere::{cosine_density, cosine_direction};
+use super::interface::Interface;
+use super::lobe::{Left, Lobe};
 use super::numbers::Numbers;
 use super::step::Path;
 use crate::sampler::Vertex;
-use crate::scene::{Material, Shading};
 
-/// Least cosine of the angle between the viewer and the normals of perfectly smooth parts: shading normals behind it are bent.
+/// Least cosine of the angle between the viewer and the normals of all parts but the diffuse one: shading normals behind it are bent.
 const LEAST_COSINE: f64 = 1e-3;
+
+/// Least share of frosted glass that counts as transmitted when a part is selected.
+const LEAST_FROSTED: f64 = 0.25;
 
 /// The parts of a surface at a point.
 pub(super) struct Parts {
-    /// Shading normal on the side of the viewer.
+    /// Shading normal on the side of the viewer, and the geometric one.
     normal: DVec3,
-    /// Colours of diffuse, mirrored and refracted light.
-    colors: [DVec3; 3],
+    geometric: DVec3,
+    /// Colour of diffuse light, and what a lobe above leaves of it.
+    diffuse: DVec3,
+    left: Option<Left>,
+    /// Rough reflection.
+    lobe: Option<Lobe>,
+    /// Colours of mirrored and refracted light, and of light that microfacets refract.
+    smooth: [DVec3; 2],
+    frosted: DVec3,
+    interface: Interface,
     /// Directions of mirrored and refracted light; there is no refracted one in total internal reflection.
     mirrored: DVec3,
     refracted: Option<DVec3>,
+    /// Of diffuse, lobe, mirrored, refracted and frosted light.
+    probabilities: [f64; 5],
 }
 
 /// A random direction.
@@ -44,90 +60,126 @@ pub(super) struct Scattered {
     pub through: bool,
 }
 
-/// A material that this oracle does not know.
-pub(super) struct Unknown;
-
 impl PathOracle<'_> {
     /// The parts of a surface that a path hits.
-    ///
-    /// # Errors
-    /// [`Unknown`] for rough reflection.
-    pub(super) fn parts(&self, path: &Path, surface: &SurfacePoint) -> Result<Parts, Unknown> {
-        let materials = &self.oracle.scene.materials;
-        let material = self.oracle.material(surface);
-        let highlight = material.is_specular() && self.oracle.view.quality.shading == Shading::Full;
-        if highlight || material.metallic_roughness.is_some() {
-            return Err(Unknown);
-        }
-        let sides = path.bodies.sides(materials, surface.material_index, surface.front);
-        let indices = if material.thin { [1.0, f64::from(material.ior)] } else { sides.indices };
+    pub(super) fn parts(&self, path: &Path, surface: &SurfacePoint) -> Parts {
+        let oracle = self.oracle;
+        let material = oracle.material(surface);
+        let sides = path.bodies.sides(&oracle.scene.materials, surface.material_index, surface.front);
+        let interface = Interface::of(material, sides.indices);
         let (direction, ns) = (surface.direction, seen_normal(surface));
-        let share = reflected_share(material, direction, ns, indices);
-        let (c_r, c_t) = (material.reflect.as_dvec3(), material.transmit.as_dvec3());
-        let transparent = material.is_transparent();
-        let colors = [
-            self.oracle.diffuse(surface),
-            if transparent { c_r.max(c_t) * share } else { c_r * share },
-            if transparent { c_t * (1.0 - share) } else { DVec3::ZERO },
-        ];
+        let share = interface.share(-direction.dot(ns));
+        let cosine = (-direction.dot(ns)).clamp(1e-6, 1.0);
+        let coat = self.coat(surface);
+        let base = oracle.diffuse(surface);
+        let (below, left) = match &coat {
+            Some(coat) => (base * coat.below * coat.left.at(cosine), Some(coat.left)),
+            None => (base, None),
+        };
+        let mut smooth = [DVec3::ZERO; 2];
+        let mut frosted = DVec3::ZERO;
+        let mut of_lobe = DVec3::ZERO;
+        let mut lobe = None;
+        if material.metallic_roughness.is_none() {
+            let (c_r, c_t) = (material.reflect.as_dvec3(), material.transmit.as_dvec3());
+            let transparent = material.is_transparent();
+            let factor = if transparent || material.fresnel { share } else { 1.0 };
+            smooth[0] = if transparent { c_r.max(c_t) } else { c_r } * factor;
+            smooth[1] = c_t * (1.0 - share);
+        }
+        if let Some(coat) = coat {
+            let tinted = base * coat.glass;
+            if coat.is_rough() {
+                of_lobe = coat.albedo(cosine, share);
+                frosted = tinted;
+                lobe = Some(Lobe::new(coat, ns, -direction));
+            } else {
+                smooth[0] += coat.mirrored(cosine, share);
+                smooth[1] += tinted * (1.0 - share);
+            }
+        }
+        let estimates = [below, of_lobe, smooth[0], smooth[1], frosted * (1.0 - share).max(LEAST_FROSTED)];
         let mirrored = optics::leaving(optics::mirrored(direction, ns), surface.ng).normalize();
         let bent = if material.thin { Some(direction) } else { optics::bent(direction, ns, sides.indices) };
         let refracted = bent.map(|bent| optics::leaving(bent, -surface.ng).normalize());
-        Ok(Parts { normal: surface.ns, colors, mirrored, refracted })
+        Parts {
+            normal: surface.ns,
+            geometric: surface.ng,
+            diffuse: left.map_or(below, |left| below / left.mean()),
+            left: left.map(|left| left.seen_from(ns)),
+            lobe,
+            smooth,
+            frosted,
+            interface,
+            mirrored,
+            refracted,
+            probabilities: probabilities(estimates),
+        }
     }
 }
 
 impl Parts {
-    /// f cos and the density over solid angle of a direction, without perfectly smooth parts.
+    /// f cos and the density over solid angle of a direction, without perfectly smooth parts and light behind microfacets.
     pub(super) fn eval(&self, direction: DVec3) -> (DVec3, f64) {
-        let density = cosine_density(self.normal, direction);
-        (self.colors[0] * density, self.probability(0) * density)
+        let cosine = cosine_density(self.normal, direction);
+        let left = self.left.map_or(DVec3::ONE, |left| left.towards(direction));
+        let (mut value, mut density) = (self.diffuse * cosine * left, self.probabilities[0] * cosine);
+        if let Some(lobe) = &self.lobe {
+            let (of_lobe, its_density) = lobe.eval(direction, &self.interface);
+            value += of_lobe;
+            density += self.probabilities[1] * its_density;
+        }
+        (value, density)
     }
 
     /// A random direction; `None` if the surface scatters no light.
     pub(super) fn scatter(&self, bounce: u32, numbers: &Numbers) -> Option<Scattered> {
-        let select = numbers.at_vertex(bounce, Vertex::Lobe).x;
-        let smooth = |direction: DVec3, part: usize, through: bool| Scattered {
+        let at = numbers.at_vertex(bounce, Vertex::Direction);
+        let part = self.select(numbers.at_vertex(bounce, Vertex::Lobe).x)?;
+        let alone = |direction: DVec3, color: DVec3, through: bool| Scattered {
             direction,
-            weight: self.colors[part] / self.probability(part),
+            weight: color / self.probabilities[part],
             density: f64::INFINITY,
             through,
         };
-        let ends = [self.probability(0), self.probability(0) + self.probability(1)];
-        if select < ends[0] {
-            let direction = cosine_direction(self.normal, numbers.at_vertex(bounce, Vertex::Direction));
-            let (value, density) = self.eval(direction);
-            (density > 0.0).then(|| Scattered { direction, weight: value / density, density, through: false })
-        } else if select < ends[1] {
-            Some(smooth(self.mirrored, 1, false))
-        } else if self.probability(2) > 0.0 {
-            Some(smooth(self.refracted?, 2, true))
-        } else {
-            None
+        match part {
+            0 => self.evaluated(cosine_direction(self.normal, at)),
+            1 => self.evaluated(self.lobe.as_ref()?.sample(at)),
+            2 => Some(alone(self.mirrored, self.smooth[0], false)),
+            3 => Some(alone(self.refracted?, self.smooth[1], true)),
+            _ => {
+                let (direction, share) = self.through_facet(at)?;
+                Some(alone(direction, self.frosted * share, true))
+            }
         }
     }
 
-    /// Probability of a part: its share of the scattered light, channels averaged.
-    fn probability(&self, part: usize) -> f64 {
-        let light = self.colors.map(|color| color.element_sum());
-        let total: f64 = light.iter().sum();
-        if total > 0.0 { light[part] / total } else { 0.0 }
+    /// The part that a number from 0 to 1 selects.
+    fn select(&self, number: f64) -> Option<usize> {
+        let mut end = 0.0;
+        self.probabilities.iter().position(|&probability| {
+            end += probability;
+            probability > 0.0 && number < end
+        })
+    }
+
+    fn evaluated(&self, direction: DVec3) -> Option<Scattered> {
+        let (value, density) = self.eval(direction);
+        (density > 0.0).then(|| Scattered { direction, weight: value / density, density, through: false })
+    }
+
+    /// A direction behind a microfacet, on the far side of the surface, and the share of light that it transmits.
+    fn through_facet(&self, at: DVec2) -> Option<(DVec3, f64)> {
+        let (direction, share) = self.lobe.as_ref()?.refract(at, &self.interface)?;
+        Some((optics::leaving(direction, -self.geometric), share))
     }
 }
 
-/// Factor of mirrored light.
-fn reflected_share(material: &Material, direction: DVec3, normal: DVec3, indices: [f64; 2]) -> f64 {
-    if !(material.is_transparent() || material.fresnel) {
-        return 1.0;
-    }
-    let share = if indices[0] == indices[1] {
-        // No interface: nothing is reflected, along the surface neither.
-        0.0
-    } else {
-        optics::reflected_share(direction, normal, indices)
-    };
-    // Light between the two surfaces of a sheet: a geometric series.
-    if material.thin { 2.0 * share / (1.0 + share) } else { share }
+/// Shares of estimates of light, channels averaged.
+fn probabilities(estimates: [DVec3; 5]) -> [f64; 5] {
+    let light = estimates.map(DVec3::element_sum);
+    let total: f64 = light.iter().sum();
+    light.map(|light| if total > 0.0 { light / total } else { 0.0 })
 }
 
 /// The shading normal, bent towards the viewer where the viewer would see its back.

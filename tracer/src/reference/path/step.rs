@@ -8,11 +8,14 @@ use super::super::surface::SurfacePoint;
 use super::PathOracle;
 use super::light_tree::Receiver;
 use super::numbers::Numbers;
-use super::parts::{Scattered, Unknown};
+use super::parts::Scattered;
 use crate::sampler::Vertex;
 
 /// Bounces after which roulette begins: from the fourth vertex on.
 const BOUNCES_BEFORE_ROULETTE: u32 = 3;
+
+/// Distance between surfaces that coincide, relative to the scene's size and the distance from the camera: more than rounding moves them.
+const NEAR: f64 = 1e-12;
 
 /// A path between two vertices.
 pub(super) struct Path {
@@ -69,34 +72,31 @@ pub(super) fn power_heuristic(density: f64, other: f64) -> f64 {
 
 impl PathOracle<'_> {
     /// Follows a path to its next vertex, and adds the light that arrives there. Returns the path that goes on.
-    ///
-    /// # Errors
-    /// [`Unknown`]: see [`PathOracle::parts`].
     pub(super) fn advance(
         &self,
         bounce: u32,
         mut path: Path,
         numbers: &Numbers,
         sum: &mut Sum,
-    ) -> Result<Option<Path>, Unknown> {
+    ) -> Option<Path> {
         let oracle = self.oracle;
         let materials = &oracle.scene.materials;
         let Some(surface) = oracle.surface(path.ray, path.starts_on) else {
             sum.add(bounce, self.seen_background(bounce, &path));
-            return Ok(None);
+            return None;
         };
         path.weight *= path.bodies.remaining(materials, (surface.material_index, surface.front), surface.way);
         sum.add(bounce, self.emitted(bounce, &path, &surface));
         if oracle.material(&surface).unlit {
             sum.add(bounce, path.weight * oracle.diffuse(&surface));
-            return Ok(None);
+            return None;
         }
         if bounce == u32::from(oracle.view.quality.max_depth) {
-            return Ok(None);
+            return None;
         }
-        let parts = self.parts(&path, &surface)?;
+        let parts = self.parts(&path, &surface);
         self.add_arriving(bounce, &path, (&surface, &parts), numbers, sum);
-        Ok(parts.scatter(bounce, numbers).and_then(|next| self.go_on(bounce, path, &surface, next, numbers)))
+        parts.scatter(bounce, numbers).and_then(|next| self.go_on(bounce, path, &surface, next, numbers))
     }
 
     /// The background along a path that hits nothing.
@@ -153,7 +153,9 @@ impl PathOracle<'_> {
         } else {
             path.bodies
         };
-        let ray = Ray { origin: surface.clear_origin(), direction, ..path.ray };
+        let near = NEAR * (self.oracle.size + surface.position.length());
+        let origin = if through { surface.refraction_origin(near) } else { surface.clear_origin() };
+        let ray = Ray { origin, direction, ..path.ray };
         let from = Receiver { position: surface.position, normal: surface.ng };
         Some(Path { ray, starts_on: Some(surface.primitive), weight, density, bodies, from })
     }

@@ -43,6 +43,8 @@ pub struct SceneFeatures {
     pub normal_mapped: bool,
     /// A material is metallic-roughness.
     pub metallic_roughness: bool,
+    /// A metallic-roughness material has a texture of both shares, which only the path integrator shows.
+    pub rough_textured: bool,
     /// A volume scatters light.
     pub volumes: bool,
     /// An object moves while the shutter is open.
@@ -75,6 +77,7 @@ impl SceneFeatures {
             checkered: any(|material| material.checker.is_some()),
             normal_mapped: any(|material| material.normal_map.is_some()),
             metallic_roughness: any(|material| material.metallic_roughness.is_some()),
+            rough_textured: any(Material::has_rough_texture),
             volumes: scene.volumes.iter().any(|volume| volume.density > 0.0),
             motion: scene.motions.iter().any(|motion| motion.moves(scene)),
         }
@@ -240,6 +243,7 @@ mod tests {
             checkered: true,
             normal_mapped: true,
             metallic_roughness: true,
+            rough_textured: true,
             volumes: true,
             motion: true,
         };

@@ -13,12 +13,12 @@ use super::instances::{MaterialsText, Models, named};
 use super::limits::LoadLimits;
 use super::textures::Textures;
 use crate::mesh::CompiledMesh;
-use crate::scene::NormalMap;
 use crate::scene::data::{Background, Camera, Lens, Scene, Volume, VolumeBoundary};
 use crate::scene::import::{LoadOptions, MAX_SCENE_BYTES, SceneError, bytes};
 use crate::scene::toml::{
     self, Aim, BoundaryText, CameraText, Fault, SceneText, TextureText, TexturesText, VolumeText,
 };
+use crate::scene::{MetallicRoughness, NormalMap};
 
 /// Loads a scene file and everything that it names.
 pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
@@ -188,8 +188,9 @@ fn load_textures(
             let texture = list(&map.texture)?.index;
             material.normal_map = Some(NormalMap { texture, strength: map.strength });
         }
-        if let (Some(model), Some(text)) = (&mut material.metallic_roughness, &text.metallic_roughness) {
-            model.texture = Some(list(text)?.index);
+        if let (Some(model), Some(text)) = (material.metallic_roughness, &text.metallic_roughness) {
+            let texture = Some(list(text)?.index);
+            *material = material.with_metallic_roughness(MetallicRoughness { texture, ..model });
         }
     }
     Ok(())

@@ -11,6 +11,7 @@ mod knobs;
 mod light;
 mod material;
 mod objects;
+mod section;
 mod shutter;
 mod table;
 mod value;
@@ -28,8 +29,9 @@ use toml::de::{DeTable, DeValue};
 use fault::{FirstFault, Read};
 use groups::{Objects, with_name};
 use material::Materials;
+use section::{list, section};
 use shutter::Shutter;
-use table::{Table, tables_of};
+use table::Table;
 use value::Value;
 
 use crate::material::Material;
@@ -194,7 +196,7 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
         section(top, "background", "[background]", background::BACKGROUND_KEYS, background, first);
     let light = |table: Table<'_>| light::light(table, integrator, reading);
     let lights = list(top, "light", "[[light]]", (light::LIGHT_KEYS, MAX_LIGHTS), light, first);
-    let mut materials = read_materials(top, reading, first);
+    let mut materials = read_materials(top, integrator, reading, first);
     let plane = |table: Table<'_>| objects::plane(table, &mut materials, reading);
     let planes = list(top, "plane", "[[plane]]", (objects::PLANE_KEYS, MAX_PLANES), plane, first);
     if *integrator == Integrator::Direct {
@@ -262,52 +264,13 @@ fn read_objects(
     objects
 }
 
-/// Reads an optional table; the outer `None` means a fault.
-fn section<'t, T>(
-    top: Table<'t>,
-    key: &'static str,
-    name: &'t str,
-    known: &[&str],
-    read: impl FnOnce(Table<'t>) -> Read<T>,
-    first: &mut FirstFault,
-) -> Option<Option<T>> {
-    first.keep(top.read(key, |value| read(Table::open(name, value.value, known)?)))
-}
-
-/// Reads each table of a list of at most `most` tables; tables with a fault are left out of the result.
-fn list<'t, T>(
-    top: Table<'t>,
-    key: &'static str,
-    name: &'t str,
-    (known, most): (&[&str], usize),
-    mut read: impl FnMut(Table<'t>) -> Read<T>,
-    first: &mut FirstFault,
-) -> Vec<T> {
-    let tables =
-        first.keep(tables_of(top.get(key)).and_then(|tables| within(tables, name, most))).unwrap_or_default();
-    tables
-        .into_iter()
-        .filter_map(|value| first.keep(Table::open(name, value, known).and_then(&mut read)))
-        .collect()
-}
-
-/// Refuses a list that is too long, before any entry is built.
-fn within<'t>(
-    tables: Vec<&'t Spanned<DeValue<'t>>>,
-    name: &str,
-    most: usize,
-) -> Read<Vec<&'t Spanned<DeValue<'t>>>> {
-    match tables.get(most) {
-        Some(first_beyond) => {
-            let count = tables.len();
-            Err(Fault::at_value(first_beyond, format!("{count} times {name}, at most {most} are allowed")))
-        }
-        None => Ok(tables),
-    }
-}
-
 /// Reads all materials. All names are collected first, so that a fault in one material hides none in its users.
-fn read_materials(top: Table<'_>, reading: &mut Reading, first: &mut FirstFault) -> Materials {
+fn read_materials(
+    top: Table<'_>,
+    integrator: &Integrator,
+    reading: &mut Reading,
+    first: &mut FirstFault,
+) -> Materials {
     let Some(value) = top.get("material") else { return Materials::default() };
     let Some(entries) = first.keep(material_tables(value)) else { return Materials::default() };
     let mut materials = Materials::named(entries.iter().map(|(name, _)| name.to_string()).collect());
@@ -315,7 +278,7 @@ fn read_materials(top: Table<'_>, reading: &mut Reading, first: &mut FirstFault)
     for (index, (name, value)) in entries.into_iter().enumerate() {
         let name = format!("[material.{}]", fault::shortened(name));
         let read = Table::open(&name, value, material::MATERIAL_KEYS)
-            .and_then(|table| material::material(table, reading));
+            .and_then(|table| material::material(table, integrator, reading));
         if let Some(mut text) = first.keep(read) {
             patterns.extend(text.checker.take().map(|pattern| (index, pattern)));
             materials.define(index, text);

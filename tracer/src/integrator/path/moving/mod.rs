@@ -13,7 +13,7 @@ use super::group::Group;
 use crate::frame::{Motions, Pose, PreparedFrame};
 use crate::intersect::TimedRay;
 use crate::light::EyeLight;
-use crate::rays::{BATCH, BLOCKS, HitBlock, RayBatch, RaySource};
+use crate::rays::{BATCH, BLOCKS, HitBlock, Ray, RayBatch, RaySource};
 use crate::sampler::{Dimension, pair_of};
 use crate::scene::Sampler;
 use crate::simd::{LANES, Lanes, Simd, each_bit};
@@ -61,6 +61,11 @@ impl<'a> MovingHits<'a> {
             starts_on: batch.starts_on(block, lane),
             time: self.times[block][lane],
         }
+    }
+
+    /// A ray of the current batch as the object that it hits meets it at rest; t is the same.
+    pub(super) fn ray_at_rest(&self, block: usize, lane: usize) -> Ray {
+        self.at_rest.ray(block, lane)
     }
 
     /// Replaces the hits of rays that hit an object that moves before.
@@ -134,7 +139,7 @@ impl Group<'_> {
         let moving = self.moving.as_ref()?;
         let pose = moving.pose_of(&self.hits[block], block, lane)?;
         let outwards = self.frame.front_normal(self.hits[block].slot(lane), pose.point_to_rest(point));
-        Some(outwards.dot(moving.at_rest.ray(block, lane).direction) < 0.0)
+        Some(outwards.dot(moving.ray_at_rest(block, lane).direction) < 0.0)
     }
 
     /// Bits of some of the current shadow rays that hit an object that moves. With `of_light`, those do not count that let all light pass.

@@ -2,6 +2,7 @@
 
 mod many_lamps;
 mod skies;
+mod small;
 
 use std::sync::Arc;
 

@@ -97,7 +97,8 @@ impl LightTree {
         Some(Self { nodes, trails })
     }
 
-    /// Selects a source for each of some points, by a number in [0, 1) each. Points that no source can reach select none.
+    /// Selects a source for each of some points, by a number in [0, 1) each. Points that no source can reach select none, and so do
+    /// numbers that lead to a node none of whose sources can reach the point: its bounds are wider than theirs.
     #[inline(never)]
     pub(super) fn select<S: Simd>(
         &self,
@@ -129,7 +130,7 @@ impl LightTree {
         )
     }
 
-    /// The source that a point selects by a number in [0, 1), and its probability.
+    /// The source that a point selects by a number in [0, 1), and its probability; `None` as of [`LightTree::select`].
     #[inline(always)]
     fn select_one<S: Simd>(
         &self,

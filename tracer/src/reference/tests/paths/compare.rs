@@ -55,11 +55,11 @@ pub(super) fn compare(furnished: &Furnished, view: &FrameView, numbers: Range<u3
             let (x, y) = (place % view.width, place / view.width);
             let found = PixelSums::from_bytes(pixel).rgb.map(|sum| sum as f64 * STEP);
             let expected = if scene.motions.is_empty() {
-                paths.radiance(x, y, number).unwrap()
+                paths.radiance(x, y, number)
             } else {
                 let time = paths.time(x, y, number);
                 let oracle = Oracle::at_time(scene, meshes, textures, view, time);
-                oracle.paths().unwrap().radiance(x, y, number).unwrap()
+                oracle.paths().unwrap().radiance(x, y, number)
             };
             let expected = PixelSums::steps(expected.map(|value| value as f32));
             let expected = expected.map(|steps| f64::from(steps) * STEP);

@@ -4,17 +4,21 @@
 //! paths go elsewhere. There are few of them, and they change no mean.
 //!
 //! ```text
-//!   scenes    small scenes with every kind of light
-//!   compare   samples of both
+//!   scenes     small scenes with every kind of light
+//!   rough      rough surfaces
+//!   touching   bodies of glass that touch
+//!   compare    samples of both
 //! ```
 
 mod compare;
+mod rough;
 mod scenes;
+mod touching;
 
 use compare::{compare, path_view};
 use scenes::Furnished;
 
-use crate::scene::{CameraKind, Lens, PathSettings, Sampler};
+use crate::scene::{CameraKind, Filter, Lens, PathSettings, Sampler};
 
 /// Largest share of samples that rounding may send elsewhere.
 const FEW: f64 = 0.002;
@@ -79,6 +83,29 @@ fn single_paths_through_glass_and_mirrors_are_those_of_the_oracle() {
     for seed in [0, 10] {
         assert_same(&scenes::room_of_mirrors(), seeded(seed), 10, |_| {});
     }
+}
+
+#[test]
+fn single_paths_through_bodies_that_touch_are_those_of_the_oracle() {
+    for seed in [0, 16] {
+        assert_same(&touching::touching_glass(), seeded(seed), 12, |_| {});
+    }
+}
+
+#[test]
+fn single_paths_among_rough_surfaces_are_those_of_the_oracle() {
+    for seed in [0, 17] {
+        assert_same(&rough::rough_room(), seeded(seed), 10, |_| {});
+    }
+}
+
+#[test]
+fn single_paths_among_textures_of_roughness_are_those_of_the_oracle() {
+    for seed in [0, 18] {
+        assert_same(&rough::rough_textures(), seeded(seed), 8, |_| {});
+    }
+    let filter = Some(Filter::Nearest);
+    assert_same(&rough::rough_textures(), seeded(19), 5, |view| view.quality.filter = filter);
 }
 
 #[test]

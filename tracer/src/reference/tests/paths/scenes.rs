@@ -25,7 +25,7 @@ impl Furnished {
     }
 }
 
-fn diffuse(color: Vec3) -> Material {
+pub(super) fn diffuse(color: Vec3) -> Material {
     Material { diffuse: color, specular: Vec3::ZERO, ..Material::NEUTRAL }
 }
 
@@ -33,11 +33,11 @@ fn lamp(emission: Vec3) -> Material {
     Material { emission, ..diffuse(Vec3::ZERO) }
 }
 
-fn glass(absorption: Vec3) -> Material {
+pub(super) fn glass(absorption: Vec3) -> Material {
     Material { transmit: Vec3::ONE, absorption, ..diffuse(Vec3::ZERO) }
 }
 
-fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
+pub(super) fn ball(center: DVec3, radius: f64, material: u32) -> Sphere {
     Sphere { center, radius, material, inside_out: false, uv_rotate: DVec3::ZERO }
 }
 
@@ -46,7 +46,7 @@ fn light(kind: LightKind, color: Vec3) -> Light {
 }
 
 /// Two triangles; their front is the side from which a, b, c, d are in counter-clockwise order.
-fn quad([a, b, c, d]: [DVec3; 4], material: u32) -> [Triangle; 2] {
+pub(super) fn quad([a, b, c, d]: [DVec3; 4], material: u32) -> [Triangle; 2] {
     [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, uvs: None, material })
 }
 
@@ -57,7 +57,7 @@ fn level(height: f64, half: f64) -> [DVec3; 4] {
 
 /// A corner of a room with lamps: triangles, a ball that emits, a light with a radius, a point light. Materials 0 to 4; no surface is in
 /// the centre.
-fn room() -> Scene {
+pub(super) fn room() -> Scene {
     let mut triangles = Vec::new();
     triangles.extend(quad(level(-1.0, 2.0), 0));
     let wall = [[-2., -1.], [2., -1.], [2., 2.], [-2., 2.]].map(|[x, y]| DVec3::new(x, y, -2.0));

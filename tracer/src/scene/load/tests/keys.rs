@@ -157,14 +157,13 @@ fn glass_of_a_model_reaches_the_scene_through_its_compiled_form() {
 #[test]
 fn lenses_and_metallic_roughness_reach_the_scene() {
     let scene = "aperture = 0.5\nfocus_distance = 3\n[render]\nintegrator = \"path\"\nsamples = 10\nexposure = 1\n\
-                 [material.gold]\ndiffuse = [1, 0.75, 0.25]\nroughness = 0.75\n\
+                 [material.gold]\ndiffuse = [1, 0.75, 0.25]\nroughness = 0.75\ntransmission = 0.5\n\
                  metallic_roughness_texture = { texture = \"rough.png\" }\n\
                  [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"gold\"\n";
     let folder = folder(scene);
     picture(&folder, "rough.png", 2, 2);
     let LoadedScene { scene, textures, warnings, .. } = folder.load("s.toml");
-    assert_eq!((textures.len(), warnings.len()), (1, 1));
-    assert!(warnings[0].ends_with("`metallic_roughness_texture` in [material.gold] has no effect yet"));
+    assert_eq!((textures.len(), warnings), (1, Vec::new()));
     assert_eq!((scene.lens.aperture, scene.lens.focus_distance), (0.5, Some(3.0)));
     let view = FrameView::of(&scene);
     assert!(view.integrator.path().is_some() && view.validate().is_ok());
@@ -173,5 +172,7 @@ fn lenses_and_metallic_roughness_reach_the_scene() {
     let model = gold.metallic_roughness.unwrap();
     assert_eq!((model.metallic, model.roughness, model.texture), (1.0, 0.75, Some(0)));
     assert_eq!(gold.diffuse, Vec3::new(1.0, 0.75, 0.25), "the base colour");
-    assert_eq!(gold.shown_directly().diffuse, Vec3::ZERO);
+    assert_eq!(gold.transmit, Vec3::new(0.5, 0.375, 0.125), "where the texture has no metal");
+    let direct = gold.shown_directly();
+    assert_eq!((direct.diffuse, direct.transmit), (Vec3::ZERO, Vec3::ZERO));
 }

@@ -52,7 +52,5 @@ pub(super) fn applied(
     } else if material.thin {
         reading.idle(table, "absorption", "on a thin material, which has no inside");
     }
-    // Neither integrator looks it up.
-    reading.idle(table, TEXTURE_KEY, "yet");
     material.with_metallic_roughness(model)
 }

@@ -8,11 +8,12 @@ mod texture;
 
 use glam::Vec3;
 
-use super::Reading;
 use super::fault::Read;
 use super::table::Table;
 use super::value::Value;
+use super::{Reading, knobs};
 use crate::material::{MAX_EXPONENT, Material};
+use crate::scene::data::Integrator;
 use crate::scene::validate::MAX_LIGHT;
 
 pub(in crate::scene) use texture::{TextureText, TexturesText};
@@ -51,8 +52,12 @@ pub(super) struct MaterialText {
     pub(super) checker: Option<CheckerText>,
 }
 
-/// Reads a material.
-pub(super) fn material(table: Table<'_>, reading: &mut Reading) -> Read<MaterialText> {
+/// Reads a material of a scene that is rendered by `integrator`.
+pub(super) fn material(
+    table: Table<'_>,
+    integrator: &Integrator,
+    reading: &mut Reading,
+) -> Read<MaterialText> {
     let exponent = |value: Value<'_>| {
         value.number("from 0 to 1e6", |n| (0.0..=f64::from(MAX_EXPONENT)).contains(&n)).map(|n| n as f32)
     };
@@ -85,6 +90,9 @@ pub(super) fn material(table: Table<'_>, reading: &mut Reading) -> Read<Material
         checker: checker.as_ref().map(|text| text.pattern),
         ..Material::NEUTRAL
     };
+    if *integrator == Integrator::Direct {
+        reading.idle(table, metallic::TEXTURE_KEY, knobs::with(integrator));
+    }
     let material = bounce::bounces(table, material)?;
     let material = match metallic::model(table)? {
         Some(model) => metallic::applied(table, material, model, reading),

@@ -207,6 +207,9 @@ fn keys_without_effect_on_metallic_roughness_are_warned_about() {
     assert_eq!(of("roughness = 0.5\nior = 1.25"), [""; 0]);
     assert_eq!(of("transmission = 1\nabsorption = 0.5\nior = 1.25"), [""; 0]);
     assert_eq!(of("transmission = 1\nthin = true"), [""; 0]);
-    let textured = "[material.a]\nmetallic_roughness_texture = { texture = \"a.png\" }\n";
-    assert_eq!(warnings(textured), ["2:30 `metallic_roughness_texture` in [material.a] has no effect yet"]);
+    let key = "metallic_roughness_texture";
+    let textured = format!("[material.a]\n{key} = {{ texture = \"a.png\" }}\n");
+    let expected = format!("2:30 `{key}` in [material.a] has no effect with the direct integrator");
+    assert_eq!(warnings(&textured), [expected]);
+    assert_eq!(warnings(&format!("{PATH}{textured}")), [""; 0]);
 }

@@ -1,5 +1,8 @@
 //! Physics of all materials: furnace, reciprocity, and directions that follow their density.
 
+mod directions;
+mod furnace;
+
 use glam::{DVec3, Vec3};
 
 use super::parts::Parts;
@@ -55,12 +58,14 @@ fn back(vector: DVec3) -> DVec3 {
 #[derive(Clone, Copy)]
 struct Seen {
     material: Material,
+    /// Factors of the roughness and of the share of metal by a texture.
+    factors: [f32; 2],
     viewer: DVec3,
     eta: f32,
 }
 
 fn seen(material: Material, cosine: f64, eta: f32) -> Seen {
-    Seen { material, viewer: turned(at(cosine, 0.7)), eta }
+    Seen { material, factors: [1.0; 2], viewer: turned(at(cosine, 0.7)), eta }
 }
 
 #[inline(always)]
@@ -80,7 +85,9 @@ impl Seen {
         };
         let recipe = Recipe::of(&self.material, true);
         let diffuse = Vec3x16::splat(simd, self.material.diffuse.to_array());
-        let numbers = Recipe::splat(simd, &recipe);
+        let mut numbers = Recipe::splat(simd, &recipe);
+        let [roughness, metal] = self.factors;
+        numbers.multiply([splat(simd, roughness), splat(simd, metal)]);
         let parts =
             recipe.is_more_than_diffuse().then(|| Box::new(Parts::new(simd, &numbers, diffuse, &setting)));
         Scattering { normals: geometric, diffuse, parts }
@@ -156,92 +163,6 @@ fn albedo(seen: &Seen, blocks: usize) -> f64 {
     samples(seen, blocks).map(weight).sum::<f64>() / (blocks * LANES) as f64
 }
 
-const ROUGHNESSES: [f32; 8] = [0.0, 0.04, 0.1, 0.2, 0.33, 0.5, 0.7, 1.0];
-const COSINES: [f64; 5] = [0.07, 0.2, 0.45, 0.8, 1.0];
-
-#[test]
-fn white_models_pass_the_furnace() {
-    for roughness in ROUGHNESSES {
-        for cosine in COSINES {
-            for (metallic, transmission) in [(1.0, 0.0), (0.0, 0.0), (0.4, 0.0)] {
-                let material = metallic_roughness(metallic, roughness, transmission);
-                let found = albedo(&seen(material, cosine, 1.0), 1024);
-                let at = format!("metal {metallic}, roughness {roughness}, cosine {cosine}");
-                // Next to the horizon of smooth metals the table is coarse.
-                let most = if cosine < 0.1 && roughness < 0.2 { 0.016 } else { 0.01 };
-                assert!((found - 1.0).abs() < most, "{at}: {found}");
-            }
-        }
-    }
-    for eta in [1.0 / 1.5, 1.5] {
-        for cosine in COSINES {
-            assert!((albedo(&seen(glass(), cosine, eta), 64) - 1.0).abs() < 1e-3);
-            let sheet = Material { thin: true, ..glass() };
-            assert!((albedo(&seen(sheet, cosine, 1.0), 64) - 1.0).abs() < 1e-3);
-        }
-    }
-}
-
-#[test]
-fn white_rough_glass_passes_the_furnace_from_either_side() {
-    for roughness in ROUGHNESSES {
-        for (eta, cosine) in [1.0 / 1.5, 1.5].into_iter().flat_map(|eta| COSINES.map(|c| (eta, c))) {
-            let material = metallic_roughness(0.0, roughness, 1.0);
-            let found = albedo(&seen(material, cosine, eta), 4096);
-            assert!((found - 1.0).abs() < 0.02, "roughness {roughness}, eta {eta}, cosine {cosine}: {found}");
-        }
-        let sheet = Material { thin: true, ..metallic_roughness(0.0, roughness, 1.0) };
-        let found = albedo(&seen(sheet, 0.6, 1.0), 4096);
-        assert!((found - 1.0).abs() < 0.02, "sheet of roughness {roughness}: {found}");
-    }
-}
-
-#[test]
-fn blinn_phong_adds_no_energy_where_the_colours_do_not() {
-    for exponent in [0.0, 3.0, 50.0, 1e4, 1e6] {
-        for cosine in COSINES {
-            let of = |diffuse, specular| {
-                albedo(&seen(blinn_phong(diffuse, specular, exponent), cosine, 1.0), 1024)
-            };
-            for specular in [0.04, 0.3, 0.7, 1.0] {
-                let full = of(1.0 - specular, specular);
-                assert!((full - 1.0).abs() < 0.016, "{exponent} {specular} {cosine}: {full}");
-                assert!(specular == 1.0 || of(0.5 * (1.0 - specular), specular) < full);
-            }
-            // Seen from above, a faint highlight leaves the diffuse colour as it is.
-            if cosine == 1.0 && exponent >= 50.0 {
-                assert!((of(0.6, 0.02) - 0.62).abs() < 0.01);
-            }
-        }
-    }
-}
-
-#[test]
-fn mirrors_and_glass_have_their_shares() {
-    let mirror = Material { reflect: Vec3::splat(0.9), ..BLACK };
-    assert!((albedo(&seen(mirror, 0.5, 1.0), 16) - 0.9).abs() < 1e-5);
-    for (cosine, eta) in [(0.2, 1.0 / 1.5), (0.9, 1.5), (0.5, 1.5)] {
-        let seen = seen(Material { transmit: Vec3::splat(0.5), ..BLACK }, cosine, eta);
-        let share = crate::bsdf::fresnel(cosine, f64::from(eta));
-        for found in samples(&seen, 16).filter(|sample| sample.alive) {
-            assert!(found.density.is_infinite());
-            let expected = if found.refracted {
-                crate::bsdf::refracted(-seen.viewer, normal(), f64::from(eta)).unwrap()
-            } else {
-                crate::bsdf::reflected(-seen.viewer, normal())
-            };
-            assert!((found.direction - expected).length() < 2e-6);
-        }
-        let through: f64 = samples(&seen, 64).filter(|s| s.refracted).map(|s| f64::from(s.weight[0])).sum();
-        let through = through / (64 * LANES) as f64;
-        assert!((through - 0.5 * (1.0 - share)).abs() < 2e-3, "{through} at {cosine}");
-    }
-    // Varnish: the exact share of the mirrored light, and the diffuse colour.
-    let varnish = Material { reflect: Vec3::ONE, fresnel: true, ..white(0.5) };
-    let expected = 0.5 + crate::bsdf::fresnel(0.3, 1.0 / 1.5);
-    assert!((albedo(&seen(varnish, 0.3, 1.0 / 1.5), 64) - expected).abs() < 2e-3);
-}
-
 /// Materials without perfectly smooth parts.
 fn rough() -> Vec<Material> {
     let plastic = Material { diffuse: Vec3::new(0.2, 0.9, 0.1), ..metallic_roughness(0.3, 0.4, 0.0) };
@@ -264,8 +185,9 @@ fn reflection_is_reciprocal() {
     for material in rough() {
         for (from, to, turn) in [(0.2, 0.9, 2.0), (0.5, 0.6, 3.0), (0.05, 0.4, 3.6), (1.0, 0.3, 0.0)] {
             let (v, l) = (turned(at(from, 0.0)), turned(at(to, turn)));
-            let there = eval(&Seen { material, viewer: v, eta: 1.0 }, l)[0] / to;
-            let back = eval(&Seen { material, viewer: l, eta: 1.0 }, v)[0] / from;
+            let seen = seen(material, 1.0, 1.0);
+            let there = eval(&Seen { viewer: v, ..seen }, l)[0] / to;
+            let back = eval(&Seen { viewer: l, ..seen }, v)[0] / from;
             assert!((there - back).abs() <= 1e-3 * there.max(1e-3), "{material:?}: {there} and {back}");
         }
     }
@@ -280,78 +202,6 @@ fn weights_are_values_over_densities() {
             let [weight, found] = [f64::from(sample.weight[0]), f64::from(sample.density)];
             assert!((density / found - 1.0).abs() < 1e-3, "{density} and {found} of {material:?}");
             assert!((value / density - weight).abs() < 1e-3 * weight.max(1e-3));
-        }
-    }
-}
-
-/// Number of bins of the cosine, and of the angle around.
-const BINS: [usize; 2] = [24, 24];
-
-/// Expected numbers of samples in bins of equal solid angle above the surface, of `count` in all.
-fn expected(seen: &Seen, count: usize) -> Vec<f64> {
-    const FINE: usize = 12;
-    let mut bins = vec![0.0; BINS[0] * BINS[1]];
-    let (rows, columns) = (BINS[0] * FINE, BINS[1] * FINE);
-    for row in 0..rows {
-        for column in 0..columns {
-            let cosine = (row as f64 + 0.5) / rows as f64;
-            let turn = (column as f64 + 0.5) / columns as f64 * std::f64::consts::TAU;
-            let [_, density] = eval(seen, turned(at(cosine, turn)));
-            let solid_angle = std::f64::consts::TAU / (rows * columns) as f64;
-            bins[row / FINE * BINS[1] + column / FINE] += density * solid_angle * count as f64;
-        }
-    }
-    bins
-}
-
-/// Pseudo-random numbers in [0, 1): splitmix64.
-fn random(state: &mut u64) -> f32 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
-}
-
-/// Chi-square of the directions of independent samples. The bound is that of p = 1e-4 by Wilson and Hilferty's approximation.
-#[test]
-fn directions_follow_their_density() {
-    for material in rough() {
-        for cosine in [0.95, 0.35] {
-            let seen = seen(material, cosine, 1.0);
-            let (blocks, mut state) = (4096, 7);
-            let mut found = vec![0_u32; BINS[0] * BINS[1]];
-            for _ in 0..blocks {
-                let numbers = three!(_i => std::array::from_fn(|_| random(&mut state)));
-                for sample in sample(best(), &seen, &numbers).iter().filter(|sample| sample.alive) {
-                    let local = back(sample.direction);
-                    if local.z > 0.0 {
-                        let row = (local.z * BINS[0] as f64) as usize;
-                        let turn = libm::atan2(local.y, local.x) / std::f64::consts::TAU;
-                        let column = ((turn - turn.floor()) * BINS[1] as f64) as usize;
-                        let (row, column) = (row.min(BINS[0] - 1), column.min(BINS[1] - 1));
-                        found[row * BINS[1] + column] += 1;
-                    }
-                }
-            }
-            let (mut sum, mut bins) = (0.0, 0.0_f64);
-            let (mut rare, mut rare_found) = (0.0, 0.0);
-            for (found, expected) in found.iter().zip(expected(&seen, blocks * LANES)) {
-                if expected < 10.0_f64 {
-                    rare += expected;
-                    rare_found += f64::from(*found);
-                    continue;
-                }
-                let difference = f64::from(*found) - expected;
-                sum += difference * difference / expected;
-                bins += 1.0;
-            }
-            if rare >= 10.0 {
-                sum += (rare_found - rare) * (rare_found - rare) / rare;
-                bins += 1.0;
-            }
-            let spread = 2.0 / (9.0 * bins);
-            let bound = bins * f64::powi(1.0 - spread + 3.72 * spread.sqrt(), 3);
-            assert!(bins > 20.0 && sum < bound, "{sum} over {bins} bins at {cosine}: {material:?}");
         }
     }
 }
