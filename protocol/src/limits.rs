@@ -39,7 +39,7 @@ pub const MAX_ASSET_BYTES: u64 = 2 << 30;
 /// Ethernet.
 pub const MAX_CHUNK_BYTES: usize = 256 << 10;
 
-/// Most peers to which a worker sends assets at a time. More connections wait.
+/// Most peers to which a worker sends assets at a time. More of them wait, after their requests have been checked.
 pub const MAX_PEER_CLIENTS: usize = 8;
 
 /// Time for which a worker keeps a complete asset for its peers after the last request for it.
@@ -54,8 +54,17 @@ pub const PEER_CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 /// Interval of the keepalives that a worker sends to a peer while it waits for bytes of an asset itself.
 pub const PEER_KEEPALIVE_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Most consecutive keepalives without a chunk between them.
-pub const MAX_PEER_KEEPALIVES: u32 = 240;
+/// Most consecutive keepalives without a chunk of that asset between them.
+pub const MAX_PEER_KEEPALIVES: u32 = 120;
+
+/// Time without a chunk of any asset after which a transfer between workers has stalled, next to the master.
+pub const PEER_STALL_LIMIT: Duration = Duration::from_secs(3);
+
+/// Time that is added to [`PEER_STALL_LIMIT`] for each worker between the master and a worker.
+pub const PEER_STALL_PER_HOP: Duration = Duration::from_millis(500);
+
+/// Most workers between the master and a worker that count.
+pub const MAX_PEER_HOPS: u64 = 24;
 
 /// Longest silence of a peer in the middle of a transfer.
 pub const PEER_TIMEOUT: Duration = Duration::from_secs(3);

@@ -95,7 +95,7 @@ async fn begin_transfer(address: SocketAddr, id: AssetId) -> TcpStream {
         loop {
             match within_limit(receive_reply(&mut stream, id)).await.unwrap() {
                 PeerReply::Begin { .. } => return stream,
-                PeerReply::Waiting => {}
+                PeerReply::Waiting { .. } => {}
                 PeerReply::Unknown => break,
                 other => panic!("{other:?}"),
             }
@@ -111,7 +111,7 @@ async fn receive_bytes(stream: &mut TcpStream, id: AssetId, received: &mut Vec<u
                 assert_eq!(offset, received.len() as u64);
                 received.extend_from_slice(&bytes);
             }
-            PeerReply::Waiting => {}
+            PeerReply::Waiting { .. } => {}
             other => panic!("{other:?}"),
         }
     }
@@ -152,7 +152,7 @@ async fn a_request_before_the_first_byte_waits_for_it() {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let request = PeerRequest { id, token: Token::new(&KEY, id, None, 0), offset: 0 };
     send_request(&mut stream, &request).await.unwrap();
-    assert_eq!(within_limit(receive_reply(&mut stream, id)).await.unwrap(), PeerReply::Waiting);
+    assert_eq!(within_limit(receive_reply(&mut stream, id)).await.unwrap(), PeerReply::Waiting { hops: 1 });
     let (mut second, ..) = start_client(&body, &mesh, address, &KEY).await;
     first.send_asset(id, 0).await;
     for master in [&mut first, &mut second] {
