@@ -158,6 +158,12 @@ impl Farm {
         self.driver.record_timeline(sink);
     }
 
+    /// The hash of the scene's body.
+    #[cfg(test)]
+    pub(crate) fn scene_id(&self) -> rayfarm_protocol::AssetId {
+        self.driver.assets.scene()
+    }
+
     /// Sets a function that is called at the start of each decoding of pixels.
     #[cfg(test)]
     pub(crate) fn on_decode(&self, hook: impl Fn() + Send + Sync + 'static) {
