@@ -87,6 +87,9 @@ pub const INBOX_QUEUE: usize = 256;
 /// Most body bytes in the queue of received messages. While there are more, the session does not read.
 pub const INBOX_BYTES: usize = 2 * (MAX_PIXELS_BYTES + MAX_CONTROL_BYTES);
 
+/// Most bytes of pixels that all sessions of a master receive at a time, the queues of received messages included (256 MiB).
+pub const MAX_RECEIVING_BYTES: usize = 256 << 20;
+
 /// Time limit from the first byte of the preamble to the end of the handshake.
 pub const HANDSHAKE_DEADLINE: Duration = Duration::from_secs(5);
 
@@ -104,4 +107,10 @@ const MIN_BYTES_PER_SECOND: u64 = 256 << 10;
 /// between two envelopes is unlimited.
 pub const fn envelope_deadline(body_bytes: usize) -> Duration {
     Duration::from_millis(10_000 + body_bytes as u64 * 1000 / MIN_BYTES_PER_SECOND)
+}
+
+/// Time limit for a body with pixels of `body_bytes` while other sessions wait for its share of [`MAX_RECEIVING_BYTES`]: 2 s, and
+/// 1 s for each 8 MiB.
+pub const fn contended_deadline(body_bytes: usize) -> Duration {
+    Duration::from_millis(2000 + (body_bytes as u64 * 1000 >> 23))
 }

@@ -160,7 +160,7 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
         tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}{more}");
     }
     let is_logged = left_out.is_some();
-    let (limit, key) = (BodyLimit::closed(), stream.peer_key());
+    let (limit, key) = (BodyLimit::closed(driver.receiving.clone()), stream.peer_key());
     let (sender, receiver, traffic) = session::spawn_limited::<_, ToWorker, ToMaster>(stream, limit.clone());
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
     let link = Link { address, key, sender: sender.clone(), traffic, pixels: limit };

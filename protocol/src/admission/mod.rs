@@ -2,7 +2,7 @@
 //!
 //! An unauthenticated peer must not keep others out. So a new connection is always looked at, the number of pending ones is
 //! bounded for each host and in all, and a connection that has sent nothing gives way to a new one. Connections of this
-//! machine have places of their own, and so have hosts that are known to be honest.
+//! machine have places of their own, and so have hosts that are known.
 
 mod host;
 

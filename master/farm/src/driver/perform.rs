@@ -45,9 +45,9 @@ impl Driver {
             Action::Grant { worker, lease } => {
                 let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
-                    session.pixels.allow(bytes);
                     session.causes.allow_failure();
-                    session.leases.grant(lease);
+                    session.leases.grant(lease, bytes);
+                    session.bound_pixels();
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
             }
@@ -76,9 +76,9 @@ impl Driver {
             Action::Verify { worker, lease } => {
                 let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
-                    session.pixels.allow(bytes);
                     session.causes.allow_failure();
-                    session.leases.verify(lease);
+                    session.leases.verify(lease, bytes);
+                    session.bound_pixels();
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
             }
