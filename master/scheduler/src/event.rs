@@ -49,6 +49,8 @@ pub enum Event {
         threads: u32,
         /// The machine that it runs on.
         host: HostId,
+        /// Whether the shell vouches for it: the master has started it, or it has proved a token with a key of its own.
+        trusted: bool,
     },
     /// A session has ended, for whatever reason.
     WorkerLeft {

@@ -10,6 +10,9 @@
 //! rows on the master, and the master bans every worker whose result does not match. A vote among workers would
 //! be cheaper and could be wrong: two machines with the same fault agree. Verifications that are drawn for the master,
 //! or for which no other worker is ready, are arbitrated one at a time, by a random priority.
+//!
+//! Segments of untrusted workers are sampled by default, see [`trust`](super::trust), and rendered again by trusted
+//! workers. Without a share to verify there is no arbiter, and the trusted worker's rendering decides.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
@@ -73,12 +76,20 @@ pub(super) struct PendingVerification {
     pub(super) lease: Lease,
     load: Load,
     /// The worker that rendered the rows first.
-    pub(super) first: WorkerId,
-    /// The machine of that worker.
-    pub(super) first_host: HostId,
+    pub(super) first: Renderer,
     /// Order in the master's queue, lowest first.
     priority: u64,
     pub(super) stage: Stage,
+}
+
+/// A worker that has rendered a segment, and may have left since.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Renderer {
+    pub(super) worker: WorkerId,
+    /// Its machine.
+    pub(super) host: HostId,
+    /// Whether it is trusted.
+    pub(super) trusted: bool,
 }
 
 /// Stage of a pending verification.
@@ -121,9 +132,9 @@ pub(super) struct VerificationQueue {
 }
 
 impl VerificationQueue {
-    /// Draws whether a segment is verified.
-    fn samples(&mut self) -> bool {
-        self.rng.chance(self.counts.percent) && self.pending.len() < MAX_PENDING
+    /// Draws whether a segment is verified, with this probability.
+    fn samples(&mut self, percent: u8) -> bool {
+        self.rng.chance(percent) && self.pending.len() < MAX_PENDING
     }
 
     /// Verifications that wait for the master.
@@ -162,23 +173,26 @@ impl Scheduler {
         Verification { open: self.verifications.pending.len() as u64, ..self.verifications.counts }
     }
 
-    /// Samples row ranges of which `first` has delivered the first valid pixels.
-    pub(super) fn sample_for_verification(&mut self, first: WorkerId, lease: &Lease, fresh: Vec<Range<u32>>) {
-        let Some(first_host) = self.workers.get(&first).map(|worker| worker.host) else { return };
+    /// Samples row ranges of which a worker has delivered the first valid pixels.
+    pub(super) fn sample_for_verification(&mut self, id: WorkerId, lease: &Lease, fresh: Vec<Range<u32>>) {
+        let Some(worker) = self.workers.get(&id) else { return };
+        let first = Renderer { worker: id, host: worker.host, trusted: worker.trusted };
+        let percent = self.standings.percent(worker).max(self.verifications.counts.percent);
         for rows in fresh {
-            if !self.verifications.samples() {
+            if !self.verifications.samples(percent) {
                 continue;
             }
-            let stage = Stage::Waiting(self.draw_second_renderer(first, first_host, None));
+            let Some(second) = self.draw_second_renderer(first, None) else { continue };
+            let stage = Stage::Waiting(second);
             let priority = self.verifications.rng.next();
             let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
             let load = Load::of(&frame.forecast, rows.clone());
             let (first_row, row_count) = (rows.start, rows.end - rows.start);
             let lease = Lease { segment: frame.next_number(), attempt: 0, first_row, row_count, ..*lease };
-            let pending = PendingVerification { lease, load, first, first_host, priority, stage };
+            let pending = PendingVerification { lease, load, first, priority, stage };
             self.verifications.pending.insert((lease.frame, lease.segment), pending);
             self.verifications.counts.picked += 1;
-            self.actions.push_back(Action::RecordDigest { worker: first, lease });
+            self.actions.push_back(Action::RecordDigest { worker: first.worker, lease });
         }
     }
 
@@ -254,7 +268,18 @@ impl Scheduler {
         let pending = self.verifications.pending.get_mut(&key);
         let open = pending.filter(|pending| !matches!(pending.stage, Stage::Arbitrating(_)));
         let Some(pending) = open.filter(|_| was_held) else { return };
+        let (first, first_lease) = (pending.first, pending.lease);
+        let decides = !first.trusted && self.workers.get(&id).is_some_and(|worker| worker.trusted);
         match finding {
+            // There is no arbiter without a share to verify: the trusted worker decides.
+            Finding::Different if self.verifications.counts.percent == 0 => {
+                self.verifications.counts.verified += 1;
+                self.verifications.counts.mismatches += 1;
+                self.close_verification(key);
+                if decides {
+                    self.ban(first, first_lease, "a trusted worker's rendering");
+                }
+            }
             Finding::Different => {
                 let before = std::mem::replace(&mut pending.stage, Stage::Arbitrating(Some(id)));
                 let (frame, segment) = key;
@@ -263,6 +288,9 @@ impl Scheduler {
             }
             Finding::Same | Finding::Unknown => {
                 self.verifications.counts.verified += u64::from(finding == Finding::Same);
+                if decides && finding == Finding::Same {
+                    self.standings.confirm(first.host);
+                }
                 self.close_verification(key);
             }
         }
@@ -270,22 +298,32 @@ impl Scheduler {
 
     /// Applies the arbiter's result: bans every worker whose rendering differs from the master's.
     pub(super) fn segment_arbitrated(&mut self, frame: FrameId, segment: u32, result: ArbiterResult) {
-        let pending = self.verifications.pending.get(&(frame, segment));
-        let Some(&PendingVerification { lease, first, stage: Stage::Arbitrating(second), .. }) = pending
-        else {
+        let Some(pending) = self.verifications.pending.get(&(frame, segment)) else { return };
+        let (lease, first, Stage::Arbitrating(second)) = (pending.lease, pending.first, pending.stage) else {
             return;
         };
         self.verifications.counts.verified += u64::from(result.rendered);
         self.verifications.counts.mismatches += u64::from(second.is_some() || result.first_differs);
         self.close_verification((frame, segment));
-        let wrong = [Some(first).filter(|_| result.first_differs), second.filter(|_| result.second_differs)];
-        for worker in wrong.into_iter().flatten() {
-            self.ban(worker, lease);
+        let second = second.filter(|_| result.second_differs).map(|worker| self.renderer(worker));
+        if result.rendered && !result.first_differs && !first.trusted {
+            self.standings.confirm(first.host);
+        }
+        for renderer in [Some(first).filter(|_| result.first_differs), second].into_iter().flatten() {
+            self.ban(renderer, lease, "the master's rendering");
         }
     }
 
-    /// Bans a worker once, for rows that differ from the master's rendering.
-    fn ban(&mut self, worker: WorkerId, lease: Lease) {
+    /// A worker as a renderer. One that has left counts as trusted: its host is not known any more.
+    fn renderer(&self, worker: WorkerId) -> Renderer {
+        let known = self.workers.get(&worker).map(|known| (known.host, known.trusted));
+        let (host, trusted) = known.unwrap_or((HostId(0), true));
+        Renderer { worker, host, trusted }
+    }
+
+    /// Bans a worker once, for rows that differ from the rendering that decides.
+    fn ban(&mut self, renderer: Renderer, lease: Lease, decides: &str) {
+        let Renderer { worker, host, trusted } = renderer;
         if self.verifications.banned.contains(&worker) {
             return;
         }
@@ -295,10 +333,13 @@ impl Scheduler {
         }
         let Lease { frame, first_row, row_count, .. } = lease;
         let reason = format!(
-            "it sent wrong pixels: rows {first_row}+{row_count} of frame {frame} differ from the master's rendering"
+            "it sent wrong pixels: rows {first_row}+{row_count} of frame {frame} differ from {decides}"
         );
+        if !trusted {
+            self.standings.ban(host);
+        }
         self.remove_worker(worker);
-        self.drop_verifications(|pending| pending.first == worker);
+        self.drop_verifications(|pending| pending.first.worker == worker);
         self.actions.push_back(Action::Ban { worker, reason });
     }
 
@@ -344,7 +385,7 @@ impl Scheduler {
     }
 
     /// Ends a verification and its lease.
-    fn close_verification(&mut self, key: (FrameId, u32)) {
+    pub(super) fn close_verification(&mut self, key: (FrameId, u32)) {
         let Some(pending) = self.verifications.pending.remove(&key) else { return };
         let (frame, segment) = key;
         self.actions.push_back(Action::DropDigest { frame, segment });

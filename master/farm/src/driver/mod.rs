@@ -133,7 +133,8 @@ impl Driver {
         arbiter_queue: mpsc::UnboundedSender<Dispute>,
     ) -> Result<Self, FarmError> {
         let key = match options.verify_percent {
-            0 => [0; 32],
+            // Segments of untrusted workers are sampled all the same.
+            0 => random().unwrap_or_default(),
             _ => random().map_err(FarmError::Random)?,
         };
         let scheduler = Scheduler::new(options.policy, MAX_PIXELS_BYTES as u64)

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
 use rayfarm_protocol::{FrameId, Lease, ToWorker};
-use rayfarm_scheduler::{Action, Cost, Event, Reconnect, WorkerId};
+use rayfarm_scheduler::{Action, Cost, Event, Reconnect, Verification, WorkerId};
 
 use super::{Driver, Inner, Request};
 use crate::error::FarmError;
@@ -89,7 +89,8 @@ impl Driver {
     }
 
     fn frame_done(&self, inner: &mut Inner, frame: FrameId, cost: Cost, elapsed: Duration) {
-        if inner.scheduler.verification().percent > 0 {
+        let Verification { percent, picked, .. } = inner.scheduler.verification();
+        if percent > 0 || picked > 0 {
             inner.delivered.add(frame, self.framebuffers.workers(frame));
         }
         let picture = inner.requests.remove(&frame).zip(self.framebuffers.finish(frame));

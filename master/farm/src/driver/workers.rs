@@ -45,9 +45,11 @@ impl Driver {
     pub(crate) fn join(&self, worker: WorkerId, session: Session) {
         let Hello { name, threads, .. } = session.hello.clone();
         let host = host(session.address.ip());
+        // A remote worker has a key only where it has proved the token.
+        let trusted = session.identity.is_local() || session.key.is_some();
         let mut inner = self.lock();
         inner.sessions.insert(worker, session);
-        self.drive(&mut inner, Event::WorkerJoined { worker, threads, host });
+        self.drive(&mut inner, Event::WorkerJoined { worker, threads, host, trusted });
         inner.accounts.name(worker, &name);
     }
 
@@ -162,7 +164,7 @@ impl Driver {
             rows: progress.map_or(0, |progress| progress.rows),
             wrong_frames: inner.delivered.wrong().count(),
             verification: Some(inner.scheduler.verification())
-                .filter(|verification| verification.percent > 0),
+                .filter(|verification| verification.percent > 0 || verification.picked > 0),
         }
     }
 
