@@ -103,6 +103,9 @@ pub const CLOSE_GRACE: Duration = Duration::from_millis(500);
 /// Lowest data rate that is accepted in the middle of an envelope.
 const MIN_BYTES_PER_SECOND: u64 = 256 << 10;
 
+/// Lowest data rate that is accepted in the middle of pixels while other sessions wait for room.
+const MIN_CONTENDED_BYTES_PER_SECOND: u64 = 8 << 20;
+
 /// Time limit for an envelope with a body of `body_bytes`, in either direction, from its first byte to its last. The time
 /// between two envelopes is unlimited.
 pub const fn envelope_deadline(body_bytes: usize) -> Duration {
@@ -112,5 +115,5 @@ pub const fn envelope_deadline(body_bytes: usize) -> Duration {
 /// Time limit for a body with pixels of `body_bytes` while other sessions wait for its share of [`MAX_RECEIVING_BYTES`]: 2 s, and
 /// 1 s for each 8 MiB.
 pub const fn contended_deadline(body_bytes: usize) -> Duration {
-    Duration::from_millis(2000 + (body_bytes as u64 * 1000 >> 23))
+    Duration::from_millis(2000 + body_bytes as u64 * 1000 / MIN_CONTENDED_BYTES_PER_SECOND)
 }

@@ -64,7 +64,8 @@ pub(super) struct Fleet {
 
 impl Fleet {
     pub(super) fn of(scheduler: &Scheduler, now: Duration) -> Self {
-        let ready = scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(now));
+        let is_able = |worker: &Worker| worker.is_ready(now) && !scheduler.standings.is_excluded(worker);
+        let ready = scheduler.workers.iter().filter(|(_, worker)| is_able(worker));
         let of = |(&id, worker): (&WorkerId, &Worker)| {
             let on_probation = scheduler.standings.is_on_probation(worker);
             Candidate { on_probation, ..Candidate::of(id, worker, now) }

@@ -8,6 +8,7 @@ use super::adaptive::Fleet;
 use super::forecast::Load;
 use super::frame::Frame;
 use super::limits::FIXED_POLICY_WINDOW;
+use super::worker::Worker;
 use super::{Action, Lease, Scheduler, SegmentPolicy, WorkerId};
 
 impl Scheduler {
@@ -26,7 +27,8 @@ impl Scheduler {
     /// The rule of the fixed policies `static` and `smart`: [`FIXED_POLICY_WINDOW`] leases per worker, in order; every
     /// worker gets a first lease before any gets a second one. At the end, idle workers get backup tasks.
     fn assign_fixed(&mut self, now: Duration) {
-        let ids = self.ids_of(|worker| worker.is_ready(now) && worker.leases.len() < FIXED_POLICY_WINDOW);
+        let is_able = |worker: &Worker| worker.is_ready(now) && !self.standings.is_excluded(worker);
+        let ids = self.ids_of(|worker| is_able(worker) && worker.leases.len() < FIXED_POLICY_WINDOW);
         for depth in 0..FIXED_POLICY_WINDOW {
             for &id in &ids {
                 if self.workers.get(&id).is_none_or(|worker| worker.leases.len() != depth) {

@@ -52,6 +52,11 @@ pub enum Event {
         /// Whether the shell vouches for it: the master has started it, or it has proved a token with a key of its own.
         trusted: bool,
     },
+    /// The master's user lifts the ban of a worker of this machine.
+    BanLifted {
+        /// The machine.
+        host: HostId,
+    },
     /// A session has ended, for whatever reason.
     WorkerLeft {
         /// The worker of that session.

@@ -36,6 +36,7 @@ mod active_lease;
 mod adaptive;
 mod assign;
 pub mod check;
+mod comparison;
 mod cost_map;
 mod event;
 mod flight;
@@ -192,6 +193,7 @@ impl Scheduler {
                 self.remove_worker(worker);
                 self.workers.insert(worker, Worker::new(threads, host, trusted, now));
             }
+            Event::BanLifted { host } => self.standings.forget(host),
             Event::WorkerLeft { worker } => self.remove_worker(worker),
             Event::WorkerDrains { worker } => self.set_service(worker, Service::Draining),
             Event::DrainRequested { worker } => self.drain(worker),

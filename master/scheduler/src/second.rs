@@ -39,6 +39,7 @@ impl Scheduler {
         let able = self.workers.iter().filter(|(id, worker)| {
             **id != first.worker
                 && Some(**id) != except
+                && !self.standings.is_excluded(worker)
                 && if only_trusted { worker.vouches(now) } else { worker.is_ready(now) }
         });
         let mut hosts: BTreeMap<HostId, (Option<f64>, Vec<WorkerId>)> = BTreeMap::new();

@@ -3,8 +3,8 @@
 //! An untrusted worker may be anybody that reaches the master's port. While a trusted worker renders, its host is on
 //! *probation*: all such hosts together get a bounded share of the rows of each frame, in small leases, and no backup
 //! tasks. A trusted worker renders each of these segments again, and the probation of a host ends when enough of them
-//! were the same. Later on, a part of its segments is rendered again. A host of which a worker was banned stays on
-//! probation.
+//! were the same. Later on, a part of its segments is rendered again. A host of which a worker was banned gets no leases:
+//! a worker could return under another name.
 //!
 //! Where no trusted worker renders, there is no bound: a frame must not wait, and there is nothing to compare with.
 
@@ -59,6 +59,17 @@ impl Standings {
         if self.hosts.len() < MAX_HOSTS || self.hosts.contains_key(&host) {
             self.hosts.insert(host, Standing::Banned);
         }
+    }
+
+    /// Forgets what is known of a host: its probation begins.
+    pub(super) fn forget(&mut self, host: HostId) {
+        self.hosts.remove(&host);
+    }
+
+    /// Whether a worker gets no leases now because another one of its host was banned.
+    pub(super) fn is_excluded(&self, worker: &Worker) -> bool {
+        let is_banned = || matches!(self.hosts.get(&worker.host), Some(Standing::Banned));
+        !worker.trusted && self.has_trusted && is_banned()
     }
 
     fn is_confirmed(&self, host: HostId) -> bool {
@@ -123,6 +134,9 @@ mod tests {
         standings.ban(HOST);
         (0..=CONFIRMATIONS).for_each(|_| standings.confirm(HOST));
         assert!(!standings.is_confirmed(HOST));
+        standings.forget(HOST);
+        (0..CONFIRMATIONS).for_each(|_| standings.confirm(HOST));
+        assert!(standings.is_confirmed(HOST));
     }
 
     #[test]

@@ -175,6 +175,15 @@ fn an_untrusted_worker_with_wrong_pixels_is_banned_by_default() {
         // A quarter of each frame until the second rendering of the first one, with two frames in flight.
         assert!(rows <= HEIGHT as usize, "{policy}: {rows} rows before the ban");
         assert_eq!(farm.scheduler.verification().mismatches, 1);
+        // Another worker of the same host gets nothing, until the user lifts the ban.
+        let (worker, host) = (WorkerId(3), HostId(2));
+        farm.untrusted_rows.clear();
+        farm.handle(Event::WorkerJoined { worker, threads: 64, host, trusted: false });
+        farm.run(10);
+        assert_eq!(farm.most_untrusted_rows(), 0, "{policy}");
+        farm.handle(Event::BanLifted { host });
+        farm.run(15);
+        assert!(farm.most_untrusted_rows() > 0 && farm.banned.len() == 2, "{policy}");
     }
 }
 

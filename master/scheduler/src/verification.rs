@@ -23,14 +23,14 @@ use super::forecast::Load;
 use super::keyed_rng::KeyedRng;
 use super::limits::TRAILING_FRAMES;
 use super::worker::Worker;
-use super::{Action, Cost, FrameId, HostId, Lease, Scheduler, WorkerId};
+use super::{Action, FrameId, HostId, Lease, Scheduler, WorkerId};
 
 /// Pending verifications at most; segments sampled beyond that are not verified.
 pub(super) const MAX_PENDING: usize = 1024;
 /// Pending verifications that wait for the master at most; those with the lowest priority numbers stay.
 pub(super) const MAX_FOR_MASTER: usize = 8;
 /// Banned workers that are remembered: pending verifications can accuse at most these.
-const MAX_BANNED: usize = 2 * MAX_PENDING;
+pub(super) const MAX_BANNED: usize = 2 * MAX_PENDING;
 
 /// Counts of verified segments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -128,7 +128,7 @@ pub(super) struct VerificationQueue {
     /// The newest complete frames, oldest first.
     complete: VecDeque<FrameId>,
     /// Banned workers, oldest first, so that each is banned once.
-    banned: VecDeque<WorkerId>,
+    pub(super) banned: VecDeque<WorkerId>,
 }
 
 impl VerificationQueue {
@@ -254,95 +254,6 @@ impl Scheduler {
         }
     }
 
-    /// Applies the comparison of a second rendering.
-    pub(super) fn segment_verified(
-        &mut self,
-        now: Duration,
-        id: WorkerId,
-        lease: Lease,
-        cost: Cost,
-        finding: Finding,
-    ) {
-        let key = (lease.frame, lease.segment);
-        let was_held = self.finish_lease(now, id, lease, cost).is_some();
-        let pending = self.verifications.pending.get_mut(&key);
-        let open = pending.filter(|pending| !matches!(pending.stage, Stage::Arbitrating(_)));
-        let Some(pending) = open.filter(|_| was_held) else { return };
-        let (first, first_lease) = (pending.first, pending.lease);
-        let decides = !first.trusted && self.workers.get(&id).is_some_and(|worker| worker.trusted);
-        match finding {
-            // There is no arbiter without a share to verify: the trusted worker decides.
-            Finding::Different if self.verifications.counts.percent == 0 => {
-                self.verifications.counts.verified += 1;
-                self.verifications.counts.mismatches += 1;
-                self.close_verification(key);
-                if decides {
-                    self.ban(first, first_lease, "a trusted worker's rendering");
-                }
-            }
-            Finding::Different => {
-                let before = std::mem::replace(&mut pending.stage, Stage::Arbitrating(Some(id)));
-                let (frame, segment) = key;
-                self.actions.push_back(Action::Arbitrate { frame, segment });
-                self.revoke_verification(before, key);
-            }
-            Finding::Same | Finding::Unknown => {
-                self.verifications.counts.verified += u64::from(finding == Finding::Same);
-                if decides && finding == Finding::Same {
-                    self.standings.confirm(first.host);
-                }
-                self.close_verification(key);
-            }
-        }
-    }
-
-    /// Applies the arbiter's result: bans every worker whose rendering differs from the master's.
-    pub(super) fn segment_arbitrated(&mut self, frame: FrameId, segment: u32, result: ArbiterResult) {
-        let Some(pending) = self.verifications.pending.get(&(frame, segment)) else { return };
-        let (lease, first, Stage::Arbitrating(second)) = (pending.lease, pending.first, pending.stage) else {
-            return;
-        };
-        self.verifications.counts.verified += u64::from(result.rendered);
-        self.verifications.counts.mismatches += u64::from(second.is_some() || result.first_differs);
-        self.close_verification((frame, segment));
-        let second = second.filter(|_| result.second_differs).map(|worker| self.renderer(worker));
-        if result.rendered && !result.first_differs && !first.trusted {
-            self.standings.confirm(first.host);
-        }
-        for renderer in [Some(first).filter(|_| result.first_differs), second].into_iter().flatten() {
-            self.ban(renderer, lease, "the master's rendering");
-        }
-    }
-
-    /// A worker as a renderer. One that has left counts as trusted: its host is not known any more.
-    fn renderer(&self, worker: WorkerId) -> Renderer {
-        let known = self.workers.get(&worker).map(|known| (known.host, known.trusted));
-        let (host, trusted) = known.unwrap_or((HostId(0), true));
-        Renderer { worker, host, trusted }
-    }
-
-    /// Bans a worker once, for rows that differ from the rendering that decides.
-    fn ban(&mut self, renderer: Renderer, lease: Lease, decides: &str) {
-        let Renderer { worker, host, trusted } = renderer;
-        if self.verifications.banned.contains(&worker) {
-            return;
-        }
-        self.verifications.banned.push_back(worker);
-        if self.verifications.banned.len() > MAX_BANNED {
-            self.verifications.banned.pop_front();
-        }
-        let Lease { frame, first_row, row_count, .. } = lease;
-        let reason = format!(
-            "it sent wrong pixels: rows {first_row}+{row_count} of frame {frame} differ from {decides}"
-        );
-        if !trusted {
-            self.standings.ban(host);
-        }
-        self.remove_worker(worker);
-        self.drop_verifications(|pending| pending.first.worker == worker);
-        self.actions.push_back(Action::Ban { worker, reason });
-    }
-
     /// Requeues rows that have left their picture.
     pub(super) fn rows_rejected(&mut self, frame: FrameId, first_row: u32, row_count: u32) {
         let known = self.frames.iter_mut().find(|known| known.id == frame);
@@ -393,7 +304,7 @@ impl Scheduler {
     }
 
     /// Drops the lease of a second rendering that is not needed any more.
-    fn revoke_verification(&mut self, stage: Stage, key: (FrameId, u32)) {
+    pub(super) fn revoke_verification(&mut self, stage: Stage, key: (FrameId, u32)) {
         if let Stage::Leased(holder) = stage
             && let Some(worker) = self.workers.get_mut(&holder)
         {

@@ -92,11 +92,7 @@ mod tests {
         assert_eq!(room.free_bytes(), 0);
         drop((second, third));
         let all = room.enter(1000).await.unwrap();
-        assert_eq!(
-            room.free_bytes(),
-            0,
-            "a larger body takes all of the room, and waits for no more than the room has"
-        );
+        assert_eq!(room.free_bytes(), 0, "a larger body takes all of the room, and waits for that");
         drop(all);
         assert_eq!(room.free_bytes(), 100);
     }

@@ -6,6 +6,7 @@
 mod accounting;
 mod bad_input;
 mod bench_farm;
+mod black_pixels;
 mod command_line;
 mod control;
 mod documents;

@@ -78,7 +78,14 @@ impl Driver {
 
     /// Lifts the bans that `which` selects. Returns the identities.
     pub(crate) fn allow(&self, which: impl Fn(&PastWorker) -> bool) -> Vec<Identity> {
-        self.lock().sessions.allow(which)
+        let mut inner = self.lock();
+        let allowed = inner.sessions.allow(which);
+        for identity in &allowed {
+            if let Identity::Remote { address, .. } = identity {
+                self.drive(&mut inner, Event::BanLifted { host: host(*address) });
+            }
+        }
+        allowed
     }
 
     /// The reason to refuse a worker in its handshake; `None`: it is admitted.
