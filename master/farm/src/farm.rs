@@ -76,6 +76,8 @@ impl Farm {
         tokio::spawn(async move { clock.keep_time(stopped).await });
         let (keys, stopped) = (driver.clone(), stop.clone());
         tokio::spawn(async move { keys.keep_share_keys_new(stopped).await });
+        let (revoking, stopped) = (driver.clone(), stop.clone());
+        tokio::spawn(async move { revoking.end_revoked(stopped).await });
         if let Some(renderer) = renderer {
             let settled = driver.clone();
             let report = move |event| settled.handle(event);
