@@ -12,6 +12,8 @@ mod control;
 mod documents;
 mod faults;
 #[cfg(unix)]
+mod full_farm;
+#[cfg(unix)]
 mod launch;
 mod resume;
 mod same_picture;
