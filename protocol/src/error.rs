@@ -167,6 +167,15 @@ pub enum ProtocolError {
         limit: u64,
     },
 
+    /// A header announces more pixels than the leases of the session can need. Nothing was allocated for them.
+    #[error("pixels of {announced} bytes are announced; the open leases need at most {limit}")]
+    NotLeased {
+        /// Number of bytes announced.
+        announced: u64,
+        /// Largest number that an open lease needs; 0 without leases.
+        limit: u64,
+    },
+
     /// The content of an envelope breaks a rule.
     #[error("{kind} is malformed: {why}")]
     Malformed {
@@ -198,7 +207,7 @@ impl ProtocolError {
             Self::Version { .. } | Self::WrongKey { .. } | Self::WrongToken | Self::Tls { .. } => false,
             Self::Io { .. } | Self::Closed { .. } | Self::Deadline { .. } | Self::NotNow { .. } => false,
             Self::UnknownKind { .. } | Self::Unexpected { .. } | Self::TooLong { .. } => false,
-            Self::Malformed { .. } | Self::Codec { .. } => false,
+            Self::NotLeased { .. } | Self::Malformed { .. } | Self::Codec { .. } => false,
         }
     }
 

@@ -39,7 +39,7 @@ pub const MAX_ASSET_BYTES: u64 = 2 << 30;
 /// Ethernet.
 pub const MAX_CHUNK_BYTES: usize = 256 << 10;
 
-/// Most peers to which a worker sends assets at a time. More connections wait.
+/// Most peers to which a worker sends assets at a time. More of them wait, after their requests have been checked.
 pub const MAX_PEER_CLIENTS: usize = 8;
 
 /// Time for which a worker keeps a complete asset for its peers after the last request for it.
@@ -54,8 +54,17 @@ pub const PEER_CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 /// Interval of the keepalives that a worker sends to a peer while it waits for bytes of an asset itself.
 pub const PEER_KEEPALIVE_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Most consecutive keepalives without a chunk between them.
-pub const MAX_PEER_KEEPALIVES: u32 = 240;
+/// Most consecutive keepalives without a chunk of that asset between them.
+pub const MAX_PEER_KEEPALIVES: u32 = 120;
+
+/// Time without a chunk of any asset after which a transfer between workers has stalled, next to the master.
+pub const PEER_STALL_LIMIT: Duration = Duration::from_secs(3);
+
+/// Time that is added to [`PEER_STALL_LIMIT`] for each worker between the master and a worker.
+pub const PEER_STALL_PER_HOP: Duration = Duration::from_millis(500);
+
+/// Most workers between the master and a worker that count.
+pub const MAX_PEER_HOPS: u64 = 24;
 
 /// Longest silence of a peer in the middle of a transfer.
 pub const PEER_TIMEOUT: Duration = Duration::from_secs(3);
@@ -78,6 +87,9 @@ pub const INBOX_QUEUE: usize = 256;
 /// Most body bytes in the queue of received messages. While there are more, the session does not read.
 pub const INBOX_BYTES: usize = 2 * (MAX_PIXELS_BYTES + MAX_CONTROL_BYTES);
 
+/// Most bytes of pixels that all sessions of a master receive at a time, the queues of received messages included (256 MiB).
+pub const MAX_RECEIVING_BYTES: usize = 256 << 20;
+
 /// Time limit from the first byte of the preamble to the end of the handshake.
 pub const HANDSHAKE_DEADLINE: Duration = Duration::from_secs(5);
 
@@ -91,8 +103,17 @@ pub const CLOSE_GRACE: Duration = Duration::from_millis(500);
 /// Lowest data rate that is accepted in the middle of an envelope.
 const MIN_BYTES_PER_SECOND: u64 = 256 << 10;
 
+/// Lowest data rate that is accepted in the middle of pixels while other sessions wait for room.
+const MIN_CONTENDED_BYTES_PER_SECOND: u64 = 8 << 20;
+
 /// Time limit for an envelope with a body of `body_bytes`, in either direction, from its first byte to its last. The time
 /// between two envelopes is unlimited.
 pub const fn envelope_deadline(body_bytes: usize) -> Duration {
     Duration::from_millis(10_000 + body_bytes as u64 * 1000 / MIN_BYTES_PER_SECOND)
+}
+
+/// Time limit for a body with pixels of `body_bytes` while other sessions wait for its share of [`MAX_RECEIVING_BYTES`]: 2 s, and
+/// 1 s for each 8 MiB.
+pub const fn contended_deadline(body_bytes: usize) -> Duration {
+    Duration::from_millis(2000 + body_bytes as u64 * 1000 / MIN_CONTENDED_BYTES_PER_SECOND)
 }

@@ -76,6 +76,8 @@ impl Farm {
         tokio::spawn(async move { clock.keep_time(stopped).await });
         let (keys, stopped) = (driver.clone(), stop.clone());
         tokio::spawn(async move { keys.keep_share_keys_new(stopped).await });
+        let (revoking, stopped) = (driver.clone(), stop.clone());
+        tokio::spawn(async move { revoking.end_revoked(stopped).await });
         if let Some(renderer) = renderer {
             let settled = driver.clone();
             let report = move |event| settled.handle(event);
@@ -156,6 +158,12 @@ impl Farm {
     /// Records a timeline of everything from now on.
     pub fn record_timeline(&self, sink: TimelineSink) {
         self.driver.record_timeline(sink);
+    }
+
+    /// The hash of the scene's body.
+    #[cfg(test)]
+    pub(crate) fn scene_id(&self) -> rayfarm_protocol::AssetId {
+        self.driver.assets.scene()
     }
 
     /// Sets a function that is called at the start of each decoding of pixels.

@@ -7,14 +7,13 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use rayfarm_protocol::admission::Place;
-use rayfarm_protocol::limits::{FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES};
+use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
 use rayfarm_protocol::session::{self, BodyLimit, Receiver, SendError, Sender};
 use rayfarm_protocol::transport::Connection;
 use rayfarm_protocol::{AssetId, Hello, KeyHash, ProtocolError, ToMaster, ToWorker, Welcome, handshake, tcp};
 use rayfarm_scheduler::{Event, WorkerId};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
-use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
@@ -117,11 +116,10 @@ async fn shake_hands(
         tokio::time::sleep(delay).await;
     }
     // A connection that never sends is no news: port scanners and health checks do that.
-    if !matches!(timeout(FIRST_BYTE_DEADLINE, stream.peek(&mut [0])).await, Ok(Ok(1))) {
-        tracing::debug!("{address} sends nothing and is closed");
+    if let Err(error) = place.wait_for_first_byte(&stream).await {
+        tracing::debug!("{address} sends nothing and is closed: {error}");
         return None;
     }
-    place.has_sent();
     let mut admitted = None;
     let decide = |hello: &Hello, key: Option<KeyHash>| {
         let identity = driver.tickets.identify(&hello.name, address.ip(), key);
@@ -162,7 +160,7 @@ async fn run_session(driver: &Driver, admitted: Admitted, address: SocketAddr) {
         tracing::info!("{worker} joins: {name} ({address}), {threads} threads, {simd}, {software}{more}");
     }
     let is_logged = left_out.is_some();
-    let (limit, key) = (BodyLimit::closed(), stream.peer_key());
+    let (limit, key) = (BodyLimit::closed(driver.receiving.clone()), stream.peer_key());
     let (sender, receiver, traffic) = session::spawn_limited::<_, ToWorker, ToMaster>(stream, limit.clone());
     let (request, requests) = mpsc::channel(MAX_ASSET_REQUESTS);
     let link = Link { address, key, sender: sender.clone(), traffic, pixels: limit };

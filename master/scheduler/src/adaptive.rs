@@ -28,6 +28,8 @@ const OVERLAP_WEIGHT: f64 = 0.25;
 /// Segments per worker and frame, at least, while no speed is measured. They have at most one tile band per thread: the
 /// cost of a band is unknown, and the first reply measures it.
 const FIRST_SEGMENTS: u32 = 8;
+/// Largest part of the trusted workers' speed that all workers on probation together count as.
+const PROBATION_SPEED: f64 = 1.0 / 3.0;
 
 /// A worker that may get leases.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +40,8 @@ struct Candidate {
     speed: Option<f64>,
     /// Whether `speed` is this worker's own measured one: only then are its leases predicted.
     measured: bool,
+    /// Whether it is on probation: its share of a frame is bounded.
+    on_probation: bool,
     leases: usize,
     /// Tile bands of its leases.
     bands: u32,
@@ -60,9 +64,15 @@ pub(super) struct Fleet {
 
 impl Fleet {
     pub(super) fn of(scheduler: &Scheduler, now: Duration) -> Self {
-        let ready = scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(now));
-        let mut candidates: Vec<Candidate> = ready.map(|(&id, w)| Candidate::of(id, w, now)).collect();
-        let measured = candidates.iter().filter_map(|candidate| Some((candidate.speed?, candidate.threads)));
+        let is_able = |worker: &Worker| worker.is_ready(now) && !scheduler.standings.is_excluded(worker);
+        let ready = scheduler.workers.iter().filter(|(_, worker)| is_able(worker));
+        let of = |(&id, worker): (&WorkerId, &Worker)| {
+            let on_probation = scheduler.standings.is_on_probation(worker);
+            Candidate { on_probation, ..Candidate::of(id, worker, now) }
+        };
+        let mut candidates: Vec<Candidate> = ready.map(of).collect();
+        let believed = candidates.iter().filter(|candidate| !candidate.on_probation);
+        let measured = believed.filter_map(|candidate| Some((candidate.speed?, candidate.threads)));
         let (speed, threads) = measured.fold((0.0, 0.0), |(s, t), (speed, threads)| (s + speed, t + threads));
         if threads > 0.0 {
             // An unmeasured worker is assumed to have the average speed per thread.
@@ -70,6 +80,7 @@ impl Fleet {
                 candidate.speed.get_or_insert(speed / threads * candidate.threads);
             });
         }
+        bound_speeds_on_probation(&mut candidates);
         let total = candidates.iter().filter_map(|candidate| candidate.speed).sum();
         let under_way =
             candidates.iter().filter_map(|candidate| Some(candidate.speed? * candidate.free_in)).sum();
@@ -120,17 +131,19 @@ impl Fleet {
         candidate.measured.then_some((at, seconds(takes)))
     }
 
-    /// The fastest worker without leases, its speed and its round trip time in seconds.
+    /// The fastest worker without leases that is not on probation, its speed and its round trip time in seconds.
     pub(super) fn fastest_idle(&self) -> Option<(WorkerId, Option<f64>, f64)> {
-        let idle = self.candidates.iter().filter(|candidate| candidate.leases == 0);
+        let idle =
+            self.candidates.iter().filter(|candidate| candidate.leases == 0 && !candidate.on_probation);
         let best = idle.max_by(|a, b| a.speed.unwrap_or(0.0).total_cmp(&b.speed.unwrap_or(0.0)))?;
         Some((best.id, best.speed, best.round_trip))
     }
 
     /// Seconds until the first candidate could have done this work.
     fn soonest_done(&self, work: f64) -> f64 {
-        // An unmeasured worker that holds a lease is not predictable.
-        let predictable = |candidate: &&Candidate| candidate.measured || candidate.leases == 0;
+        // An unmeasured worker that holds a lease is not predictable, and one on probation may not get the rows.
+        let predictable =
+            |candidate: &&Candidate| !candidate.on_probation && (candidate.measured || candidate.leases == 0);
         let candidates = self.candidates.iter().filter(predictable);
         let done_in = candidates.filter_map(|candidate| Some(candidate.free_in + work / candidate.speed?));
         done_in.fold(f64::INFINITY, f64::min)
@@ -148,6 +161,7 @@ impl Candidate {
             threads: f64::from(worker.threads),
             speed: worker.speed.value(),
             measured: worker.speed.value().is_some(),
+            on_probation: false,
             leases: worker.leases.len(),
             bands,
             round_trip,
@@ -161,8 +175,12 @@ impl Scheduler {
     pub(super) fn adaptive_rows(&mut self, index: usize, fleet: &Fleet, candidate: usize) -> Option<u32> {
         let frame = self.frames.get(index)?;
         let range = frame.queue.front()?;
-        let limit = frame.max_rows;
         let candidate = fleet.candidates.get(candidate)?;
+        let limit =
+            frame.max_rows.min(if candidate.on_probation { frame.probation_rows() } else { u32::MAX });
+        if limit == 0 {
+            return None;
+        }
         let Some(speed) = candidate.speed else {
             let rows = first_rows(frame, fleet.candidates.len(), candidate.threads);
             let step = frame.forecast.tiles.rows.min(rows);
@@ -210,6 +228,20 @@ impl Scheduler {
         };
         let halves = std::iter::successors(Some(tile), |&step| (step > 1).then_some(step / 2));
         halves.min_by(|&a, &b| seconds(a).total_cmp(&seconds(b))).unwrap_or(tile)
+    }
+}
+
+/// Limits the speeds of the candidates on probation, so that all of them together count as [`PROBATION_SPEED`] of the
+/// others.
+fn bound_speeds_on_probation(candidates: &mut [Candidate]) {
+    let count = candidates.iter().filter(|candidate| candidate.on_probation).count();
+    if count == 0 {
+        return;
+    }
+    let others = candidates.iter().filter(|candidate| !candidate.on_probation);
+    let bound = others.filter_map(|candidate| candidate.speed).sum::<f64>() * PROBATION_SPEED / count as f64;
+    for candidate in candidates.iter_mut().filter(|candidate| candidate.on_probation) {
+        candidate.speed = candidate.speed.map(|speed| speed.min(bound)).filter(|&speed| speed > 0.0);
     }
 }
 

@@ -8,6 +8,7 @@ use super::adaptive::Fleet;
 use super::forecast::Load;
 use super::frame::Frame;
 use super::limits::FIXED_POLICY_WINDOW;
+use super::worker::Worker;
 use super::{Action, Lease, Scheduler, SegmentPolicy, WorkerId};
 
 impl Scheduler {
@@ -26,7 +27,8 @@ impl Scheduler {
     /// The rule of the fixed policies `static` and `smart`: [`FIXED_POLICY_WINDOW`] leases per worker, in order; every
     /// worker gets a first lease before any gets a second one. At the end, idle workers get backup tasks.
     fn assign_fixed(&mut self, now: Duration) {
-        let ids = self.ids_of(|worker| worker.is_ready(now) && worker.leases.len() < FIXED_POLICY_WINDOW);
+        let is_able = |worker: &Worker| worker.is_ready(now) && !self.standings.is_excluded(worker);
+        let ids = self.ids_of(|worker| is_able(worker) && worker.leases.len() < FIXED_POLICY_WINDOW);
         for depth in 0..FIXED_POLICY_WINDOW {
             for &id in &ids {
                 if self.workers.get(&id).is_none_or(|worker| worker.leases.len() != depth) {
@@ -39,6 +41,7 @@ impl Scheduler {
                     self.grant(now, id, lease, None);
                 } else if !self.lease_verification(now, id, None)
                     && depth == 0
+                    && !self.is_on_probation(id)
                     && let Some(lease) = self.any_backup(now, id)
                 {
                     self.grant(now, id, lease, None);
@@ -52,8 +55,10 @@ impl Scheduler {
         if matches!(self.policy, SegmentPolicy::Smart(_)) {
             self.halve_if_near_the_end(index);
         }
-        let limit = self.frames.get(index)?.max_rows;
-        self.frames.get_mut(index)?.lease_front(id, limit)
+        let on_probation = self.is_on_probation(id);
+        let frame = self.frames.get_mut(index)?;
+        let limit = if on_probation { frame.probation_rows().min(frame.max_rows) } else { frame.max_rows };
+        if limit == 0 { None } else { frame.lease_front(id, limit) }
     }
 
     /// The rule of the policy `smart`: the last `workers / 2` segments are halved.
@@ -127,8 +132,12 @@ impl Scheduler {
     /// Records a lease of rows for a picture and sends it.
     pub(super) fn grant(&mut self, now: Duration, id: WorkerId, lease: Lease, fleet: Option<&mut Fleet>) {
         let rows = lease.first_row..lease.first_row + lease.row_count;
+        let on_probation = self.is_on_probation(id);
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
         frame.started_at.get_or_insert(now);
+        if on_probation {
+            frame.rows_on_probation = frame.rows_on_probation.saturating_add(lease.row_count);
+        }
         let load = Load::of(&frame.forecast, rows);
         if self.record_lease(now, id, lease, fleet, load, false) {
             self.actions.push_back(Action::Grant { worker: id, lease });

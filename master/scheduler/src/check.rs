@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use super::frame::Frame;
 use super::limits::{FIXED_POLICY_WINDOW, MAX_WINDOW, TRAILING_FRAMES};
 use super::verification::{MAX_FOR_MASTER, MAX_PENDING, SecondRenderer, Stage};
+use super::worker::Worker;
 use super::{Scheduler, SegmentPolicy};
 
 /// Describes the first violated invariant; `None` if all of these hold:
@@ -14,7 +15,7 @@ use super::{Scheduler, SegmentPolicy};
 /// - leases of a worker never exceed the window;
 /// - a worker has a stall timer if, and only if, it holds leases or has overdue ones;
 /// - rows are not queued while all ready workers are idle;
-/// - under the fixed policies, no ready worker is idle while rows are queued;
+/// - under the fixed policies, no ready worker is idle while rows are queued, except for those on probation;
 /// - at most two frames are in flight, in order, and none of them is complete;
 /// - pending verifications are bounded, of frames in flight or recently complete, and no worker verifies its own rows;
 /// - without workers nothing is leased.
@@ -126,7 +127,7 @@ fn verifications_are_valid(scheduler: &Scheduler) -> Option<String> {
     queue.pending.iter().find_map(|(&(frame, number), pending)| {
         let place = format!("{frame:?} verification {number}");
         if let Stage::Waiting(SecondRenderer::Worker(second)) = pending.stage {
-            let able = second != pending.first && scheduler.workers.contains_key(&second);
+            let able = second != pending.first.worker && scheduler.workers.contains_key(&second);
             return (!able).then(|| format!("{place} waits for {second}, which cannot render it"));
         }
         let Stage::Leased(holder) = pending.stage else { return None };
@@ -135,7 +136,7 @@ fn verifications_are_valid(scheduler: &Scheduler) -> Option<String> {
         if !holds {
             return Some(format!("{place} is held by {holder}, which does not hold it"));
         }
-        (holder == pending.first).then(|| format!("{holder} verifies its own rows"))
+        (holder == pending.first.worker).then(|| format!("{holder} verifies its own rows"))
     })
 }
 
@@ -143,8 +144,11 @@ fn verifications_are_valid(scheduler: &Scheduler) -> Option<String> {
 fn no_worker_is_idle(scheduler: &Scheduler) -> Option<String> {
     let rows_are_queued = scheduler.frames.iter().any(|frame| !frame.queue.is_empty());
     let ready = || scheduler.workers.iter().filter(|(_, worker)| worker.is_ready(scheduler.handled_at));
-    let idle = ready().find(|(_, worker)| worker.leases.is_empty()).filter(|_| rows_are_queued);
-    let busy = ready().any(|(_, worker)| !worker.leases.is_empty());
+    // Workers on probation wait where the share of all of them is used up: a trusted worker is ready then.
+    let is_idle = |worker: &Worker| worker.leases.is_empty() && !scheduler.standings.is_on_probation(worker);
+    let idle = ready().find(|(_, worker)| is_idle(worker)).filter(|_| rows_are_queued);
+    let is_busy = |worker: &Worker| !worker.leases.is_empty() && !scheduler.standings.is_on_probation(worker);
+    let busy = ready().any(|(_, worker)| is_busy(worker));
     let forbidden = !busy || scheduler.policy != SegmentPolicy::Adaptive;
     idle.filter(|_| forbidden).map(|(id, _)| format!("{id} is idle while rows are queued"))
 }

@@ -49,6 +49,13 @@ pub enum Event {
         threads: u32,
         /// The machine that it runs on.
         host: HostId,
+        /// Whether the shell vouches for it: the master has started it, or it has proved a token with a key of its own.
+        trusted: bool,
+    },
+    /// The master's user lifts the ban of a worker of this machine.
+    BanLifted {
+        /// The machine.
+        host: HostId,
     },
     /// A session has ended, for whatever reason.
     WorkerLeft {

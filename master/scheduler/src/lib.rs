@@ -14,7 +14,7 @@
 //!
 //! let mut scheduler = Scheduler::new(SegmentPolicy::Static(16), 1 << 20);
 //! let now = Duration::ZERO;
-//! scheduler.handle(now, Event::WorkerJoined { worker: WorkerId(1), threads: 2, host: HostId(1) });
+//! scheduler.handle(now, Event::WorkerJoined { worker: WorkerId(1), threads: 2, host: HostId(1), trusted: true });
 //! let frame = FrameId(1);
 //! scheduler.handle(now, Event::FrameRequested { frame, width: 64, height: 32, row_bytes: 192, tile_rows: 16 });
 //!
@@ -36,6 +36,7 @@ mod active_lease;
 mod adaptive;
 mod assign;
 pub mod check;
+mod comparison;
 mod cost_map;
 mod event;
 mod flight;
@@ -51,6 +52,7 @@ mod speculation;
 mod speed;
 mod stall;
 mod timeouts;
+mod trust;
 mod verification;
 mod worker;
 
@@ -62,6 +64,8 @@ mod sizes_tests;
 mod stall_scenarios;
 #[cfg(test)]
 mod transcript;
+#[cfg(test)]
+mod trust_tests;
 
 pub use action::Action;
 pub use event::{Event, HostId, WorkerId};
@@ -75,6 +79,7 @@ use flight::Request;
 use frame::Frame;
 use limits::MAX_FRAMES;
 use timeouts::FIRST_STALL_TIMEOUT;
+use trust::Standings;
 use verification::VerificationQueue;
 use worker::{PING_INTERVAL, Service, Worker};
 
@@ -115,6 +120,7 @@ pub struct Scheduler {
     waiting: Option<Request>,
     costs: CostMap,
     verifications: VerificationQueue,
+    standings: Standings,
     /// Pixels per row of the frame that began last.
     width: u32,
     actions: VecDeque<Action>,
@@ -144,6 +150,7 @@ impl Scheduler {
             waiting: None,
             costs: CostMap::default(),
             verifications: VerificationQueue::default(),
+            standings: Standings::default(),
             width: 0,
             actions: VecDeque::new(),
             next_nonce: 0,
@@ -182,10 +189,11 @@ impl Scheduler {
                 self.request(Request { frame, width, height, row_bytes, tile_rows });
             }
             Event::RequestsDropped { next } => self.drop_requests(next),
-            Event::WorkerJoined { worker, threads, host } => {
+            Event::WorkerJoined { worker, threads, host, trusted } => {
                 self.remove_worker(worker);
-                self.workers.insert(worker, Worker::new(threads, host, now));
+                self.workers.insert(worker, Worker::new(threads, host, trusted, now));
             }
+            Event::BanLifted { host } => self.standings.forget(host),
             Event::WorkerLeft { worker } => self.remove_worker(worker),
             Event::WorkerDrains { worker } => self.set_service(worker, Service::Draining),
             Event::DrainRequested { worker } => self.drain(worker),
@@ -216,6 +224,7 @@ impl Scheduler {
         self.fail_frames();
         self.complete_frames();
         self.arbitrate_next();
+        self.note_trusted();
         self.assign(now);
         self.disconnect_drained();
         debug_assert_eq!(check::violated(self), None);
@@ -247,7 +256,9 @@ impl Scheduler {
         let Some(work) = self.finish_lease(now, id, lease, cost) else { return };
         let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
         let fresh = frame.finish(&lease, cost);
-        if let Some(work) = work.filter(|_| !fresh.is_empty()) {
+        // False times of a worker on probation must not change the leases of others.
+        let on_probation = self.workers.get(&id).is_some_and(|worker| self.standings.is_on_probation(worker));
+        if let Some(work) = work.filter(|_| !fresh.is_empty() && !on_probation) {
             frame.forecast.learn(lease.first_row..lease.first_row + lease.row_count, work);
         }
         self.sample_for_verification(id, &lease, fresh);

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::verification::{MAX_FOR_MASTER, SecondRenderer, Stage};
+use super::verification::{MAX_FOR_MASTER, Renderer, SecondRenderer, Stage};
 use super::{FrameId, HostId, Scheduler, WorkerId};
 
 /// The master's share of the second renderings, in per cent.
@@ -16,26 +16,32 @@ const MASTER_PERCENT: u8 = 25;
 const MEAN_WEIGHT: f64 = 16.0;
 
 impl Scheduler {
-    /// Draws the second renderer of a segment that `first` rendered on `host`, other than `except`.
+    /// Draws the second renderer of a segment, other than `except`. `None`: there is none, and the segment is not verified.
     pub(super) fn draw_second_renderer(
         &mut self,
-        first: WorkerId,
-        host: HostId,
+        first: Renderer,
         except: Option<WorkerId>,
-    ) -> SecondRenderer {
-        let for_master = self.verifications.rng.chance(MASTER_PERCENT);
+    ) -> Option<SecondRenderer> {
+        // Without a share to verify, the master has no arbiter.
+        let has_arbiter = self.verifications.counts.percent > 0;
+        let for_master = has_arbiter && self.verifications.rng.chance(MASTER_PERCENT);
         if for_master && self.verifications.waiting_for_master() < MAX_FOR_MASTER {
-            return SecondRenderer::Master;
+            return Some(SecondRenderer::Master);
         }
-        self.draw_worker(first, host, except).map_or(SecondRenderer::Master, SecondRenderer::Worker)
+        let drawn = self.draw_worker(first, except).map(SecondRenderer::Worker);
+        drawn.or_else(|| has_arbiter.then_some(SecondRenderer::Master))
     }
 
-    fn draw_worker(&mut self, first: WorkerId, host: HostId, except: Option<WorkerId>) -> Option<WorkerId> {
+    fn draw_worker(&mut self, first: Renderer, except: Option<WorkerId>) -> Option<WorkerId> {
         let now = self.handled_at;
-        let able = self
-            .workers
-            .iter()
-            .filter(|(id, worker)| **id != first && Some(**id) != except && worker.is_ready(now));
+        // Untrusted workers do not confirm each other where a trusted one can render.
+        let only_trusted = !first.trusted && self.standings.has_trusted();
+        let able = self.workers.iter().filter(|(id, worker)| {
+            **id != first.worker
+                && Some(**id) != except
+                && !self.standings.is_excluded(worker)
+                && if only_trusted { worker.vouches(now) } else { worker.is_ready(now) }
+        });
         let mut hosts: BTreeMap<HostId, (Option<f64>, Vec<WorkerId>)> = BTreeMap::new();
         for (&id, worker) in able {
             let (speed, ids) = hosts.entry(worker.host).or_default();
@@ -43,8 +49,8 @@ impl Scheduler {
             ids.push(id);
         }
         // Workers of one host may collude.
-        if hosts.keys().any(|known| *known != host) {
-            hosts.remove(&host);
+        if hosts.keys().any(|known| *known != first.host) {
+            hosts.remove(&first.host);
         }
         let speeds: Vec<f64> = hosts.values().filter_map(|(speed, _)| *speed).collect();
         let mean = speeds.iter().sum::<f64>() / speeds.len() as f64;
@@ -74,13 +80,10 @@ impl Scheduler {
     }
 
     fn redraw_second_renderer(&mut self, key: (FrameId, u32), except: WorkerId) {
-        let pending = self.verifications.pending.get(&key);
-        let Some((first, host)) = pending.map(|pending| (pending.first, pending.first_host)) else {
-            return;
-        };
-        let second = self.draw_second_renderer(first, host, Some(except));
-        if let Some(pending) = self.verifications.pending.get_mut(&key) {
-            pending.stage = Stage::Waiting(second);
+        let Some(first) = self.verifications.pending.get(&key).map(|pending| pending.first) else { return };
+        match (self.draw_second_renderer(first, Some(except)), self.verifications.pending.get_mut(&key)) {
+            (Some(second), Some(pending)) => pending.stage = Stage::Waiting(second),
+            _ => self.close_verification(key),
         }
     }
 }

@@ -14,7 +14,7 @@ fn adaptive_gives_the_faster_worker_more_rows_on_tile_boundaries() {
 }
 
 fn joined(worker: u64) -> Event {
-    Event::WorkerJoined { worker: WorkerId(worker), threads: 1, host: HostId(worker.into()) }
+    Event::WorkerJoined { worker: WorkerId(worker), threads: 1, host: HostId(worker.into()), trusted: true }
 }
 
 /// Renders frames of 512 rows with two workers; `speeds` are in rows per millisecond. Returns the rows of each worker,
@@ -80,7 +80,7 @@ fn the_first_leases_have_one_band_per_thread_at_most() {
         (8, 16, 4, 1),
     ] {
         let mut scheduler = Scheduler::new(SegmentPolicy::Adaptive, 1 << 24);
-        let join = Event::WorkerJoined { worker: WorkerId(1), threads, host: HostId(1) };
+        let join = Event::WorkerJoined { worker: WorkerId(1), threads, host: HostId(1), trusted: true };
         scheduler.handle(Duration::ZERO, join);
         let request =
             Event::FrameRequested { frame: FrameId(1), width: 1920, height, tile_rows, row_bytes: 1920 * 3 };

@@ -10,6 +10,9 @@
 //! rows on the master, and the master bans every worker whose result does not match. A vote among workers would
 //! be cheaper and could be wrong: two machines with the same fault agree. Verifications that are drawn for the master,
 //! or for which no other worker is ready, are arbitrated one at a time, by a random priority.
+//!
+//! Segments of untrusted workers are sampled by default, see [`trust`](super::trust), and rendered again by trusted
+//! workers. Without a share to verify there is no arbiter, and the trusted worker's rendering decides.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
@@ -20,14 +23,14 @@ use super::forecast::Load;
 use super::keyed_rng::KeyedRng;
 use super::limits::TRAILING_FRAMES;
 use super::worker::Worker;
-use super::{Action, Cost, FrameId, HostId, Lease, Scheduler, WorkerId};
+use super::{Action, FrameId, HostId, Lease, Scheduler, WorkerId};
 
 /// Pending verifications at most; segments sampled beyond that are not verified.
 pub(super) const MAX_PENDING: usize = 1024;
 /// Pending verifications that wait for the master at most; those with the lowest priority numbers stay.
 pub(super) const MAX_FOR_MASTER: usize = 8;
 /// Banned workers that are remembered: pending verifications can accuse at most these.
-const MAX_BANNED: usize = 2 * MAX_PENDING;
+pub(super) const MAX_BANNED: usize = 2 * MAX_PENDING;
 
 /// Counts of verified segments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,12 +76,20 @@ pub(super) struct PendingVerification {
     pub(super) lease: Lease,
     load: Load,
     /// The worker that rendered the rows first.
-    pub(super) first: WorkerId,
-    /// The machine of that worker.
-    pub(super) first_host: HostId,
+    pub(super) first: Renderer,
     /// Order in the master's queue, lowest first.
     priority: u64,
     pub(super) stage: Stage,
+}
+
+/// A worker that has rendered a segment, and may have left since.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Renderer {
+    pub(super) worker: WorkerId,
+    /// Its machine.
+    pub(super) host: HostId,
+    /// Whether it is trusted.
+    pub(super) trusted: bool,
 }
 
 /// Stage of a pending verification.
@@ -117,13 +128,13 @@ pub(super) struct VerificationQueue {
     /// The newest complete frames, oldest first.
     complete: VecDeque<FrameId>,
     /// Banned workers, oldest first, so that each is banned once.
-    banned: VecDeque<WorkerId>,
+    pub(super) banned: VecDeque<WorkerId>,
 }
 
 impl VerificationQueue {
-    /// Draws whether a segment is verified.
-    fn samples(&mut self) -> bool {
-        self.rng.chance(self.counts.percent) && self.pending.len() < MAX_PENDING
+    /// Draws whether a segment is verified, with this probability.
+    fn samples(&mut self, percent: u8) -> bool {
+        self.rng.chance(percent) && self.pending.len() < MAX_PENDING
     }
 
     /// Verifications that wait for the master.
@@ -162,23 +173,26 @@ impl Scheduler {
         Verification { open: self.verifications.pending.len() as u64, ..self.verifications.counts }
     }
 
-    /// Samples row ranges of which `first` has delivered the first valid pixels.
-    pub(super) fn sample_for_verification(&mut self, first: WorkerId, lease: &Lease, fresh: Vec<Range<u32>>) {
-        let Some(first_host) = self.workers.get(&first).map(|worker| worker.host) else { return };
+    /// Samples row ranges of which a worker has delivered the first valid pixels.
+    pub(super) fn sample_for_verification(&mut self, id: WorkerId, lease: &Lease, fresh: Vec<Range<u32>>) {
+        let Some(worker) = self.workers.get(&id) else { return };
+        let first = Renderer { worker: id, host: worker.host, trusted: worker.trusted };
+        let percent = self.standings.percent(worker).max(self.verifications.counts.percent);
         for rows in fresh {
-            if !self.verifications.samples() {
+            if !self.verifications.samples(percent) {
                 continue;
             }
-            let stage = Stage::Waiting(self.draw_second_renderer(first, first_host, None));
+            let Some(second) = self.draw_second_renderer(first, None) else { continue };
+            let stage = Stage::Waiting(second);
             let priority = self.verifications.rng.next();
             let Some(frame) = self.frames.iter_mut().find(|frame| frame.id == lease.frame) else { return };
             let load = Load::of(&frame.forecast, rows.clone());
             let (first_row, row_count) = (rows.start, rows.end - rows.start);
             let lease = Lease { segment: frame.next_number(), attempt: 0, first_row, row_count, ..*lease };
-            let pending = PendingVerification { lease, load, first, first_host, priority, stage };
+            let pending = PendingVerification { lease, load, first, priority, stage };
             self.verifications.pending.insert((lease.frame, lease.segment), pending);
             self.verifications.counts.picked += 1;
-            self.actions.push_back(Action::RecordDigest { worker: first, lease });
+            self.actions.push_back(Action::RecordDigest { worker: first.worker, lease });
         }
     }
 
@@ -240,68 +254,6 @@ impl Scheduler {
         }
     }
 
-    /// Applies the comparison of a second rendering.
-    pub(super) fn segment_verified(
-        &mut self,
-        now: Duration,
-        id: WorkerId,
-        lease: Lease,
-        cost: Cost,
-        finding: Finding,
-    ) {
-        let key = (lease.frame, lease.segment);
-        let was_held = self.finish_lease(now, id, lease, cost).is_some();
-        let pending = self.verifications.pending.get_mut(&key);
-        let open = pending.filter(|pending| !matches!(pending.stage, Stage::Arbitrating(_)));
-        let Some(pending) = open.filter(|_| was_held) else { return };
-        match finding {
-            Finding::Different => {
-                let before = std::mem::replace(&mut pending.stage, Stage::Arbitrating(Some(id)));
-                let (frame, segment) = key;
-                self.actions.push_back(Action::Arbitrate { frame, segment });
-                self.revoke_verification(before, key);
-            }
-            Finding::Same | Finding::Unknown => {
-                self.verifications.counts.verified += u64::from(finding == Finding::Same);
-                self.close_verification(key);
-            }
-        }
-    }
-
-    /// Applies the arbiter's result: bans every worker whose rendering differs from the master's.
-    pub(super) fn segment_arbitrated(&mut self, frame: FrameId, segment: u32, result: ArbiterResult) {
-        let pending = self.verifications.pending.get(&(frame, segment));
-        let Some(&PendingVerification { lease, first, stage: Stage::Arbitrating(second), .. }) = pending
-        else {
-            return;
-        };
-        self.verifications.counts.verified += u64::from(result.rendered);
-        self.verifications.counts.mismatches += u64::from(second.is_some() || result.first_differs);
-        self.close_verification((frame, segment));
-        let wrong = [Some(first).filter(|_| result.first_differs), second.filter(|_| result.second_differs)];
-        for worker in wrong.into_iter().flatten() {
-            self.ban(worker, lease);
-        }
-    }
-
-    /// Bans a worker once, for rows that differ from the master's rendering.
-    fn ban(&mut self, worker: WorkerId, lease: Lease) {
-        if self.verifications.banned.contains(&worker) {
-            return;
-        }
-        self.verifications.banned.push_back(worker);
-        if self.verifications.banned.len() > MAX_BANNED {
-            self.verifications.banned.pop_front();
-        }
-        let Lease { frame, first_row, row_count, .. } = lease;
-        let reason = format!(
-            "it sent wrong pixels: rows {first_row}+{row_count} of frame {frame} differ from the master's rendering"
-        );
-        self.remove_worker(worker);
-        self.drop_verifications(|pending| pending.first == worker);
-        self.actions.push_back(Action::Ban { worker, reason });
-    }
-
     /// Requeues rows that have left their picture.
     pub(super) fn rows_rejected(&mut self, frame: FrameId, first_row: u32, row_count: u32) {
         let known = self.frames.iter_mut().find(|known| known.id == frame);
@@ -344,7 +296,7 @@ impl Scheduler {
     }
 
     /// Ends a verification and its lease.
-    fn close_verification(&mut self, key: (FrameId, u32)) {
+    pub(super) fn close_verification(&mut self, key: (FrameId, u32)) {
         let Some(pending) = self.verifications.pending.remove(&key) else { return };
         let (frame, segment) = key;
         self.actions.push_back(Action::DropDigest { frame, segment });
@@ -352,7 +304,7 @@ impl Scheduler {
     }
 
     /// Drops the lease of a second rendering that is not needed any more.
-    fn revoke_verification(&mut self, stage: Stage, key: (FrameId, u32)) {
+    pub(super) fn revoke_verification(&mut self, stage: Stage, key: (FrameId, u32)) {
         if let Stage::Leased(holder) = stage
             && let Some(worker) = self.workers.get_mut(&holder)
         {

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rayfarm_tracer::image;
 use tokio::task::JoinHandle;
@@ -15,6 +16,10 @@ const EXTENSIONS: [&str; 4] = ["png", "ppm", "exr", "hdr"];
 const MAX_PENDING: usize = 2;
 /// Largest number of digits of a frame number; more would only be zeros.
 const MAX_DIGITS: usize = 18;
+
+/// Further attempts to write a picture while too many files are open, and the delay between two of them.
+const MAX_RETRIES: u32 = 20;
+const RETRY_DELAY: Duration = Duration::from_millis(250);
 
 /// Word in place of a file name for which no picture is written.
 const NONE: &str = "none";
@@ -164,6 +169,38 @@ pub(crate) fn check_writable(path: &Path) -> Result<(), CommandError> {
     }
 }
 
+/// Saves a picture. A full table of open files is no reason to lose a frame: connections that took its places end.
+fn save(picture: &Picture, path: &Path) -> Result<(), image::ImageError> {
+    with_retries(|| picture.save(path), is_out_of_descriptors, RETRY_DELAY)
+}
+
+/// Whether a picture was not written because the process, or the system, has too many open files.
+fn is_out_of_descriptors(error: &image::ImageError) -> bool {
+    // EMFILE and ENFILE have these numbers on all Unix systems.
+    let numbers: &[i32] = if cfg!(unix) { &[24, 23] } else { &[] };
+    match error {
+        image::ImageError::Write { source, .. } => {
+            source.raw_os_error().is_some_and(|number| numbers.contains(&number))
+        }
+        _ => false,
+    }
+}
+
+/// Repeats `save` while it fails for a reason that passes, up to [`MAX_RETRIES`] times.
+fn with_retries<E>(
+    save: impl Fn() -> Result<(), E>,
+    passes: impl Fn(&E) -> bool,
+    delay: Duration,
+) -> Result<(), E> {
+    for _ in 0..MAX_RETRIES {
+        match save() {
+            Err(error) if passes(&error) => std::thread::sleep(delay),
+            result => return result,
+        }
+    }
+    save()
+}
+
 /// Writer of frames: encodes and writes on blocking threads, at most [`MAX_PENDING`] frames at a time.
 #[derive(Debug)]
 pub(crate) struct FrameWriter {
@@ -198,7 +235,7 @@ impl FrameWriter {
     {
         let Some(path) = self.pattern.path(index) else { return };
         let picture = picture();
-        self.pending.push_back(tokio::task::spawn_blocking(move || picture()?.into().save(&path)));
+        self.pending.push_back(tokio::task::spawn_blocking(move || save(&picture()?.into(), &path)));
     }
 
     /// Waits until all accepted frames are on the disk.
@@ -320,6 +357,29 @@ mod tests {
         assert!(message(folder.path()).contains("is a folder"));
         check_writable(&folder.path().join("a.png")).unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "the check leaves nothing behind");
+    }
+
+    #[test]
+    fn a_picture_is_written_again_while_too_many_files_are_open() {
+        let attempts = std::cell::Cell::new(0);
+        let out_of = |number| image::ImageError::Write {
+            path: PathBuf::from("a.png"),
+            source: std::io::Error::from_raw_os_error(number),
+        };
+        let save = |failures: u32, number: i32| {
+            attempts.set(0);
+            let attempt = || {
+                attempts.set(attempts.get() + 1);
+                if attempts.get() > failures { Ok(()) } else { Err(out_of(number)) }
+            };
+            with_retries(attempt, is_out_of_descriptors, Duration::ZERO).is_ok()
+        };
+        if cfg!(unix) {
+            assert_eq!((save(3, 24), attempts.get()), (true, 4));
+            assert_eq!((save(100, 23), attempts.get()), (false, MAX_RETRIES + 1));
+        }
+        // A full disk is an error at once.
+        assert_eq!((save(1, 28), attempts.get()), (false, 1));
     }
 
     #[tokio::test]

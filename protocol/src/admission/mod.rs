@@ -2,7 +2,7 @@
 //!
 //! An unauthenticated peer must not keep others out. So a new connection is always looked at, the number of pending ones is
 //! bounded for each host and in all, and a connection that has sent nothing gives way to a new one. Connections of this
-//! machine have places of their own, and so have hosts that are known to be honest.
+//! machine have places of their own, and so have hosts that are known.
 
 mod host;
 
@@ -11,9 +11,14 @@ use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use tokio::net::TcpStream;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 pub use host::host_number;
+
+use crate::ProtocolError;
+use crate::limits::FIRST_BYTE_DEADLINE;
 
 /// Time after which a connection that has sent something may give way as well: a handshake of a worker takes a part of that.
 const SLOW: Duration = Duration::from_secs(1);
@@ -163,6 +168,23 @@ impl Place {
     pub fn has_sent(&self) {
         if let Some(connection) = self.admission.lock().connections.get_mut(&self.number) {
             connection.has_sent = true;
+        }
+    }
+
+    /// Waits for the first byte of the connection and leaves it in the stream. Cancel safe.
+    ///
+    /// # Errors
+    /// A connection that is closed, fails, or sends nothing within [`FIRST_BYTE_DEADLINE`].
+    pub async fn wait_for_first_byte(&self, stream: &TcpStream) -> Result<(), ProtocolError> {
+        let late = ProtocolError::Deadline { what: "sending its first byte", limit: FIRST_BYTE_DEADLINE };
+        let first = timeout(FIRST_BYTE_DEADLINE, stream.peek(&mut [0])).await.map_err(|_| late)?;
+        match first {
+            Ok(0) => Err(ProtocolError::Closed { at: "before its first byte" }),
+            Ok(_) => {
+                self.has_sent();
+                Ok(())
+            }
+            Err(source) => Err(ProtocolError::Io { doing: "waiting for the first byte", source }),
         }
     }
 

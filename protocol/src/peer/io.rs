@@ -49,7 +49,7 @@ pub async fn send_reply(
     let message = match reply {
         PeerReply::Begin { size } => ToWorker::AssetBegin { id, size },
         PeerReply::Chunk { offset, bytes } => ToWorker::AssetChunk { id, offset, bytes },
-        PeerReply::Waiting => ToWorker::Ping { nonce: 0 },
+        PeerReply::Waiting { hops } => ToWorker::Ping { nonce: hops },
         PeerReply::Unknown => ToWorker::AssetUnknown { id },
     };
     message.to_envelope()?.write(io).await?;
@@ -82,7 +82,7 @@ pub async fn receive_reply(
         ToWorker::AssetBegin { id: of, size } if of == id => Ok(PeerReply::Begin { size }),
         ToWorker::AssetChunk { id: of, offset, bytes } if of == id => Ok(PeerReply::Chunk { offset, bytes }),
         ToWorker::AssetUnknown { id: of } if of == id => Ok(PeerReply::Unknown),
-        ToWorker::Ping { .. } => Ok(PeerReply::Waiting),
+        ToWorker::Ping { nonce: hops } => Ok(PeerReply::Waiting { hops }),
         _ => Err(ProtocolError::Unexpected { kind, expected: EXPECTED }),
     }
 }

@@ -60,7 +60,10 @@ pub enum PeerReply {
         bytes: Bytes,
     },
     /// Keepalive: the sender waits for more bytes itself.
-    Waiting,
+    Waiting {
+        /// Number of workers between the master and the receiver.
+        hops: u64,
+    },
     /// The sender does not have the asset, or the token is wrong.
     Unknown,
 }

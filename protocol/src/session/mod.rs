@@ -15,6 +15,7 @@
 
 mod body_limit;
 mod reader;
+mod receive_room;
 mod sender;
 mod traffic;
 mod writer;
@@ -33,6 +34,7 @@ use crate::message::Message;
 
 pub use body_limit::BodyLimit;
 pub use reader::Receiver;
+pub use receive_room::ReceiveRoom;
 pub use sender::{SendError, Sender, TrySendError};
 pub use traffic::Traffic;
 
@@ -51,7 +53,7 @@ where
     spawn_limited(io, BodyLimit::unlimited())
 }
 
-/// As [`spawn`], with a limit of received pixels, which the caller raises with each lease. A longer message ends the session.
+/// As [`spawn`], with bounds of received pixels, which the caller sets with each lease and each reply. A longer message ends the session.
 pub fn spawn_limited<S, Out, In>(io: S, pixels: BodyLimit) -> (Sender<Out>, Receiver<In>, Arc<Traffic>)
 where
     S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
@@ -118,7 +120,7 @@ async fn report<In>(
     tokio::time::sleep(CLOSE_GRACE).await;
     let Some(inbox) = failures.upgrade() else { return };
     abort.cancel();
-    let _ = inbox.send(reader::Delivery { message: Err(error), _room: None }).await;
+    let _ = inbox.send(reader::Delivery::failed(error)).await;
 }
 
 /// Whether a message goes through the bulk queue.

@@ -12,10 +12,17 @@ use crate::envelope::{HEADER_BYTES, Kind, read_body_counted, read_header};
 use crate::limits::INBOX_BYTES;
 use crate::message::Message;
 
-/// A received message on its way to the user, with its share of the inbox's bytes.
+/// A received message on its way to the user, with its shares of the inbox's bytes and of the room of all sessions.
 pub(super) struct Delivery<In> {
-    pub(super) message: Result<In, ProtocolError>,
-    pub(super) _room: Option<OwnedSemaphorePermit>,
+    message: Result<In, ProtocolError>,
+    _room: [Option<OwnedSemaphorePermit>; 2],
+}
+
+impl<In> Delivery<In> {
+    /// An error, which takes no room.
+    pub(super) fn failed(error: ProtocolError) -> Self {
+        Self { message: Err(error), _room: [None, None] }
+    }
 }
 
 /// Receives messages of one direction.
@@ -65,7 +72,7 @@ impl<S: AsyncRead, In: Message> Reader<S, In> {
                 let delivery = match read_message(&mut io, &room, &self.traffic, &self.pixels).await {
                     Ok(None) => return,
                     Ok(Some(delivery)) => delivery,
-                    Err(error) => Delivery { message: Err(error), _room: None },
+                    Err(error) => Delivery::failed(error),
                 };
                 let failed = delivery.message.is_err();
                 if self.inbox.send(delivery).await.is_err() || failed {
@@ -94,15 +101,22 @@ async fn read_message<In: Message>(
     if !In::carries(header.kind) {
         return Err(ProtocolError::Unexpected { kind: header.kind, expected: In::EXPECTED });
     }
+    let is_pixels = header.kind == Kind::Pixels;
     let limit = pixels.bytes();
-    if header.kind == Kind::Pixels && header.body_bytes > limit {
-        let (announced, limit) = (header.body_bytes as u64, limit as u64);
-        return Err(ProtocolError::TooLong { kind: header.kind, announced, limit });
+    if is_pixels && header.body_bytes > limit {
+        return Err(ProtocolError::NotLeased { announced: header.body_bytes as u64, limit: limit as u64 });
     }
     // Every body fits: INBOX_BYTES is above the limit of every type, and a u32 can count it.
     let permits = u32::try_from(header.body_bytes).unwrap_or(u32::MAX);
-    let taken = room.clone().acquire_many_owned(permits).await;
+    let in_inbox = room.clone().acquire_many_owned(permits).await.ok();
+    let in_all = if is_pixels { pixels.enter(header.body_bytes).await } else { None };
     traffic.count_received(HEADER_BYTES);
-    let body = read_body_counted(io, header, |bytes| traffic.count_received(bytes)).await?;
-    Ok(Some(Delivery { message: In::from_body(header.kind, body), _room: taken.ok() }))
+    let body = tokio::select! {
+        biased;
+        body = read_body_counted(io, header, |bytes| traffic.count_received(bytes)) => body?,
+        limit = pixels.late(header.body_bytes), if is_pixels => {
+            return Err(ProtocolError::Deadline { what: "sending pixels while other workers wait to send", limit });
+        }
+    };
+    Ok(Some(Delivery { message: In::from_body(header.kind, body), _room: [in_inbox, in_all] }))
 }

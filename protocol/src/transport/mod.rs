@@ -25,4 +25,4 @@ pub use join_line::{JoinLine, JoinLineError, JoinToken};
 pub use private_file::{read_private, write_private};
 pub use private_key::{PrivateKey, PrivateKeyError};
 pub(crate) use proof::Proof;
-pub use security::{MasterSecurity, MasterTrust, WorkerSecurity};
+pub use security::{JoinedWorker, MasterSecurity, MasterTrust, WorkerSecurity};

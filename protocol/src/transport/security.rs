@@ -1,7 +1,10 @@
 //! Whether an end of a connection uses TLS, and with which keys and tokens.
 
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
+
+use tokio::sync::watch;
 
 use super::{JoinLine, JoinToken, PrivateKey};
 use crate::KeyHash;
@@ -16,10 +19,24 @@ pub enum MasterSecurity {
     Tls(Arc<MasterTrust>),
 }
 
-/// Key of a master, and the token of its farm, which can change while the master runs.
+/// Most workers that have joined and are not fetched yet by [`MasterTrust::take_joined`]; beyond that, the oldest is dropped.
+const MAX_JOINED: usize = 1024;
+
+/// Key of a master, and what can change while the master runs: the token of its farm and the revoked keys of workers.
 pub struct MasterTrust {
     key: PrivateKey,
     token: Mutex<JoinToken>,
+    revoked: watch::Sender<BTreeSet<KeyHash>>,
+    joined: Mutex<VecDeque<JoinedWorker>>,
+}
+
+/// A worker that has proved the token.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JoinedWorker {
+    /// Hash of its public key.
+    pub key: KeyHash,
+    /// The name that it sends: any text.
+    pub name: String,
 }
 
 /// Security of the connection from a worker to its master.
@@ -52,7 +69,7 @@ impl MasterSecurity {
 impl MasterTrust {
     /// Joins a key and the farm's first token.
     pub fn new(key: PrivateKey, token: JoinToken) -> Self {
-        Self { key, token: Mutex::new(token) }
+        Self { key, token: Mutex::new(token), revoked: watch::Sender::default(), joined: Mutex::default() }
     }
 
     /// The master's key.
@@ -73,6 +90,36 @@ impl MasterTrust {
     /// Replaces the token. Sessions continue; later handshakes need the new token.
     pub fn set_token(&self, token: JoinToken) {
         *self.token.lock().unwrap_or_else(PoisonError::into_inner) = token;
+    }
+
+    /// Replaces the set of keys whose workers are refused.
+    pub fn set_revoked(&self, keys: BTreeSet<KeyHash>) {
+        self.revoked.send_replace(keys);
+    }
+
+    /// Whether the workers with a key are refused.
+    pub fn is_revoked(&self, key: &KeyHash) -> bool {
+        self.revoked.borrow().contains(key)
+    }
+
+    /// The set of revoked keys, and its changes.
+    pub fn revoked(&self) -> watch::Receiver<BTreeSet<KeyHash>> {
+        self.revoked.subscribe()
+    }
+
+    /// Records that a worker has joined.
+    pub fn add_joined(&self, worker: JoinedWorker) {
+        let mut joined = self.joined.lock().unwrap_or_else(PoisonError::into_inner);
+        if joined.len() >= MAX_JOINED {
+            joined.pop_front();
+        }
+        joined.push_back(worker);
+    }
+
+    /// The workers that have joined since the last call, in order.
+    pub fn take_joined(&self) -> Vec<JoinedWorker> {
+        let mut joined = self.joined.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut *joined).into()
     }
 
     /// The line with which workers join, for an address (HOST:PORT) at which they reach the master.

@@ -49,7 +49,7 @@ fn replies() -> Vec<PeerReply> {
     vec![
         PeerReply::Begin { size: 9 },
         chunk(0, b"abcd"),
-        PeerReply::Waiting,
+        PeerReply::Waiting { hops: 3 },
         chunk(4, b"efghi"),
         PeerReply::Unknown,
     ]

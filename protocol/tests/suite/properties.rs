@@ -3,12 +3,13 @@
 use bytes::Bytes;
 use proptest::collection::vec;
 use proptest::prelude::*;
+use rayfarm_protocol::envelope::Kind;
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::peer::{ShareKey, Token};
 use rayfarm_protocol::session::spawn;
 use rayfarm_protocol::{
     AssetId, Cost, Encoding, FrameAnnounce, FrameId, Hello, KeyHash, Lease, PROTOCOL_VERSION, PixelFormat,
-    PixelsHeader, ToMaster, ToWorker, Welcome, codec, handshake, limits,
+    PixelsHeader, ProtocolError, ToMaster, ToWorker, Welcome, codec, handshake, limits,
 };
 use rayfarm_text::printable;
 use tokio::io::{AsyncWriteExt, duplex};
@@ -110,13 +111,14 @@ fn to_master() -> impl Strategy<Value = ToMaster> {
 
 fn hellos() -> impl Strategy<Value = Hello> {
     let text = "\\PC{0,20}";
-    (text, 1..200u32, text, text).prop_map(|(name, threads, simd, software)| Hello {
-        name,
-        threads,
-        simd,
-        software,
-        tags: Vec::new(),
-    })
+    (text, 1..200u32, text, text, vec("\\PC{0,9}|[\\x00-\\x1f]{1,9}", 0..4))
+        .prop_map(|(name, threads, simd, software, tags)| Hello { name, threads, simd, software, tags })
+}
+
+/// Fails where the text of an error has characters that a log or a terminal must not receive.
+fn expect_printable(error: &ProtocolError) {
+    let text = error.to_string();
+    assert_eq!(printable(&text), text);
 }
 
 /// Sends these bytes to a master, and then to a worker, as a handshake. Returns the worker that the master accepted, if
@@ -131,9 +133,14 @@ async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::
         limit,
         handshake::as_master(&mut ours, &rayfarm_protocol::transport::MasterSecurity::Plain, accept),
     )
-    .await?
-    .ok()
-    .map(|(_, hello)| hello);
+    .await?;
+    let accepted = match accepted {
+        Ok((_, hello)) => Some(hello),
+        Err(error) => {
+            expect_printable(&error);
+            None
+        }
+    };
 
     let (mut ours, mut theirs) = duplex(4096);
     theirs.write_all(input).await.unwrap();
@@ -145,11 +152,12 @@ async fn shake_hands(input: &[u8]) -> Result<Option<Hello>, tokio::time::error::
         software: String::new(),
         tags: Vec::new(),
     };
-    let _ = tokio::time::timeout(
+    let joined = tokio::time::timeout(
         limit,
         handshake::as_worker(&mut ours, &rayfarm_protocol::transport::WorkerSecurity::Plain, &hello),
     )
     .await?;
+    joined.err().iter().for_each(expect_printable);
     Ok(accepted)
 }
 
@@ -267,7 +275,17 @@ proptest! {
         if let Ok(Some(hello)) = block_on(shake_hands(&bytes)) {
             let texts = [&hello.name, &hello.simd, &hello.software];
             prop_assert!(hello.threads > 0);
-            prop_assert!(texts.iter().all(|text| printable(text) == text.as_str()));
+            prop_assert!(texts.into_iter().chain(&hello.tags).all(|text| printable(text) == text.as_str()));
+        }
+    }
+
+    #[test]
+    fn errors_of_arbitrary_bodies_are_printable(body in bytes(0..300), text in "[\\x00-\\x1f]{0,99}") {
+        for kind in Kind::ALL {
+            for body in [body.clone(), Bytes::from(text.clone())] {
+                ToMaster::from_body(kind, body.clone()).err().iter().for_each(expect_printable);
+                ToWorker::from_body(kind, body).err().iter().for_each(expect_printable);
+            }
         }
     }
 

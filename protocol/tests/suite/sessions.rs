@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::envelope::Kind;
-use rayfarm_protocol::session::{Receiver, SendError, Sender, TrySendError, spawn};
+use rayfarm_protocol::session::{
+    BodyLimit, ReceiveRoom, Receiver, SendError, Sender, TrySendError, spawn, spawn_limited,
+};
 use rayfarm_protocol::{AssetId, FrameId, ProtocolError, Reconnect, ToMaster, ToWorker, limits};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
@@ -328,4 +330,48 @@ async fn a_full_inbox_stops_the_reader() {
     }
     drop(peer.await.unwrap());
     assert!(received.recv().await.is_none());
+}
+
+/// A session that receives pixels within a room, and the peer's end of its connection.
+fn receiving(room: &ReceiveRoom) -> (Sender<ToWorker>, Receiver<ToMaster>, BodyLimit, DuplexStream) {
+    let (ours, theirs) = duplex(1 << 16);
+    let limit = BodyLimit::closed(room.clone());
+    let (out, received, _) = spawn_limited::<_, ToWorker, ToMaster>(ours, limit.clone());
+    (out, received, limit, theirs)
+}
+
+#[tokio::test(start_paused = true)]
+async fn pixels_are_accepted_up_to_the_limit_that_is_set() {
+    let room = ReceiveRoom::new(1 << 20);
+    let (_out, mut received, limit, mut peer) = receiving(&room);
+    limit.set(Some(1000));
+    peer.write_all(&wire(&pixels(1, 1000)).await).await.unwrap();
+    assert_eq!(received.recv().await.unwrap().unwrap(), pixels(1, 1000));
+    assert_eq!(room.free_bytes(), 1 << 20, "a message that is delivered takes no room");
+    limit.set(None);
+    peer.write_all(&wire(&pixels(2, 1)).await).await.unwrap();
+    let error = received.recv().await.unwrap().unwrap_err();
+    assert!(matches!(error, ProtocolError::NotLeased { limit: 0, .. }), "{error}");
+    assert!(received.recv().await.is_none());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_session_that_stalls_within_its_pixels_ends_when_others_need_its_room() {
+    let room = ReceiveRoom::new(100_000);
+    let (_slow_out, mut slow, slow_limit, mut slow_peer) = receiving(&room);
+    slow_limit.set(Some(90_000));
+    let bytes = wire(&pixels(1, 90_000)).await;
+    slow_peer.write_all(&bytes[..100]).await.unwrap();
+    // No session waits for room: the deadline of its size applies, which is above ten seconds.
+    tokio::time::sleep(Duration::from_secs(9)).await;
+    let begun = tokio::time::Instant::now();
+    let (_out, mut received, limit, mut peer) = receiving(&room);
+    limit.set(Some(20_000));
+    peer.write_all(&wire(&pixels(2, 20_000)).await).await.unwrap();
+    assert_eq!(received.recv().await.unwrap().unwrap(), pixels(2, 20_000));
+    assert!(begun.elapsed() < Duration::from_secs(1), "{:?}", begun.elapsed());
+    let error = slow.recv().await.unwrap().unwrap_err();
+    assert!(matches!(error, ProtocolError::Deadline { .. }), "{error}");
+    assert!(error.to_string().contains("other workers wait"), "{error}");
+    assert_eq!(room.free_bytes(), 100_000);
 }

@@ -6,10 +6,13 @@
 mod accounting;
 mod bad_input;
 mod bench_farm;
+mod black_pixels;
 mod command_line;
 mod control;
 mod documents;
 mod faults;
+#[cfg(unix)]
+mod full_farm;
 #[cfg(unix)]
 mod launch;
 mod resume;

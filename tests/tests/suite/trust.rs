@@ -147,6 +147,36 @@ fn a_rotation_refuses_the_old_line_and_keeps_connected_workers() {
 }
 
 #[test]
+fn a_revoked_worker_is_disconnected_and_refused_until_it_is_allowed() {
+    let mut farm = Farm::start(3);
+    let line = farm.join_line();
+    let state = farm.scenes.path("state");
+    let run = |action: &[&str]| {
+        let mut command = master();
+        Running::start(command.arg("trust").args(action).arg("--state").arg(&state)).finish()
+    };
+    let revoked = farm.worker("mill", &line, &[]);
+    let _other = farm.worker("barn", &line, &[]);
+    let listed = || run(&["workers"]).expect_success().stdout;
+    wait_until("both are listed", || listed().contains("mill") && listed().contains("barn"));
+    run(&["revoke", "silo"]).expect_failure(2, &["trust workers"]);
+    let answer = run(&["revoke", "mill"]).expect_success();
+    assert!(answer.stderr.contains("trust rotate"), "{answer:?}");
+    // It ends, since the refusal is authenticated.
+    let ended = revoked.finish();
+    assert!(ended.stderr.contains("revoked"), "{ended:?}");
+    farm.worker("mill", &line, &[]).finish().expect_failure(1, &["revoked"]);
+    let key = answer.stdout.split_whitespace().next().unwrap().to_owned();
+    assert!(listed().contains(&format!("{key}  revoked")), "{}", listed());
+    run(&["allow", &key[..8]]).expect_success();
+    run(&["allow", &key]).expect_failure(2, &["not revoked"]);
+    farm.master.wait_for("revoked keys: 0");
+    let _again = farm.worker("mill", &line, &[]);
+    let _third = farm.worker("silo", &line, &[]);
+    farm.master.finish().expect_success();
+}
+
+#[test]
 fn an_open_farm_says_so_and_a_closed_one_prints_no_secret() {
     let scenes = Scenes::new();
     let run = |more: &[&str]| {

@@ -10,8 +10,8 @@ use rayfarm_protocol::{AssetId, KeyHash};
 use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 
-use super::PartialAsset;
 use super::share_keys::ShareKeys;
+use super::{PartialAsset, StallClock};
 
 /// Assets of one session with the master, partial or complete, by id. The master's tokens give access to them.
 #[derive(Debug, Default)]
@@ -19,6 +19,8 @@ pub(crate) struct PeerCache {
     inner: Mutex<Inner>,
     /// Notified when an asset is inserted.
     inserted: Notify,
+    /// Chunks that arrive at this worker.
+    stall_clock: Arc<StallClock>,
 }
 
 /// Result of looking up the asset of a request.
@@ -51,6 +53,11 @@ impl PeerCache {
     /// Removes everything at the beginning of a session.
     pub(crate) fn reset(&self) {
         *self.lock() = Inner::default();
+    }
+
+    /// The clock of the transfers to this worker.
+    pub(crate) fn stall_clock(&self) -> &Arc<StallClock> {
+        &self.stall_clock
     }
 
     /// Sets the next key of the session's tokens. Tokens of the key before the previous one are invalid then.

@@ -5,11 +5,12 @@ mod address_rules;
 mod cache;
 mod client;
 mod partial_asset;
-mod pending;
 mod server;
 mod share_keys;
+mod stall_clock;
 
 pub(crate) use cache::PeerCache;
-pub(crate) use client::{PeerClient, PeerEvent, PeerSource};
+pub(crate) use client::{Fetch, PeerClient, PeerEvent, PeerSource};
 pub(crate) use partial_asset::PartialAsset;
 pub(crate) use server::{PeerServer, serve_peers};
+pub(crate) use stall_clock::StallClock;

@@ -4,8 +4,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use rayfarm_protocol::admission::{Admission, AdmissionLimits, Place};
 use rayfarm_protocol::limits::{
-    FIRST_BYTE_DEADLINE, MAX_CHUNK_BYTES, MAX_PEER_CLIENTS, MAX_PEER_KEEPALIVES, PEER_KEEPALIVE_INTERVAL,
+    MAX_CHUNK_BYTES, MAX_PEER_CLIENTS, MAX_PEER_KEEPALIVES, PEER_KEEPALIVE_INTERVAL,
 };
 use rayfarm_protocol::peer::{self, PeerReply, PeerRequest, receive_request, send_reply};
 use rayfarm_protocol::transport::{Connection, WorkerSecurity};
@@ -17,13 +18,15 @@ use tokio::task::JoinSet;
 use tokio::time::timeout;
 
 use super::cache::Lookup;
-use super::pending::{Pending, Place};
 use super::{PartialAsset, PeerCache};
+
+/// Most connections without a valid token. Known hosts are those that have sent a valid one.
+const LIMITS: AdmissionLimits = AdmissionLimits { unknown: 32, known: 32, here: 32, of_host: 8 };
 
 /// Delay after a failed accept, so that a lasting failure does not become a busy loop.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(100);
 
-/// Most connections with a valid token, served and waiting.
+/// Most connections with a valid token, served and waiting. Further ones are refused, and the master sends those assets.
 const MAX_CONNECTIONS: usize = 64;
 
 /// A running peer server: where it listens, and what it serves.
@@ -37,6 +40,8 @@ pub(crate) struct PeerServer {
 struct Shared {
     cache: Arc<PeerCache>,
     security: WorkerSecurity,
+    /// Connections without a valid token.
+    admission: Admission,
     /// Places of connections with a valid token.
     connections: Semaphore,
     /// Places of transfers.
@@ -48,15 +53,17 @@ pub(crate) async fn serve_peers(listener: TcpListener, cache: Arc<PeerCache>, se
     let shared = Arc::new(Shared {
         cache,
         security,
+        admission: Admission::new(LIMITS),
         connections: Semaphore::new(MAX_CONNECTIONS),
         transfers: Semaphore::new(MAX_PEER_CLIENTS),
     });
-    let pending = Pending::default();
     let mut connections = JoinSet::new();
     loop {
         match listener.accept().await {
             Ok((stream, address)) => {
-                let (shared, place) = (Arc::clone(&shared), pending.enter(address.ip()));
+                // Without a place the connection is closed: its host has as many that are not silent.
+                let Some(place) = shared.admission.enter(address.ip()) else { continue };
+                let shared = Arc::clone(&shared);
                 connections.spawn(async move { serve_connection(stream, address, place, &shared).await });
             }
             Err(error) => {
@@ -72,11 +79,12 @@ async fn serve_connection(stream: TcpStream, address: SocketAddr, place: Place, 
     let accepted = tokio::select! {
         biased;
         () = place.closed() => return,
-        accepted = accept(stream, shared) => accepted,
+        accepted = accept(stream, &place, shared) => accepted,
     };
     drop(place);
     let served = match accepted {
         Ok(Accepted { mut stream, request, client, connection: Some(_connection) }) => {
+            shared.admission.add_known(address.ip());
             serve_request(&mut stream, &request, client, shared).await
         }
         Ok(Accepted { mut stream, request, .. }) => refuse(&mut stream, request.id).await,
@@ -98,12 +106,14 @@ struct Accepted<'a> {
 }
 
 /// Shakes hands and receives the request.
-async fn accept(stream: TcpStream, shared: &Shared) -> Result<Accepted<'_>, ProtocolError> {
+async fn accept<'a>(
+    stream: TcpStream,
+    place: &Place,
+    shared: &'a Shared,
+) -> Result<Accepted<'a>, ProtocolError> {
     // Every message is flushed as a whole, so there is nothing to gather.
     let _ = stream.set_nodelay(true);
-    let late = ProtocolError::Deadline { what: "sending its first byte", limit: FIRST_BYTE_DEADLINE };
-    let first = timeout(FIRST_BYTE_DEADLINE, stream.peek(&mut [0])).await.map_err(|_| late)?;
-    first.map_err(|source| ProtocolError::Io { doing: "waiting for a request", source })?;
+    place.wait_for_first_byte(&stream).await?;
     let mut stream = peer::accept(stream, &shared.security).await?;
     let client = stream.peer_key();
     let request = receive_request(&mut stream).await?;
@@ -127,7 +137,7 @@ async fn serve_request(
     };
     send_reply(stream, request.id, PeerReply::Begin { size: asset.size() as u64 }).await?;
     let offset = usize::try_from(request.offset).unwrap_or(usize::MAX);
-    send_chunks(stream, request.id, &asset, offset).await?;
+    send_chunks(stream, request.id, &asset, offset, &shared.cache).await?;
     close(stream).await
 }
 
@@ -141,6 +151,11 @@ async fn close(stream: &mut (impl AsyncWrite + Unpin)) -> Result<(), ProtocolErr
     stream.shutdown().await.map_err(|source| ProtocolError::Io { doing: "sending", source })
 }
 
+/// A keepalive.
+fn waiting(cache: &PeerCache) -> PeerReply {
+    PeerReply::Waiting { hops: cache.stall_clock().hops_of_next() }
+}
+
 /// Waits until one of the transfers has ended, with keepalives. Returns `None` where none ends in time.
 async fn wait_for_transfer<'a>(
     stream: &mut (impl AsyncWrite + Unpin),
@@ -150,7 +165,7 @@ async fn wait_for_transfer<'a>(
     for _ in 0..MAX_PEER_KEEPALIVES {
         match timeout(PEER_KEEPALIVE_INTERVAL, shared.transfers.acquire()).await {
             Ok(permit) => return Ok(permit.ok()),
-            Err(_) => send_reply(stream, id, PeerReply::Waiting).await?,
+            Err(_) => send_reply(stream, id, waiting(&shared.cache)).await?,
         }
     }
     Ok(None)
@@ -171,7 +186,7 @@ async fn wait_for_asset(
             Lookup::Expected => {}
         }
         if timeout(PEER_KEEPALIVE_INTERVAL, inserted).await.is_err() {
-            send_reply(stream, request.id, PeerReply::Waiting).await?;
+            send_reply(stream, request.id, waiting(cache)).await?;
         }
     }
     Ok(None)
@@ -183,6 +198,7 @@ async fn send_chunks(
     id: AssetId,
     asset: &PartialAsset,
     mut offset: usize,
+    cache: &PeerCache,
 ) -> Result<(), ProtocolError> {
     let mut progress = asset.subscribe();
     while offset < asset.size() {
@@ -205,7 +221,7 @@ async fn send_chunks(
         match timeout(PEER_KEEPALIVE_INTERVAL, progress.changed()).await {
             Ok(Ok(())) => {}
             Ok(Err(_)) => return Ok(()),
-            Err(_) => send_reply(stream, id, PeerReply::Waiting).await?,
+            Err(_) => send_reply(stream, id, waiting(cache)).await?,
         }
     }
     Ok(())

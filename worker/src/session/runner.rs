@@ -14,7 +14,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::idle_timeout::{CHECK_INTERVAL, IdleTimeout};
 use super::state::{Effect, SessionState, Work, WorkResult};
 use super::work::{compile_with_permit, do_work};
-use crate::peer::{PeerClient, PeerEvent, PeerServer};
+use crate::peer::{Fetch, PeerClient, PeerEvent, PeerServer, StallClock};
 use crate::render_pool::{JobReply, PoolJob, RenderPool};
 use crate::renderer::Renderer;
 use crate::scenes::{BuildPool, DiskWriter, SceneLoader, SceneWork};
@@ -101,6 +101,10 @@ where
         sender: sender.clone(),
         work: JoinSet::new(),
         fetches: JoinSet::new(),
+        stall_clock: config
+            .peer_server
+            .as_ref()
+            .map_or_else(Arc::default, |it| it.cache.stall_clock().clone()),
         peer_server: config.peer_server,
         peer_client: config.peer_client,
         compress: config.compress,
@@ -152,6 +156,8 @@ struct SessionRunner<'a, R: Renderer> {
     fetches: JoinSet<()>,
     peer_server: Option<PeerServer>,
     peer_client: PeerClient,
+    /// Chunks of assets that arrive in this session.
+    stall_clock: Arc<StallClock>,
     compress: bool,
     shutdown: &'a ShutdownHandle,
     traffic: Arc<Traffic>,
@@ -204,7 +210,12 @@ impl<R: Renderer> SessionRunner<'_, R> {
             }
             tokio::select! {
                 message = receiver.recv(), if self.work.len() < MAX_WORK => match message {
-                    Some(Ok(message)) => self.state.handle_message(Instant::now(), message),
+                    Some(Ok(message)) => {
+                        if matches!(message, ToWorker::AssetChunk { .. }) {
+                            self.stall_clock.note_chunk();
+                        }
+                        self.state.handle_message(Instant::now(), message);
+                    }
                     Some(Err(error)) => return SessionEnd::Lost(error.to_string()),
                     None => {
                         let why = "the master closed the connection without a disconnect";
@@ -257,8 +268,9 @@ impl<R: Renderer> SessionRunner<'_, R> {
                 }
             }
             Effect::FetchFromPeer { id, size, source } => {
-                let client = self.peer_client.clone();
-                self.fetches.spawn(client.fetch(id, size, source, peer_events.clone()));
+                let (client, clock) = (self.peer_client.clone(), Arc::clone(&self.stall_clock));
+                let fetch = Fetch { id, size, source };
+                self.fetches.spawn(client.fetch(fetch, clock, peer_events.clone()));
             }
             Effect::Serve(id, asset) => {
                 if let Some(server) = &self.peer_server {

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use rayfarm_protocol::limits::MAX_CHUNK_BYTES;
-use rayfarm_protocol::peer::{PeerReply, PeerRequest, ShareKey, Token, receive_reply, send_request};
+use rayfarm_protocol::peer::{PeerReply, PeerRequest, ShareKey, Token};
+use rayfarm_protocol::peer::{receive_reply, receive_request, send_reply, send_request};
 use rayfarm_protocol::transport::WorkerSecurity;
 use rayfarm_protocol::{AssetId, ToMaster, ToWorker};
 use tokio::net::{TcpListener, TcpStream};
@@ -62,6 +63,23 @@ async fn announce_frame(master: &mut FakeMaster, body: &[u8], mesh: &[u8]) {
     assert_eq!(within_limit(master.receive_request()).await, (AssetId::of(mesh), 0, false));
 }
 
+/// A listener that accepts requests of workers and answers them with keepalives only.
+async fn start_stalling_peer() -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let address = listener.local_addr().unwrap();
+    tokio::spawn(async move {
+        while let Ok((mut stream, _)) = listener.accept().await {
+            tokio::spawn(async move {
+                let id = receive_request(&mut stream).await.unwrap().id;
+                while send_reply(&mut stream, id, PeerReply::Waiting { hops: 1 }).await.is_ok() {
+                    tokio::time::sleep(Duration::from_millis(500)).await;
+                }
+            });
+        }
+    });
+    address
+}
+
 async fn send_range(master: &FakeMaster, mesh: &[u8], range: Range<usize>) {
     let id = AssetId::of(mesh);
     let mut offset = range.start;
@@ -95,7 +113,7 @@ async fn begin_transfer(address: SocketAddr, id: AssetId) -> TcpStream {
         loop {
             match within_limit(receive_reply(&mut stream, id)).await.unwrap() {
                 PeerReply::Begin { .. } => return stream,
-                PeerReply::Waiting => {}
+                PeerReply::Waiting { .. } => {}
                 PeerReply::Unknown => break,
                 other => panic!("{other:?}"),
             }
@@ -111,7 +129,7 @@ async fn receive_bytes(stream: &mut TcpStream, id: AssetId, received: &mut Vec<u
                 assert_eq!(offset, received.len() as u64);
                 received.extend_from_slice(&bytes);
             }
-            PeerReply::Waiting => {}
+            PeerReply::Waiting { .. } => {}
             other => panic!("{other:?}"),
         }
     }
@@ -152,7 +170,7 @@ async fn a_request_before_the_first_byte_waits_for_it() {
     let mut stream = TcpStream::connect(address).await.unwrap();
     let request = PeerRequest { id, token: Token::new(&KEY, id, None, 0), offset: 0 };
     send_request(&mut stream, &request).await.unwrap();
-    assert_eq!(within_limit(receive_reply(&mut stream, id)).await.unwrap(), PeerReply::Waiting);
+    assert_eq!(within_limit(receive_reply(&mut stream, id)).await.unwrap(), PeerReply::Waiting { hops: 1 });
     let (mut second, ..) = start_client(&body, &mesh, address, &KEY).await;
     first.send_asset(id, 0).await;
     for master in [&mut first, &mut second] {
@@ -210,4 +228,44 @@ async fn wrong_bytes_tokens_and_addresses_lead_to_a_transfer_from_the_master() {
         master.send_asset(id, 0).await;
         expect_arrival_and_pixels(&mut master, &body, id).await;
     }
+}
+
+#[tokio::test]
+async fn a_peer_that_only_sends_keepalives_delays_an_asset_by_seconds() {
+    let mesh = mesh();
+    let body = scene(1, &[&mesh]);
+    let id = AssetId::of(&mesh);
+    let peer = start_stalling_peer().await;
+    let begun = std::time::Instant::now();
+    let (mut master, ..) = start_client(&body, &mesh, peer, &KEY).await;
+    assert_eq!(within_limit(master.receive_request()).await, (id, 0, true));
+    assert!(begun.elapsed() < Duration::from_secs(10), "{:?}", begun.elapsed());
+    master.send_asset(id, 0).await;
+    expect_arrival_and_pixels(&mut master, &body, id).await;
+}
+
+#[tokio::test]
+async fn idle_connections_to_a_peer_server_keep_no_worker_out() {
+    let (server, address, _task) = start_server(WorkerSecurity::Plain).await;
+    server.cache.set_key(0, KEY);
+    let mesh = mesh();
+    let (id, asset) = (AssetId::of(&mesh), PartialAsset::new(mesh.len()).unwrap());
+    asset.append(&mesh);
+    asset.finish().unwrap();
+    server.cache.insert(id, asset);
+    let mut idle = Vec::new();
+    for _ in 0..200 {
+        idle.push(TcpStream::connect(address).await.unwrap());
+    }
+    // Wrong tokens take no place of a transfer either.
+    let wrong = PeerRequest { id, token: Token::new(&ShareKey([1; 32]), id, None, 0), offset: 0 };
+    for stream in idle.iter_mut().rev().take(10) {
+        let _ = send_request(stream, &wrong).await;
+    }
+    let begun = std::time::Instant::now();
+    let (mut stream, mut received) = (begin_transfer(address, id).await, Vec::new());
+    receive_bytes(&mut stream, id, &mut received, mesh.len()).await;
+    assert!(received == mesh);
+    // Without places that new connections take over, it waits for a deadline of one second for each eight connections.
+    assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
 }

@@ -13,7 +13,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
 
 use super::peers::{KEY, mesh, start_server, within_limit};
-use crate::peer::{PartialAsset, PeerClient, PeerEvent, PeerServer, PeerSource};
+use crate::peer::{Fetch, PartialAsset, PeerClient, PeerEvent, PeerServer, PeerSource};
 
 /// Security of a worker with a new key, and the hash of the key.
 fn new_worker() -> (WorkerSecurity, KeyHash) {
@@ -39,7 +39,8 @@ fn fill(server: &PeerServer, bytes: &[u8]) -> AssetId {
 /// Fetches an asset of the length of [`mesh`].
 async fn fetch(client: &PeerClient, id: AssetId, source: PeerSource) -> Result<Vec<u8>, String> {
     let (events, mut received) = mpsc::channel(4);
-    tokio::spawn(client.clone().fetch(id, mesh().len() as u64, source, events));
+    let fetch = Fetch { id, size: mesh().len() as u64, source };
+    tokio::spawn(client.clone().fetch(fetch, Arc::default(), events));
     let mut fetched = Vec::new();
     while let Some(event) = within_limit(received.recv()).await {
         match event {
@@ -174,14 +175,14 @@ async fn transfers_above_the_limit_wait_with_keepalives() {
         served.push(stream);
     }
     let mut waiting = request(address, id).await;
-    assert_eq!(within_limit(receive_reply(&mut waiting, id)).await.unwrap(), PeerReply::Waiting);
+    assert_eq!(within_limit(receive_reply(&mut waiting, id)).await.unwrap(), PeerReply::Waiting { hops: 1 });
     asset.append(&vec![1; MAX_CHUNK_BYTES]);
     asset.finish().unwrap();
     served.push(waiting);
     for mut stream in served {
         loop {
             match within_limit(receive_reply(&mut stream, id)).await.unwrap() {
-                PeerReply::Waiting | PeerReply::Begin { .. } => {}
+                PeerReply::Waiting { .. } | PeerReply::Begin { .. } => {}
                 PeerReply::Chunk { offset, bytes } => {
                     assert_eq!((offset, bytes.len()), (0, MAX_CHUNK_BYTES));
                     break;

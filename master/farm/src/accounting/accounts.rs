@@ -182,6 +182,7 @@ impl Accounts {
             Event::ResumeRequested { worker } => self.pause(now, worker, false),
             Event::FrameRequested { .. }
             | Event::RequestsDropped { .. }
+            | Event::BanLifted { .. }
             | Event::WorkerDrains { .. }
             | Event::DrainRequested { .. }
             | Event::Pong { .. }

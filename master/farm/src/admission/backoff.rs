@@ -12,7 +12,7 @@ use crate::host_table::HostTable;
 const FREE_FAILURES: u32 = 4;
 /// First delay. It doubles with each further failure.
 const FIRST_DELAY: Duration = Duration::from_millis(125);
-/// Longest delay: with it an honest worker still completes its handshake of at most five seconds.
+/// Longest delay: with it a worker still completes its handshake, of at most five seconds.
 const MAX_DELAY: Duration = Duration::from_secs(2);
 /// Time after which the failures of a host are forgotten.
 const FORGET_AFTER: Duration = Duration::from_secs(60);

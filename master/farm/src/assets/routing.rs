@@ -20,6 +20,9 @@ pub(crate) const MAX_DIRECT_BYTES: usize = MAX_CHUNK_BYTES;
 /// server.
 const MAX_PEER_CLIENTS: usize = 2;
 
+/// Time in which a worker that turns to the master begins to receive, and its followers after it.
+const RESUME_TIME: Duration = Duration::from_secs(5);
+
 /// The source from which a worker fetches an asset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssetSource {
@@ -33,6 +36,8 @@ pub enum AssetSource {
 #[derive(Clone, Copy, Debug)]
 struct Copy {
     source: AssetSource,
+    /// Time at which the worker turned to the master because its source had failed.
+    resumed: Option<Duration>,
     /// Time at which the asset became complete; `None` while it is in transfer.
     complete: Option<Duration>,
 }
@@ -61,18 +66,33 @@ impl AssetRouting {
         again: bool,
         reaches: impl Fn(WorkerId) -> bool,
     ) -> AssetSource {
-        let source = if again { self.drop_source(worker, id) } else { self.best(now, worker, id, reaches) };
-        self.copies.entry(id).or_default().insert(worker, Copy { source, complete: None });
+        let source =
+            if again { self.drop_source(now, worker, id) } else { self.best(now, worker, id, reaches) };
+        self.copies
+            .entry(id)
+            .or_default()
+            .insert(worker, Copy { source, resumed: again.then_some(now), complete: None });
         source
     }
 
-    /// Removes the failed source of a worker from the peers.
-    fn drop_source(&mut self, worker: WorkerId, id: AssetId) -> AssetSource {
-        let copy = self.copies.get(&id).and_then(|copies| copies.get(&worker));
-        if let Some(Copy { source: AssetSource::Worker(source), .. }) = copy {
-            self.peers.remove(source);
+    /// Removes the worker that has failed a worker from the peers.
+    fn drop_source(&mut self, now: Duration, worker: WorkerId, id: AssetId) -> AssetSource {
+        if let Some(failed) = self.failed_source(now, worker, id) {
+            self.peers.remove(&failed);
         }
         AssetSource::Master
+    }
+
+    /// The worker because of which another one does not receive an asset: its source, except where that one has just turned to
+    /// the master itself, because its own source has failed. Workers wait the longer, the farther they are from the master, so
+    /// the worker next to the one at fault reports first.
+    fn failed_source(&self, now: Duration, worker: WorkerId, id: AssetId) -> Option<WorkerId> {
+        let copies = self.copies.get(&id)?;
+        let AssetSource::Worker(source) = copies.get(&worker)?.source else { return None };
+        let resumes = |copy: &Copy| {
+            copy.complete.is_none() && copy.resumed.is_some_and(|at| now.saturating_sub(at) < RESUME_TIME)
+        };
+        (!copies.get(&source).is_some_and(resumes)).then_some(source)
     }
 
     /// The reachable peer with the fewest followers; of equals a complete copy, then the lowest number.
@@ -156,6 +176,25 @@ mod tests {
         assert_eq!(route(&mut routing, 4, false), AssetSource::Worker(WorkerId(3)));
         (1..=4).for_each(|worker| routing.remove_worker(WorkerId(worker)));
         assert!(routing.copies.is_empty() && routing.peers.is_empty());
+    }
+
+    #[test]
+    fn a_worker_whose_own_source_has_failed_is_not_at_fault() {
+        let mut routing = with_peers(5);
+        for worker in 1..=3 {
+            route(&mut routing, worker, false);
+        }
+        // Worker 1 stalls: worker 2 reports it, and worker 3 reports worker 2 soon after.
+        let report = |routing: &mut AssetRouting, worker: u64, at: Duration| {
+            routing.route(at, WorkerId(worker), ID, true, |_| true)
+        };
+        report(&mut routing, 2, NOW);
+        report(&mut routing, 3, NOW + Duration::from_millis(500));
+        assert_eq!(routing.peers, [2, 3, 4, 5].map(WorkerId).into());
+        // Worker 4 follows worker 2, which keeps its bytes: it is at fault when its time to resume is over.
+        assert_eq!(route(&mut routing, 4, false), AssetSource::Worker(WorkerId(2)));
+        report(&mut routing, 4, NOW + RESUME_TIME);
+        assert_eq!(routing.peers, [3, 4, 5].map(WorkerId).into());
     }
 
     #[test]

@@ -68,7 +68,7 @@ impl Driver {
     ) -> Result<(), AnswerError> {
         let PixelsHeader { lease, encoding, cost } = header;
         let status = match self.lock().sessions.get_mut(worker) {
-            Some(session) => session.leases.check_reply(&lease),
+            Some(session) => session.check_reply(&lease),
             None => LeaseStatus::Revoked,
         };
         match status {

@@ -9,7 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
+use rayfarm_protocol::limits::{MAX_PIXELS_BYTES, MAX_RECEIVING_BYTES};
+use rayfarm_protocol::session::ReceiveRoom;
 use rayfarm_protocol::transport::MasterSecurity;
 use rayfarm_protocol::{FrameAnnounce, FrameId, codec};
 use rayfarm_scheduler::{Event, Scheduler};
@@ -70,6 +71,8 @@ pub(crate) struct Driver {
     pub(crate) tickets: Tickets,
     /// Connections before their sessions.
     pub(crate) door: Door,
+    /// Room for the pixels that sessions receive.
+    pub(crate) receiving: ReceiveRoom,
     /// Most workers at a time.
     max_workers: usize,
 }
@@ -130,7 +133,8 @@ impl Driver {
         arbiter_queue: mpsc::UnboundedSender<Dispute>,
     ) -> Result<Self, FarmError> {
         let key = match options.verify_percent {
-            0 => [0; 32],
+            // Segments of untrusted workers are sampled all the same.
+            0 => random().unwrap_or_default(),
             _ => random().map_err(FarmError::Random)?,
         };
         let scheduler = Scheduler::new(options.policy, MAX_PIXELS_BYTES as u64)
@@ -168,6 +172,7 @@ impl Driver {
             tickets: Tickets::new(secret.as_ref(), options.local_workers),
             secret,
             door: Door::default(),
+            receiving: ReceiveRoom::new(MAX_RECEIVING_BYTES),
             max_workers: descriptors::max_workers(),
         })
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rayfarm_protocol::limits::MAX_PIXELS_BYTES;
 use rayfarm_protocol::{FrameId, Lease, ToWorker};
-use rayfarm_scheduler::{Action, Cost, Event, Reconnect, WorkerId};
+use rayfarm_scheduler::{Action, Cost, Event, Reconnect, Verification, WorkerId};
 
 use super::{Driver, Inner, Request};
 use crate::error::FarmError;
@@ -45,9 +45,9 @@ impl Driver {
             Action::Grant { worker, lease } => {
                 let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
-                    session.pixels.allow(bytes);
                     session.causes.allow_failure();
-                    session.leases.grant(lease);
+                    session.leases.grant(lease, bytes);
+                    session.bound_pixels();
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
             }
@@ -76,9 +76,9 @@ impl Driver {
             Action::Verify { worker, lease } => {
                 let bytes = pixel_bytes(inner, &lease);
                 if let Some(session) = inner.sessions.get_mut(worker) {
-                    session.pixels.allow(bytes);
                     session.causes.allow_failure();
-                    session.leases.verify(lease);
+                    session.leases.verify(lease, bytes);
+                    session.bound_pixels();
                     events.extend(send(inner, worker, ToWorker::Segment(lease)));
                 }
             }
@@ -89,7 +89,8 @@ impl Driver {
     }
 
     fn frame_done(&self, inner: &mut Inner, frame: FrameId, cost: Cost, elapsed: Duration) {
-        if inner.scheduler.verification().percent > 0 {
+        let Verification { percent, picked, .. } = inner.scheduler.verification();
+        if percent > 0 || picked > 0 {
             inner.delivered.add(frame, self.framebuffers.workers(frame));
         }
         let picture = inner.requests.remove(&frame).zip(self.framebuffers.finish(frame));

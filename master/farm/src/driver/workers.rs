@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
-use rayfarm_protocol::Hello;
 use rayfarm_protocol::handshake::Refusal;
+use rayfarm_protocol::transport::{JoinedWorker, MasterSecurity};
+use rayfarm_protocol::{Hello, KeyHash};
 use rayfarm_scheduler::{Event, Reconnect, WorkerId};
+use tokio_util::sync::CancellationToken;
 
 use super::{Driver, Inner, Run};
 use crate::assets::TransferStatus;
@@ -45,10 +47,49 @@ impl Driver {
     pub(crate) fn join(&self, worker: WorkerId, session: Session) {
         let Hello { name, threads, .. } = session.hello.clone();
         let host = host(session.address.ip());
+        // A remote worker has a key only where it has proved the token.
+        let trusted = session.identity.is_local() || session.key.is_some();
+        let key = session.identity.key();
+        if let (MasterSecurity::Tls(trust), Some(key)) = (&self.security, key) {
+            trust.add_joined(JoinedWorker { key, name: name.clone() });
+        }
         let mut inner = self.lock();
         inner.sessions.insert(worker, session);
-        self.drive(&mut inner, Event::WorkerJoined { worker, threads, host });
+        self.drive(&mut inner, Event::WorkerJoined { worker, threads, host, trusted });
         inner.accounts.name(worker, &name);
+        drop(inner);
+        // The key may have been revoked since the handshake.
+        if key.is_some_and(|key| self.is_revoked(&key)) {
+            self.end(worker, "the key of this worker is revoked");
+        }
+    }
+
+    /// Disconnects the workers whose keys are revoked, whenever the set of revoked keys changes, until `stop`.
+    pub(crate) async fn end_revoked(&self, stop: CancellationToken) {
+        let MasterSecurity::Tls(trust) = &self.security else { return };
+        let mut revoked = trust.revoked();
+        while let Some(Ok(())) = stop.run_until_cancelled(revoked.changed()).await {
+            let keys = revoked.borrow_and_update().clone();
+            let workers = self
+                .lock()
+                .sessions
+                .ids_with(|session| session.identity.key().is_some_and(|key| keys.contains(&key)));
+            for worker in workers {
+                self.end(worker, "the key of this worker is revoked");
+            }
+        }
+    }
+
+    fn is_revoked(&self, key: &KeyHash) -> bool {
+        matches!(&self.security, MasterSecurity::Tls(trust) if trust.is_revoked(key))
+    }
+
+    /// Disconnects a worker for good.
+    fn end(&self, worker: WorkerId, reason: &str) {
+        let mut inner = self.lock();
+        inner.sessions.log_disconnect(worker, reason);
+        inner.sessions.disconnect(worker, reason, Reconnect::Never);
+        self.drive(&mut inner, Event::WorkerLeft { worker });
     }
 
     /// Handles a user's command to a worker. Returns whether the worker is connected.
@@ -76,7 +117,14 @@ impl Driver {
 
     /// Lifts the bans that `which` selects. Returns the identities.
     pub(crate) fn allow(&self, which: impl Fn(&PastWorker) -> bool) -> Vec<Identity> {
-        self.lock().sessions.allow(which)
+        let mut inner = self.lock();
+        let allowed = inner.sessions.allow(which);
+        for identity in &allowed {
+            if let Identity::Remote { address, .. } = identity {
+                self.drive(&mut inner, Event::BanLifted { host: host(*address) });
+            }
+        }
+        allowed
     }
 
     /// The reason to refuse a worker in its handshake; `None`: it is admitted.
@@ -90,6 +138,11 @@ impl Driver {
                 "worker {} is banned from this master; the ban ends when the master allows the worker or exits",
                 identity.name()
             )));
+        }
+        if identity.key().is_some_and(|key| self.is_revoked(&key)) {
+            return Some(Refusal::Final(
+                "the key of this worker is revoked; `rayfarm-master trust allow` admits it again".to_owned(),
+            ));
         }
         // One host must not take all places: they are for workers that deliver. A refusal for lack of room passes.
         let of_host = unproven(&inner).filter(|(_, session)| identity.is_of_host(session.address.ip()));
@@ -162,7 +215,7 @@ impl Driver {
             rows: progress.map_or(0, |progress| progress.rows),
             wrong_frames: inner.delivered.wrong().count(),
             verification: Some(inner.scheduler.verification())
-                .filter(|verification| verification.percent > 0),
+                .filter(|verification| verification.percent > 0 || verification.picked > 0),
         }
     }
 

@@ -57,7 +57,7 @@ impl Budget {
         }
     }
 
-    /// Counts a message. `has_asset` tells whether the scene has an asset.
+    /// Counts a message. `has_asset` states whether the scene has an asset.
     ///
     /// # Errors
     /// A message beyond the budget.

@@ -57,6 +57,14 @@ impl Identity {
         }
     }
 
+    /// Hash of the public key of a worker that this master has not started, where connections use TLS.
+    pub(crate) fn key(&self) -> Option<KeyHash> {
+        match self {
+            Self::Local(_) => None,
+            Self::Remote { key, .. } => *key,
+        }
+    }
+
     /// The name to display.
     pub(crate) fn name(&self) -> String {
         match self {

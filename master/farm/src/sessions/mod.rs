@@ -76,6 +76,11 @@ impl Sessions {
         self.sessions.keys().copied().collect()
     }
 
+    /// The workers whose sessions match.
+    pub(crate) fn ids_with(&self, which: impl Fn(&Session) -> bool) -> Vec<WorkerId> {
+        self.sessions.iter().filter(|(_, session)| which(session)).map(|(&id, _)| id).collect()
+    }
+
     /// Render threads of all workers.
     pub(crate) fn threads(&self) -> u32 {
         self.sessions.values().fold(0, |sum, session| sum.saturating_add(session.hello.threads))

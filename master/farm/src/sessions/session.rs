@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_protocol::session::{BodyLimit, Sender, Traffic};
-use rayfarm_protocol::{Hello, KeyHash, Reconnect, ToWorker};
+use rayfarm_protocol::{Hello, KeyHash, Lease, Reconnect, ToWorker};
 use tokio::task::JoinHandle;
 
 use super::causes::Causes;
 use super::identity::Identity;
-use super::lease_book::LeaseBook;
+use super::lease_book::{LeaseBook, LeaseStatus};
 use crate::assets::peer_endpoint::PeerEndpoint;
 use crate::assets::transfers::Transfers;
 use crate::bucket::Rate;
@@ -51,7 +51,7 @@ pub(crate) struct Session {
     pub(super) sender: Sender<ToWorker>,
     pub(super) traffic: Arc<Traffic>,
     /// Limit of the pixels that it may send.
-    pub(crate) pixels: BodyLimit,
+    pixels: BodyLimit,
     /// What it may report.
     pub(crate) causes: Causes,
     /// Log lines about its failures.
@@ -90,6 +90,18 @@ impl Session {
         self.causes.ping(nonce);
         let [_, last] = self.received_at_pings;
         self.received_at_pings = [last, self.traffic.received_bytes()];
+    }
+
+    /// Bounds the pixels that it may send by its leases. Called after each new lease, before the lease is sent.
+    pub(crate) fn bound_pixels(&self) {
+        self.pixels.set(self.leases.largest());
+    }
+
+    /// Checks a reply against its leases.
+    pub(crate) fn check_reply(&mut self, lease: &Lease) -> LeaseStatus {
+        let status = self.leases.check_reply(lease);
+        self.bound_pixels();
+        status
     }
 
     /// Whether bytes have arrived since the last ping but one, whole messages or not.

@@ -160,7 +160,7 @@ async fn pixels_of_another_workers_lease_are_refused() {
     sender.send(ToMaster::Pixels { header, bytes: Bytes::from_static(&[0; 3]) }).await.unwrap();
     let answer = receiver.recv().await.unwrap().unwrap();
     // Without any lease no pixels may be announced: they are refused before their lease is known.
-    assert!(matches!(answer, ToWorker::Disconnect { reason, .. } if reason.contains("at most 0")));
+    assert!(matches!(answer, ToWorker::Disconnect { reason, .. } if reason.contains("need at most 0")));
     fake_worker::start(farm.address(), Script::Correct).await;
     render(&mut farm, view()).await;
 }

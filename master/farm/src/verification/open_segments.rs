@@ -60,9 +60,7 @@ impl OpenSegments {
         // latest one counts.
         let (first, other) = (segment.first.worker, second.worker);
         segment.second = Some(second);
-        tracing::warn!(
-            "{first} and {other} have sent different pixels of {lease}; the master renders them itself"
-        );
+        tracing::warn!("{first} and {other} have sent different pixels of {lease}");
         Finding::Different
     }
 }

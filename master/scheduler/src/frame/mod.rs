@@ -54,6 +54,8 @@ pub(super) struct Frame {
     pub(super) segments: BTreeMap<u32, Segment>,
     next_segment: u32,
     pub(super) rows_done: u32,
+    /// Rows that were leased to workers on probation, each time that they were.
+    pub(super) rows_on_probation: u32,
     /// Refusals of this frame per worker since the last finished segment.
     refusals: BTreeMap<WorkerId, u32>,
 }
@@ -76,6 +78,7 @@ impl Frame {
             segments: BTreeMap::new(),
             next_segment: 0,
             rows_done: 0,
+            rows_on_probation: 0,
             refusals: BTreeMap::new(),
         }
     }

@@ -3,7 +3,7 @@
 //! A line of a script is `MILLISECONDS COMMAND`. Commands, with `W` a worker's number:
 //!
 //! - `frame N WxH`, `drop-requests NEXT`
-//! - `join W THREADS [HOST]` (by default each worker has a host of its own), `leave W`
+//! - `join W THREADS [HOST]` (by default each worker has a host of its own), `join-untrusted W THREADS`, `leave W`
 //! - `drain W` (by the worker), `request-drain W` (by the master's user), `pause W`, `resume W`
 //! - `done W FRAME.SEGMENT`, `fail W FRAME`, `reject FRAME FIRST+ROWS`
 //! - `verified W FRAME.SEGMENT same|different`, `arbitrated FRAME.SEGMENT right|wrong right|wrong` (first, second)
@@ -65,13 +65,13 @@ fn event(command: &str, granted: &BTreeMap<(WorkerId, FrameId, u32), Lease>) -> 
             Event::FrameRequested { frame, width: width as u32, height, row_bytes, tile_rows: 8 }
         }
         ["drop-requests", next] => Event::RequestsDropped { next: FrameId(number(next)) },
-        ["join", _, threads] => {
-            let host = HostId(1000 + u128::from(worker.0));
-            Event::WorkerJoined { worker, threads: number(threads) as u32, host }
+        [join @ ("join" | "join-untrusted"), _, threads] => {
+            let (host, trusted) = (HostId(1000 + u128::from(worker.0)), join == "join");
+            Event::WorkerJoined { worker, threads: number(threads) as u32, host, trusted }
         }
         ["join", _, threads, host] => {
             let host = HostId(number(host).into());
-            Event::WorkerJoined { worker, threads: number(threads) as u32, host }
+            Event::WorkerJoined { worker, threads: number(threads) as u32, host, trusted: true }
         }
         ["leave", _] => Event::WorkerLeft { worker },
         ["drain", _] => Event::WorkerDrains { worker },

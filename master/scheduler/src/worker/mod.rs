@@ -21,6 +21,8 @@ const FIRST_BACKOFF: Duration = Duration::from_secs(1);
 const MAX_BACKOFF: Duration = Duration::from_secs(30);
 /// First back-off of a worker with an overdue lease; doubled with each consecutive timeout.
 const FIRST_LATE_BACKOFF: Duration = Duration::from_millis(250);
+/// Consecutive timeouts up to which a trusted worker counts as one that renders: it backs off for a second by then.
+const MAX_VOUCHING_TIMEOUTS: u32 = 3;
 /// The slack of a deadline is the largest of: the predicted time, times (this factor times the recent overrun factor,
 /// minus 1)...
 const SLACK_FACTOR: f64 = 1.25;
@@ -49,6 +51,8 @@ pub(super) enum Service {
 pub(super) struct Worker {
     pub(super) threads: u32,
     pub(super) host: HostId,
+    /// Whether the shell vouches for it.
+    pub(super) trusted: bool,
     pub(super) leases: BTreeMap<(FrameId, u32), ActiveLease>,
     /// Leases that were revoked because they were overdue. A late answer is still accepted.
     pub(super) overdue: BTreeMap<(FrameId, u32), ActiveLease>,
@@ -76,10 +80,11 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    pub(super) fn new(threads: u32, host: HostId, now: Duration) -> Self {
+    pub(super) fn new(threads: u32, host: HostId, trusted: bool, now: Duration) -> Self {
         Self {
             threads: threads.max(1),
             host,
+            trusted,
             leases: BTreeMap::new(),
             overdue: BTreeMap::new(),
             stale: false,
@@ -103,6 +108,13 @@ impl Worker {
     /// Whether it may get leases.
     pub(super) fn is_ready(&self, now: Duration) -> bool {
         self.service == Service::Active && !self.is_suspect(now) && self.backoff_until(now).is_none()
+    }
+
+    /// Whether it is trusted and renders, so that untrusted workers are on probation. A late lease or two, which load on its
+    /// machine may cause, do not end that.
+    pub(super) fn vouches(&self, now: Duration) -> bool {
+        let renders = self.failures == 0 && self.timeouts <= MAX_VOUCHING_TIMEOUTS;
+        self.trusted && self.service == Service::Active && !self.is_suspect(now) && renders
     }
 
     /// Whether a ping is unanswered for longer than [`SUSPECT_AFTER`].
@@ -164,13 +176,16 @@ impl Worker {
     ) -> Option<f64> {
         let held_for = now.saturating_sub(active.granted_at).as_secs_f64();
         // No thread can have traced for longer than the lease was held.
-        let traced =
+        let reported =
             Duration::from_nanos(cost.trace_ns).as_secs_f64().min(held_for * f64::from(self.threads));
-        let work = self.speed.of_thread().map(|rate| rate * traced).filter(|&work| work > 0.0);
         // Its first segment waited for the scene, and a segment that was granted while it was idle waited for the
         // network.
         let had_work = self.segments_done > 0 && active.granted_at < self.last_done_at;
         let busy = had_work.then(|| now.saturating_sub(self.last_done_at).as_secs_f64());
+        // A shorter time than between its replies is not believed of an untrusted worker: one thread at least traced.
+        let is_doubted = self.segments_done > 0 && !self.trusted;
+        let traced = if is_doubted { reported.max(busy.unwrap_or(held_for)) } else { reported };
+        let work = self.speed.of_thread().map(|rate| rate * traced).filter(|&work| work > 0.0);
         self.speed.observe(Observation { work: active.work, traced, busy }, half_life);
         work
     }

@@ -21,7 +21,7 @@ fn record(worker: &mut Worker, segment: u32, at: Duration) -> Lease {
 
 #[test]
 fn the_arrival_rate_counts_where_it_is_below_the_tracing_rate() {
-    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), true, Duration::ZERO);
     let leases = [0, 1, 2].map(|segment| record(&mut worker, segment, Duration::ZERO));
     let cost = Cost { trace_ns: 1_000_000_000, ..Cost::default() };
     worker.finish(SECOND * 20, leases[0], cost, SECOND);
@@ -33,7 +33,7 @@ fn the_arrival_rate_counts_where_it_is_below_the_tracing_rate() {
 
 #[test]
 fn a_worker_with_an_overdue_lease_backs_off_until_it_answers() {
-    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), true, Duration::ZERO);
     let lease = record(&mut worker, 0, Duration::ZERO);
     assert_eq!(worker.next_deadline(), Some(SECOND));
     assert_eq!(worker.time_out(SECOND), [(FrameId(1), 0)]);
@@ -45,7 +45,7 @@ fn a_worker_with_an_overdue_lease_backs_off_until_it_answers() {
 
 #[test]
 fn a_lease_is_finished_once_and_only_as_granted() {
-    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), true, Duration::ZERO);
     let lease = record(&mut worker, 0, Duration::ZERO);
     assert!(worker.finish(SECOND, Lease { attempt: 1, ..lease }, Cost::default(), SECOND).is_none());
     assert!(worker.finish(SECOND, lease, Cost::default(), SECOND).is_some());
@@ -54,7 +54,7 @@ fn a_lease_is_finished_once_and_only_as_granted() {
 
 #[test]
 fn backoffs_double_up_to_a_limit_and_end_with_success() {
-    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), true, Duration::ZERO);
     let mut now = Duration::ZERO;
     let mut backoffs = Vec::new();
     for _ in 0..7 {
@@ -72,7 +72,7 @@ fn backoffs_double_up_to_a_limit_and_end_with_success() {
 
 #[test]
 fn only_the_open_ping_measures_the_round_trip() {
-    let mut worker = Worker::new(1, HostId(1), Duration::ZERO);
+    let mut worker = Worker::new(1, HostId(1), true, Duration::ZERO);
     worker.mark_pinged(SECOND, 5);
     worker.pong(SECOND * 2, 4);
     assert_eq!(worker.round_trip, None);

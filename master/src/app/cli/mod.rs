@@ -46,7 +46,7 @@ pub(crate) use quality_control::{ErrorArgs, QualityControlArgs};
 pub(crate) use shell::{CompletionsArgs, ManArgs, Program};
 pub(crate) use simulate::{Profile, SimulateArgs};
 pub(crate) use tradeoff::TradeoffArgs;
-pub(crate) use trust::{TrustAction, TrustArgs};
+pub(crate) use trust::{MasterArgs, TrustAction, TrustArgs};
 
 /// The command that turns the master into a worker.
 pub(crate) const LOCAL_WORKER: &str = "local-worker";

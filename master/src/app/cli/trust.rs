@@ -29,6 +29,32 @@ pub(crate) enum TrustAction {
         #[command(flatten)]
         master: MasterArgs,
     },
+    /// List the workers that have joined, by key, name and time, the most recent first, and the revoked keys.
+    Workers(StateArgs),
+    /// Refuse a worker for good, by its key: a master that runs disconnects it.
+    Revoke {
+        /// Name of the worker, its key, or at least eight first digits of the key.
+        #[arg(value_name = "NAME|KEY")]
+        worker: String,
+        #[command(flatten)]
+        state: StateArgs,
+    },
+    /// Admit a revoked worker again.
+    Allow {
+        /// Name of the worker, its key, or at least eight first digits of the key.
+        #[arg(value_name = "NAME|KEY")]
+        worker: String,
+        #[command(flatten)]
+        state: StateArgs,
+    },
+}
+
+/// The state folder of a master.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct StateArgs {
+    /// Folder with the key and the token of the master; without it, in the user's state folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
 }
 
 /// The master whose join line is meant.

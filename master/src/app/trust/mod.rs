@@ -1,20 +1,25 @@
 //! Trust between this master and the workers of other machines: key, token and join line.
 //!
 //! The key and the token are made at the first start that needs them, and stay in the state folder, so that a worker that has joined
-//! once joins again. Their files have mode 0600.
+//! once joins again. Their files have mode 0600. The folder has the list of the workers that have joined and of the revoked keys as
+//! well.
 
 #[cfg(feature = "discovery")]
 mod announcement;
+mod date;
 mod state;
+mod workers;
 
 use rayfarm_farm::Entrance;
 use rayfarm_protocol::transport::{MasterSecurity, MasterTrust};
 use tokio_util::sync::CancellationToken;
 
-use crate::app::cli::{FarmArgs, TrustAction, TrustArgs};
+use crate::app::cli::{FarmArgs, MasterArgs, TrustAction, TrustArgs};
 use crate::error::CommandError;
 
+use date::utc;
 use state::MasterState;
+use workers::{KnownWorker, WorkerFiles};
 
 /// Whether and how the connections of a farm are secured: with TLS where other machines can connect, unless the user refuses it.
 ///
@@ -78,17 +83,72 @@ impl Announced {
 /// # Errors
 /// A state folder or a file in it that cannot be used.
 pub(crate) fn run(args: &TrustArgs) -> Result<(), CommandError> {
-    let (TrustAction::Show(master) | TrustAction::Rotate { master, .. }) = &args.action;
-    let state = MasterState::at(master.state.as_deref())?;
-    if let TrustAction::Rotate { key, .. } = args.action {
-        state.rotate(key)?;
-        let effect = if key {
-            "the key and the token are new: masters that run keep the old key until they end"
-        } else {
-            "the token is new: connected workers stay, and the old join line is refused"
-        };
-        tracing::info!("{effect}");
+    match &args.action {
+        TrustAction::Show(master) => show(master),
+        TrustAction::Rotate { key, master } => rotate(*key, master).and_then(|()| show(master)),
+        TrustAction::Workers(state) => list_workers(&MasterState::at(state.state.as_deref())?.workers()),
+        TrustAction::Revoke { worker, state } => {
+            revoke(&MasterState::at(state.state.as_deref())?.workers(), worker)
+        }
+        TrustAction::Allow { worker, state } => {
+            allow(&MasterState::at(state.state.as_deref())?.workers(), worker)
+        }
     }
+}
+
+/// Makes a new token, and a new key if requested.
+fn rotate(key: bool, master: &MasterArgs) -> Result<(), CommandError> {
+    MasterState::at(master.state.as_deref())?.rotate(key)?;
+    let effect = if key {
+        "the key and the token are new: masters that run keep the old key until they end"
+    } else {
+        "the token is new: connected workers stay, and the old join line is refused"
+    };
+    tracing::info!("{effect}");
+    Ok(())
+}
+
+/// Prints the workers that have joined, and the revoked keys.
+fn list_workers(files: &WorkerFiles) -> Result<(), CommandError> {
+    let (joined, mut revoked) = (files.joined().map_err(unreadable)?, files.revoked().map_err(unreadable)?);
+    for KnownWorker { key, name, first, last } in joined {
+        let state = if revoked.remove(&key) { "revoked" } else { "allowed" };
+        println!("{key}  {state}  first {}  last {}  {name}", utc(first), utc(last));
+    }
+    for key in revoked {
+        println!("{key}  revoked");
+    }
+    Ok(())
+}
+
+fn revoke(files: &WorkerFiles, worker: &str) -> Result<(), CommandError> {
+    let key = files.find(worker).map_err(CommandError::WrongInput)?;
+    files.revoke(key).map_err(|error| CommandError::Failed(format!("the key is not revoked: {error}")))?;
+    println!("{key}  revoked");
+    tracing::info!(
+        "a master that runs disconnects the worker within a second; a machine with its join line can still join with another \
+         key, until `rayfarm-master trust rotate`"
+    );
+    Ok(())
+}
+
+fn allow(files: &WorkerFiles, worker: &str) -> Result<(), CommandError> {
+    let key = files.find(worker).map_err(CommandError::WrongInput)?;
+    let failed = |error| CommandError::Failed(format!("the key is still revoked: {error}"));
+    if !files.allow(key).map_err(failed)? {
+        return Err(CommandError::WrongInput(format!("the key {key} is not revoked")));
+    }
+    println!("{key}  allowed");
+    Ok(())
+}
+
+fn unreadable(error: std::io::Error) -> CommandError {
+    CommandError::Failed(format!("the list of workers cannot be read: {error}"))
+}
+
+/// Prints the join line for each address of this machine.
+fn show(master: &MasterArgs) -> Result<(), CommandError> {
+    let state = MasterState::at(master.state.as_deref())?;
     let security = MasterSecurity::Tls(state.trust()?);
     let reachable = Entrance { address: master.listen, security }.reachable();
     for command in reachable.commands() {

@@ -8,12 +8,13 @@ use std::time::{Duration, SystemTime};
 use rayfarm_protocol::transport::{JoinToken, MasterTrust, PrivateKey, read_private, write_private};
 use tokio_util::sync::CancellationToken;
 
+use super::workers::WorkerFiles;
 use crate::error::CommandError;
 
 /// Interval at which a running master looks for a new token.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// The folder with the key and the token.
+/// The folder with the key and the token, the workers that have joined and the revoked keys.
 #[derive(Clone, Debug)]
 pub(super) struct MasterState {
     folder: PathBuf,
@@ -45,7 +46,15 @@ impl MasterState {
             Some(token) => token,
             None => self.new_token()?,
         };
-        Ok(Arc::new(MasterTrust::new(key, token)))
+        let trust = MasterTrust::new(key, token);
+        let failed = |error| CommandError::Failed(format!("the revoked keys cannot be read: {error}"));
+        trust.set_revoked(self.workers().revoked().map_err(failed)?);
+        Ok(Arc::new(trust))
+    }
+
+    /// The files about workers.
+    pub(super) fn workers(&self) -> WorkerFiles {
+        WorkerFiles::of(&self.folder)
     }
 
     /// Makes a new token, and a new key if requested.
@@ -64,14 +73,16 @@ impl MasterState {
         self.new_token().map(|_| ())
     }
 
-    /// Passes a token that `trust rotate` has made on to a running farm, until `stop`.
+    /// Passes a new token and revoked keys on to a running farm, and records the workers that join, until `stop`.
     pub(super) async fn follow(self, trust: Arc<MasterTrust>, stop: CancellationToken) {
         let mut seen = self.token_time();
+        let mut log = WorkerLog::default();
         loop {
             tokio::select! {
                 () = stop.cancelled() => return,
                 () = tokio::time::sleep(LOOK_EVERY) => {}
             }
+            log.update(&self.workers(), &trust).await;
             let now = self.token_time();
             if now == seen {
                 continue;
@@ -128,6 +139,38 @@ impl MasterState {
     }
 }
 
+/// Files about workers and a running farm, which follow each other.
+#[derive(Default)]
+struct WorkerLog {
+    /// The last failure, which is logged once.
+    failure: Option<String>,
+}
+
+impl WorkerLog {
+    /// Records workers that have joined, and passes revoked keys on.
+    async fn update(&mut self, files: &WorkerFiles, trust: &Arc<MasterTrust>) {
+        let (files, trust) = (files.clone(), trust.clone());
+        let result = tokio::task::spawn_blocking(move || {
+            let revoked = files.revoked()?;
+            if *trust.revoked().borrow() != revoked {
+                tracing::info!("revoked keys: {}", revoked.len());
+                trust.set_revoked(revoked);
+            }
+            let joined = trust.take_joined();
+            joined.iter().try_for_each(|worker| files.add(worker, SystemTime::now()))
+        });
+        let failure = match result.await {
+            Ok(Ok(())) => None,
+            Ok(Err(error)) => Some(error.to_string()),
+            Err(error) => Some(error.to_string()),
+        };
+        if let Some(why) = failure.as_ref().filter(|_| failure != self.failure) {
+            tracing::warn!("the list of workers and of revoked keys is not up to date: {why}");
+        }
+        self.failure = failure;
+    }
+}
+
 /// Folder for the state of this program, by the conventions of the system.
 fn user_state_folder() -> Option<PathBuf> {
     let variable = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
@@ -143,6 +186,8 @@ fn user_state_folder() -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
+    use rayfarm_protocol::transport::{JoinedWorker, KeyHash};
+
     use super::*;
 
     fn state(folder: &tempfile::TempDir) -> MasterState {
@@ -188,5 +233,23 @@ mod tests {
         assert!(trust.join_line("h:1") != before);
         stop.cancel();
         follow.await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn a_running_master_records_workers_and_follows_revocations() {
+        let folder = tempfile::tempdir().unwrap();
+        let trust = state(&folder).trust().unwrap();
+        let (files, key) = (state(&folder).workers(), KeyHash([5; 32]));
+        let mut log = WorkerLog::default();
+        trust.add_joined(JoinedWorker { key, name: "mill".to_owned() });
+        log.update(&files, &trust).await;
+        let joined = files.joined().unwrap();
+        assert_eq!((joined.len(), joined[0].key, joined[0].name.as_str()), (1, key, "mill"));
+        files.revoke(key).unwrap();
+        log.update(&files, &trust).await;
+        assert!(trust.is_revoked(&key) && state(&folder).trust().unwrap().is_revoked(&key));
+        files.allow(key).unwrap();
+        log.update(&files, &trust).await;
+        assert!(!trust.is_revoked(&key) && log.failure.is_none());
     }
 }

@@ -94,6 +94,7 @@ fn any_setup(rng: &mut Rng, seed: u64) -> Setup {
             .pick(&[Corruption::Random, Corruption::Predicting, Corruption::Colluding])
             .unwrap_or_default(),
         colocated_workers: corruption_rng.below(6) as u32,
+        untrusted_workers: Rng::new(seed ^ 0x7e57).below(8) as u32,
         workers: rng.below(12) as u32,
         threads: 1 + rng.below(8) as u32,
         policy: rng.pick(&policies).unwrap_or_default(),

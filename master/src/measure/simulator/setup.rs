@@ -51,6 +51,8 @@ pub struct Setup {
     pub corruption: Corruption,
     /// Number of workers on one shared machine: the first to join. Each other worker has its own machine.
     pub colocated_workers: u32,
+    /// Number of workers for which the master does not vouch: the first to join.
+    pub untrusted_workers: u32,
     /// Frames to measure, after a warm-up.
     pub frames: u64,
     /// Seed of all random choices.
@@ -83,6 +85,7 @@ impl Default for Setup {
             corrupt_workers: 0,
             corruption: Corruption::Random,
             colocated_workers: 0,
+            untrusted_workers: 0,
             frames: 30,
             seed: 1,
         }

@@ -87,7 +87,7 @@ impl Shell {
 
     /// Grants a lease. Returns whether it covers the last ungranted row of its frame.
     pub(crate) fn grant(&mut self, worker: WorkerId, lease: Lease) -> Result<bool, String> {
-        self.book(worker, lease)?.grant(lease);
+        self.book(worker, lease)?.grant(lease, 0);
         let picture = self.pictures.get_mut(&lease.frame);
         let picture = picture.ok_or_else(|| format!("{lease} of a frame that is not in flight"))?;
         picture.grant(&lease).ok_or_else(|| format!("{lease} leaves the picture"))
@@ -95,7 +95,7 @@ impl Shell {
 
     /// Grants a lease of a second rendering.
     pub(crate) fn verify(&mut self, worker: WorkerId, lease: Lease) -> Result<(), String> {
-        self.book(worker, lease)?.verify(lease);
+        self.book(worker, lease)?.verify(lease, 0);
         Ok(())
     }
 

@@ -139,7 +139,8 @@ impl World {
         let host =
             if self.last_worker <= u64::from(self.setup.colocated_workers) { 0 } else { self.last_worker };
         let threads = self.setup.threads;
-        self.handle(Event::WorkerJoined { worker: id, threads, host: HostId(host.into()) });
+        let trusted = self.last_worker > u64::from(self.setup.untrusted_workers);
+        self.handle(Event::WorkerJoined { worker: id, threads, host: HostId(host.into()), trusted });
         id
     }
 

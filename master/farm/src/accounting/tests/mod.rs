@@ -22,8 +22,8 @@ impl Fixture {
     /// Two connected workers, one with two threads and one with one.
     fn new() -> Self {
         let mut fixture = Self { accounts: Accounts::default() };
-        fixture.event(0, Event::WorkerJoined { worker: MILL, threads: 2, host: HostId(1) });
-        fixture.event(0, Event::WorkerJoined { worker: BARN, threads: 1, host: HostId(1) });
+        fixture.event(0, Event::WorkerJoined { worker: MILL, threads: 2, host: HostId(1), trusted: true });
+        fixture.event(0, Event::WorkerJoined { worker: BARN, threads: 1, host: HostId(1), trusted: true });
         fixture.accounts.name(MILL, "mill");
         fixture
     }

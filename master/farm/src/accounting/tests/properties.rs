@@ -55,8 +55,15 @@ impl Fixture {
         let now = Duration::from_nanos(ns);
         match *step {
             Step::Join(worker, threads) => {
-                self.accounts
-                    .event(now, &Event::WorkerJoined { worker: WorkerId(worker), threads, host: HostId(1) });
+                self.accounts.event(
+                    now,
+                    &Event::WorkerJoined {
+                        worker: WorkerId(worker),
+                        threads,
+                        host: HostId(1),
+                        trusted: true,
+                    },
+                );
             }
             Step::Leave(worker) => self.accounts.event(now, &Event::WorkerLeft { worker: WorkerId(worker) }),
             Step::Grant(worker, segment) => {
@@ -118,7 +125,7 @@ proptest! {
     #[test]
     fn every_nanosecond_is_attributed_once(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
         let mut fixture = Fixture { accounts: Accounts::default() };
-        fixture.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(9), threads: 3, host: HostId(1) });
+        fixture.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(9), threads: 3, host: HostId(1), trusted: true });
         let (mut now, mut frame, mut begun, mut settled) = (0, 1, None, 0);
         for (passed, step) in steps {
             now += passed;
@@ -148,7 +155,7 @@ proptest! {
     #[test]
     fn a_busy_workers_parts_sum_to_its_time(steps in prop::collection::vec((0..20 * MS, step()), 1..80)) {
         let mut fixture = Fixture { accounts: Accounts::default() };
-        fixture.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(1), threads: 3, host: HostId(1) });
+        fixture.accounts.event(Duration::ZERO, &Event::WorkerJoined { worker: WorkerId(1), threads: 3, host: HostId(1), trusted: true });
         fixture.begin(0, 1);
         let (mut now, mut frame, mut settled) = (0, 1, 0);
         // The worker stays connected and is never paused, so all its time is in its accounts.

@@ -2,9 +2,10 @@
 //! remaining bytes from the master.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 
 use bytes::Bytes;
-use rayfarm_protocol::limits::{MAX_PEER_KEEPALIVES, PEER_CONNECT_TIMEOUT};
+use rayfarm_protocol::limits::{MAX_CHUNK_BYTES, MAX_PEER_KEEPALIVES, PEER_CONNECT_TIMEOUT};
 use rayfarm_protocol::peer::{self, PeerReply, PeerRequest, Token, receive_reply, send_request};
 use rayfarm_protocol::transport::WorkerSecurity;
 use rayfarm_protocol::{AssetId, KeyHash, ProtocolError};
@@ -12,7 +13,7 @@ use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio::net::TcpStream;
 use tokio::sync::mpsc;
 
-use super::address_rules;
+use super::{StallClock, address_rules};
 
 /// Another worker that serves an asset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,16 +42,20 @@ pub(crate) enum PeerEvent {
     Failed { id: AssetId, why: String },
 }
 
+/// An asset to fetch from another worker.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fetch {
+    pub(crate) id: AssetId,
+    /// Number of bytes of the asset.
+    pub(crate) size: u64,
+    pub(crate) source: PeerSource,
+}
+
 impl PeerClient {
-    /// Fetches an asset of `size` bytes and sends its chunks to `events` as they arrive.
-    pub(crate) async fn fetch(
-        self,
-        id: AssetId,
-        size: u64,
-        source: PeerSource,
-        events: mpsc::Sender<PeerEvent>,
-    ) {
-        if let Err(why) = self.try_fetch(id, size, source, &events).await {
+    /// Fetches an asset and sends its chunks to `events` as they arrive. A transfer that stalls by `clock` fails.
+    pub(crate) async fn fetch(self, fetch: Fetch, clock: Arc<StallClock>, events: mpsc::Sender<PeerEvent>) {
+        if let Err(why) = self.try_fetch(fetch, &clock, &events).await {
+            let Fetch { id, source, .. } = fetch;
             let why = format!("the transfer from {} failed: {why}", source.address);
             // The receiver is closed where the session has ended.
             let _ = events.send(PeerEvent::Failed { id, why }).await;
@@ -59,49 +64,67 @@ impl PeerClient {
 
     async fn try_fetch(
         &self,
-        id: AssetId,
-        size: u64,
-        source: PeerSource,
+        fetch: Fetch,
+        clock: &StallClock,
         events: &mpsc::Sender<PeerEvent>,
     ) -> Result<(), String> {
-        address_rules::check(source.address, self.within_machine)?;
-        let connecting = tokio::time::timeout(PEER_CONNECT_TIMEOUT, TcpStream::connect(source.address));
+        let PeerSource { address, key, .. } = fetch.source;
+        address_rules::check(address, self.within_machine)?;
+        let connecting = tokio::time::timeout(PEER_CONNECT_TIMEOUT, TcpStream::connect(address));
         let stream = match connecting.await {
             Ok(connected) => connected.map_err(|error| error.to_string())?,
             Err(_) => return Err(format!("no connection within {} s", PEER_CONNECT_TIMEOUT.as_secs())),
         };
-        let connected = peer::connect(stream, &self.security, source.key).await;
+        let connected = peer::connect(stream, &self.security, key).await;
         let stream = connected.map_err(|error| error.to_string())?;
-        fetch_over(stream, id, size, source.token, events).await
+        fetch_over(stream, fetch, clock, events).await
     }
 }
 
 async fn fetch_over(
     mut stream: impl AsyncRead + AsyncWrite + Unpin,
-    id: AssetId,
-    size: u64,
-    token: Token,
+    fetch: Fetch,
+    clock: &StallClock,
     events: &mpsc::Sender<PeerEvent>,
 ) -> Result<(), String> {
+    let Fetch { id, size, source: PeerSource { token, .. }, .. } = fetch;
     let text = |error: ProtocolError| error.to_string();
+    let stalled = clock.stalled();
+    tokio::pin!(stalled);
     send_request(&mut stream, &PeerRequest { id, token, offset: 0 }).await.map_err(text)?;
     let mut stream = BufReader::new(stream);
     let (mut offset, mut keepalives) = (0, 0);
     while offset < size {
-        match receive_reply(&mut stream, id).await.map_err(text)? {
+        let reply = tokio::select! {
+            biased;
+            reply = receive_reply(&mut stream, id) => reply.map_err(text)?,
+            () = &mut stalled => {
+                return Err(format!("no chunk arrived for {} s", clock.limit().as_secs_f32()));
+            }
+        };
+        match reply {
             PeerReply::Begin { size: announced } if announced == size => {}
             PeerReply::Begin { size: announced } => {
                 return Err(format!("it announces {announced} bytes, expected {size}"));
             }
             PeerReply::Unknown => return Err("it does not have the asset".to_owned()),
-            PeerReply::Waiting if keepalives < MAX_PEER_KEEPALIVES => keepalives += 1,
-            PeerReply::Waiting => return Err(format!("it sent {keepalives} keepalives and no chunk")),
+            PeerReply::Waiting { hops } if keepalives < MAX_PEER_KEEPALIVES => {
+                keepalives += 1;
+                clock.note_hops(hops);
+            }
+            PeerReply::Waiting { .. } => return Err(format!("it sent {keepalives} keepalives and no chunk")),
             PeerReply::Chunk { offset: at, bytes } => {
-                let end = at.saturating_add(bytes.len() as u64);
-                if at != offset || end > size {
-                    return Err(format!("a chunk at byte {at} arrived, expected byte {offset} of {size}"));
+                // Each chunk but the last is full, so that a source which sends at all has a least rate.
+                let (end, due) = (at.saturating_add(bytes.len() as u64), size - offset);
+                let full = due.min(MAX_CHUNK_BYTES as u64);
+                if at != offset || bytes.len() as u64 != full {
+                    let len = bytes.len();
+                    return Err(format!(
+                        "{len} bytes at byte {at} arrived, expected {full} at byte {offset} of {size}"
+                    ));
                 }
                 (offset, keepalives) = (end, 0);
+                clock.note_chunk();
                 if events.send(PeerEvent::Chunk { id, offset: at, bytes }).await.is_err() {
                     return Ok(());
                 }
@@ -110,3 +133,6 @@ async fn fetch_over(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;
