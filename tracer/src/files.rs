@@ -1,10 +1,11 @@
-//! Reading of regular files within limits, and atomic writing.
+//! Reading of regular files within limits, atomic writing, and changes of files.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::SystemTime;
 
 /// Opens a regular file for reading; links are followed.
 ///
@@ -47,6 +48,37 @@ pub fn read_within(path: &Path, limit: u64) -> io::Result<Option<Vec<u8>>> {
     // A file may grow while it is read, and a pseudo file system announces no sizes.
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok(Some(bytes).filter(|bytes| bytes.len() as u64 <= limit))
+}
+
+/// The state of a file at one time, to find out whether it has changed since then: its size and the time of its last
+/// change. Changes that keep the size, within the resolution of the file system's clock, are not found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileStamp {
+    path: PathBuf,
+    /// `None` where there is no such file.
+    state: Option<(u64, Option<SystemTime>)>,
+}
+
+impl FileStamp {
+    /// The state of a file now; links are followed.
+    pub fn of(path: &Path) -> Self {
+        Self { path: path.to_owned(), state: Self::state(path) }
+    }
+
+    /// Path of the file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the file has changed, appeared or disappeared since then.
+    pub fn has_changed(&self) -> bool {
+        Self::state(&self.path) != self.state
+    }
+
+    fn state(path: &Path) -> Option<(u64, Option<SystemTime>)> {
+        let metadata = fs::metadata(path).ok()?;
+        Some((metadata.len(), metadata.modified().ok()))
+    }
 }
 
 /// Writes a file under a new temporary name in the same folder and renames it.
@@ -118,6 +150,23 @@ mod tests {
         write_whole(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn changes_of_a_file_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let absent = FileStamp::of(&path);
+        assert!(!absent.has_changed() && absent.path() == path);
+        fs::write(&path, "1").unwrap();
+        let first = FileStamp::of(&path);
+        assert!(absent.has_changed() && !first.has_changed());
+        let later = SystemTime::now() + std::time::Duration::from_secs(7);
+        File::options().write(true).open(&path).unwrap().set_modified(later).unwrap();
+        assert!(first.has_changed(), "the time differs");
+        let second = FileStamp::of(&path);
+        fs::remove_file(&path).unwrap();
+        assert!(second.has_changed() && !absent.has_changed());
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! A frame starts when no earlier one blocks it. A caller with at most two open requests (the frame being rendered and
 //! its successor) gets every frame that it requests, in order. A third open request replaces the second unless half of that
 //! one is leased already, so the requests of a moving camera never queue up, and the oldest frame is always finished. Frames
-//! may differ in size; a frame whose size differs from its predecessor's starts when that one is complete.
+//! may differ in size; a frame whose size differs from its predecessor's starts when that one is complete. The scene may be
+//! replaced between two requests: each frame shows the scene of the time of its request.
 
 use std::io::ErrorKind;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -17,11 +18,13 @@ use tokio_util::task::TaskTracker;
 
 use crate::accounting::TimelineSink;
 use crate::assets::Assets;
+use crate::assets::scene_table::SceneTable;
 use crate::control::FarmControl;
 use crate::driver::Driver;
 use crate::error::FarmError;
+use crate::farm_scene::FarmScene;
 use crate::finished::FinishedFrame;
-use crate::options::{DEFAULT_PORT, FarmOptions, FarmScene};
+use crate::options::{DEFAULT_PORT, FarmOptions};
 use crate::server;
 use crate::sessions::addresses::{Entrance, Reachable};
 use crate::status::FarmStatus;
@@ -50,25 +53,25 @@ impl Farm {
     /// numbers.
     pub async fn start(options: FarmOptions, scene: FarmScene) -> Result<Farm, FarmError> {
         let stop = CancellationToken::new();
+        let scenes = Arc::new(SceneTable::new(Arc::new(Assets::new(scene)?)));
         let renderer =
-            (options.verify_percent > 0).then(|| arbiter::row_renderer(scene.clone(), stop.clone()));
-        Self::start_with(options, scene, renderer, stop).await
+            (options.verify_percent > 0).then(|| arbiter::row_renderer(scenes.clone(), stop.clone()));
+        Self::start_with(options, scenes, renderer, stop).await
     }
 
     /// As [`Farm::start`], with a given renderer for the arbiter.
     pub(crate) async fn start_with(
         options: FarmOptions,
-        scene: FarmScene,
+        scenes: Arc<SceneTable>,
         renderer: Option<Arc<RowRenderer>>,
         stop: CancellationToken,
     ) -> Result<Farm, FarmError> {
-        let assets = Assets::new(&scene.scene, scene.meshes, scene.textures)?;
         let (listener, address) = listen(options.listen).await?;
         if let Some(line) = Reachable::of(address).announcement() {
             tracing::info!("{line}");
         }
         let (arbiter_queue, disputes) = mpsc::unbounded_channel();
-        let driver = Arc::new(Driver::new(&options, assets, arbiter_queue)?);
+        let driver = Arc::new(Driver::new(&options, scenes, arbiter_queue)?);
         let (sessions, processes) = (TaskTracker::new(), TaskTracker::new());
 
         let clock = driver.clone();
@@ -114,6 +117,13 @@ impl Farm {
     /// A view that cannot be rendered (no pixels, an invalid camera) is an error of [`Farm::finished`].
     pub fn request(&self, request: impl Into<ViewRequest>) -> FrameId {
         self.driver.request(request.into())
+    }
+
+    /// Replaces the scene for all frames that are requested from now on. Frames in flight show the scene of their request.
+    /// Workers fetch the new scene body when the first frame of it is announced, and only those of its meshes and textures
+    /// that they do not have.
+    pub fn replace_scene(&self, scene: Arc<Assets>) {
+        self.driver.replace_scene(scene);
     }
 
     /// Sets the number of frames of the run, from which [`FarmStatus::totals`] predicts its duration.

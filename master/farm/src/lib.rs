@@ -5,7 +5,7 @@
 //! A small frame; `examples/embed.rs` is the same as a program.
 //!
 //! ```
-//! use rayfarm_farm::{Farm, FarmOptions, FarmScene};
+//! use rayfarm_farm::{Farm, FarmOptions};
 //! use rayfarm_tracer::scene::{self, FrameView};
 //! # use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 //!
@@ -47,6 +47,7 @@ mod descriptors;
 mod driver;
 mod error;
 mod farm;
+mod farm_scene;
 mod finished;
 mod format;
 mod framebuffer;
@@ -69,10 +70,11 @@ pub use assets::{AssetError, Assets, TransferStatus};
 pub use control::FarmControl;
 pub use error::{FarmError, UnknownWorker};
 pub use farm::Farm;
+pub use farm_scene::FarmScene;
 pub use finished::{FinishedFrame, FrameCounts};
 pub use format::wire_format;
 pub use framebuffer::FramePixels;
-pub use options::{DEFAULT_PORT, FarmOptions, FarmScene};
+pub use options::{DEFAULT_PORT, FarmOptions};
 pub use rayfarm_protocol::FrameId;
 pub use rayfarm_scheduler::{SegmentPolicy, Verification, WorkerState};
 pub use sessions::addresses::{Entrance, Reachable};

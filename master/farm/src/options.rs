@@ -1,13 +1,9 @@
-//! The setup of a farm and the scene that it draws.
+//! The setup of a farm.
 
 use std::net::SocketAddr;
-use std::sync::Arc;
 
 use rayfarm_protocol::transport::MasterSecurity;
 use rayfarm_scheduler::SegmentPolicy;
-use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::Scene;
-use rayfarm_tracer::texture::Texture;
 
 use crate::supervisor::LocalWorkerCommand;
 
@@ -36,15 +32,4 @@ pub struct FarmOptions {
     pub verify_percent: u8,
     /// Whether workers connect through TLS and must prove a token.
     pub security: MasterSecurity,
-}
-
-/// A scene with its meshes and textures.
-#[derive(Clone)]
-pub struct FarmScene {
-    /// The scene as data.
-    pub scene: Scene,
-    /// The meshes that the scene refers to; others are neither kept nor sent.
-    pub meshes: Vec<Arc<CompiledMesh>>,
-    /// The textures that the scene refers to; others are neither kept nor sent.
-    pub textures: Vec<Arc<Texture>>,
 }

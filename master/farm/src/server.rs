@@ -198,10 +198,15 @@ async fn receive(
     request: mpsc::Sender<(AssetId, u64)>,
 ) -> Result<String, SessionError> {
     let mut budget = Budget::new(Instant::now());
+    let mut times_replaced = driver.assets.times_replaced();
     let mut has_delivered = false;
     while let Some(message) = receiver.recv().await {
         let message = message?;
-        budget.count(&message, |id| driver.assets.get(id).is_some(), Instant::now())?;
+        let has_asset = |id| driver.assets.has(id);
+        if std::mem::replace(&mut times_replaced, driver.assets.times_replaced()) != times_replaced {
+            budget.scene_replaced(has_asset);
+        }
+        budget.count(&message, has_asset, Instant::now())?;
         match message {
             ToMaster::Pixels { header, bytes } => {
                 driver.pixels(worker, header, &bytes)?;

@@ -243,6 +243,7 @@ impl WindowDisplay {
             accounts: shown.then(|| AccountPanel::new(size, &status, &statistics.accounts, selected)),
             help: self.show_help,
             message: self.message(&status, &statistics, viewer),
+            fault: statistics.scene_fault.clone(),
         }
     }
 
@@ -273,6 +274,7 @@ impl WindowDisplay {
         let quality = if resting { &statistics.quality } else { &picture.quality };
         Figures {
             fps: (!resting).then_some(statistics.fps),
+            fps_range: statistics.fps_range,
             frame_time,
             latency: statistics.latency,
             size: self.size(),

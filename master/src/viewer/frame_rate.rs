@@ -47,6 +47,20 @@ impl FrameRate {
         if seconds > 0.0 { intervals as f64 / seconds } else { 0.0 }
     }
 
+    /// Lowest and highest rate by the times between two frames within the window; `None` before the third frame, and when no
+    /// frame is completed any more.
+    pub(crate) fn range(&self, now: Duration) -> Option<(f64, f64)> {
+        let (last, _) = self.frames.back()?;
+        if self.frames.len() < 3 || now.saturating_sub(*last) > WINDOW {
+            return None;
+        }
+        let times = self.frames.iter().zip(self.frames.iter().skip(1));
+        let seconds = times.map(|((from, _), (to, _))| to.saturating_sub(*from).as_secs_f64());
+        let (shortest, longest) = seconds
+            .fold((f64::INFINITY, 0.0_f64), |(least, most), seconds| (least.min(seconds), most.max(seconds)));
+        (shortest > 0.0).then(|| (1.0 / longest, 1.0 / shortest))
+    }
+
     /// Mean duration of a frame.
     pub(crate) fn frame_time(&self) -> Duration {
         let count = u32::try_from(self.frames.len()).unwrap_or(u32::MAX).max(1);
@@ -68,6 +82,21 @@ mod tests {
         }
         assert!((rate.fps(MS * 20 * 199) - 50.0).abs() < 1e-9);
         assert_eq!(rate.frame_time(), MS * 15);
+    }
+
+    #[test]
+    fn the_range_is_that_of_the_last_second() {
+        let mut rate = FrameRate::default();
+        rate.completed(MS, MS);
+        rate.completed(MS * 900, MS);
+        assert_eq!(rate.range(MS * 900), None, "two frames have one rate");
+        [1000, 1010, 1210].iter().for_each(|at| rate.completed(MS * *at, MS));
+        let (lowest, highest) = rate.range(MS * 1210).unwrap();
+        assert!((highest - 100.0).abs() < 1e-9 && (lowest - 1000.0 / 899.0).abs() < 1e-9);
+        rate.completed(MS * 1990, MS);
+        let (lowest, _) = rate.range(MS * 1990).unwrap();
+        assert!((lowest - 1000.0 / 780.0).abs() < 1e-9, "{lowest}");
+        assert_eq!(rate.range(MS * 3000), None);
     }
 
     #[test]

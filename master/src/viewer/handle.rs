@@ -11,6 +11,7 @@ use super::displays::DisplayId;
 use super::film::FilmProgress;
 use super::input_action::InputAction;
 use super::knob_change::KnobChange;
+use super::scene_update::SceneUpdate;
 use super::statistics::Statistics;
 
 /// Actions that wait for the viewer at most. Further ones are dropped until it has caught up.
@@ -106,7 +107,7 @@ impl ViewerHandle {
     }
 }
 
-/// Sender of changes of knobs and of the denoiser to a viewer, which ends regardless of it.
+/// Sender of changes of knobs, of the denoiser and of the scene to a viewer, which ends regardless of it.
 #[derive(Clone, Debug)]
 pub(crate) struct KnobSender(mpsc::WeakSender<(DisplayId, InputAction)>);
 
@@ -125,6 +126,27 @@ impl KnobSender {
     /// As [`Self::send`].
     pub(crate) fn denoise(&self, on: bool) -> Result<(), String> {
         self.send_action(InputAction::Denoise(on))
+    }
+
+    /// Shows another scene, without waiting.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub(super) fn show_scene(&self, update: SceneUpdate) -> Result<(), String> {
+        self.send_action(InputAction::ShowScene(update))
+    }
+
+    /// Reports a fault in the files of the scene, without waiting.
+    ///
+    /// # Errors
+    /// As [`Self::send`].
+    pub(super) fn report_fault(&self, fault: String) -> Result<(), String> {
+        self.send_action(InputAction::SceneFault(fault))
+    }
+
+    /// Whether the viewer still takes input.
+    pub(super) fn is_running(&self) -> bool {
+        self.0.upgrade().is_some_and(|input| !input.is_closed())
     }
 
     fn send_action(&self, action: InputAction) -> Result<(), String> {

@@ -5,6 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 
 use super::knob_change::KnobChange;
+use super::scene_update::SceneUpdate;
 use super::worker_command::WorkerCommand;
 
 /// One input of a display. The display decides which key or gesture means which action; the viewer decides its effect.
@@ -72,6 +73,10 @@ pub(crate) enum InputAction {
     Set(KnobChange),
     /// Shows pictures of paths at rest with or without most of their noise.
     Denoise(bool),
+    /// Shows another scene with the same camera.
+    ShowScene(SceneUpdate),
+    /// Reports a fault in the files of the scene, which is shown as it was.
+    SceneFault(String),
     /// Commands workers.
     Worker(WorkerCommand),
     /// Ends the viewer.

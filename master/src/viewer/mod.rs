@@ -5,6 +5,7 @@
 
 mod camera_control;
 mod displays;
+pub(crate) mod edits;
 mod error;
 pub(crate) mod film;
 pub(crate) mod frame_counts;
@@ -19,6 +20,7 @@ mod open_requests;
 pub(crate) mod orbit;
 pub(crate) mod quality_controller;
 mod requests;
+mod scene_update;
 mod sequence;
 mod statistics;
 mod worker_command;

@@ -23,6 +23,8 @@ pub(crate) struct Statistics {
     pub(crate) completed: u64,
     /// Frames per second, smoothed over about a second.
     pub(crate) fps: f64,
+    /// Lowest and highest rate within the last second, by the times between frames; `None` before the third frame.
+    pub(crate) fps_range: Option<(f64, f64)>,
     /// Mean time of a frame.
     pub(crate) frame_time: Duration,
     /// Median time from an input to its picture on the screen, where known.
@@ -37,6 +39,8 @@ pub(crate) struct Statistics {
     pub(crate) film: Option<FilmProgress>,
     /// Reason for which no frame can be rendered, where known.
     pub(crate) problem: Option<String>,
+    /// Fault in the files of the scene, which is shown as it was before.
+    pub(crate) scene_fault: Option<String>,
     /// Recent use of the workers' time.
     #[serde(skip)]
     pub(crate) accounts: Arc<Fading>,
@@ -48,7 +52,8 @@ impl Statistics {
         let figures = |it: &Self| (it.completed, it.latency, it.resting, it.film);
         !self.resting
             || figures(self) != figures(older)
-            || (&self.quality, &self.problem) != (&older.quality, &older.problem)
+            || (&self.quality, &self.problem, &self.scene_fault)
+                != (&older.quality, &older.problem, &older.scene_fault)
             || !Arc::ptr_eq(&self.accounts, &older.accounts)
     }
 }
@@ -78,6 +83,7 @@ pub(super) struct ViewerState {
     rest: Duration,
     film: Option<FilmProgress>,
     problem: Option<String>,
+    scene_fault: Option<String>,
 }
 
 impl ViewerState {
@@ -95,6 +101,7 @@ impl ViewerState {
             rest: Duration::ZERO,
             film: None,
             problem: None,
+            scene_fault: None,
         }
     }
 
@@ -116,6 +123,11 @@ impl ViewerState {
     /// Sets or clears the reason for which no frame can be rendered.
     pub(super) fn set_problem(&mut self, problem: Option<String>) {
         self.problem = problem;
+    }
+
+    /// Sets or clears the fault in the files of the scene.
+    pub(super) fn set_scene_fault(&mut self, fault: Option<String>) {
+        self.scene_fault = fault;
     }
 
     /// Records whether nothing is requested, with the lines of the quality controller about the picture at rest.
@@ -166,6 +178,7 @@ impl ViewerState {
         Statistics {
             completed: self.completed,
             fps: self.rate.fps(now),
+            fps_range: self.rate.range(now),
             frame_time: self.rate.frame_time(),
             latency: self.latency.median(),
             since_last_frame: now.saturating_sub(self.last_completed),
@@ -173,6 +186,7 @@ impl ViewerState {
             quality: quiet.map_or_else(Vec::new, |quiet| quiet.quality.clone()),
             film: self.film,
             problem: self.problem.clone(),
+            scene_fault: self.scene_fault.clone(),
             accounts: self.published_accounts.1.clone(),
         }
     }

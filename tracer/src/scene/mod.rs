@@ -25,7 +25,9 @@ pub use data::{
 pub use import::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError, Up};
 pub use knobs::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setting, Shading};
 #[cfg(feature = "import")]
-pub use load::{LoadLimits, LoadedScene, compile_model, compile_model_with, load, load_limited, load_with};
+pub use load::{
+    LoadLimits, LoadedScene, SceneLoader, compile_model, compile_model_with, load, load_limited, load_with,
+};
 pub use validate::{
     MAX_CLAMP, MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_EXPOSURE, MAX_IOR, MAX_LIGHT, MAX_LIGHTS,
     MAX_MATERIALS, MAX_MODELS, MAX_NORMAL_STRENGTH, MAX_PATH_SAMPLES, MAX_PLANES, MAX_SAMPLES,

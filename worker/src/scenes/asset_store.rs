@@ -71,6 +71,23 @@ impl<V> AssetStore<V> {
         true
     }
 
+    /// Evicts the least recently used of the values that `is_meant` selects, except those in `keep`, until at most `most` of
+    /// the others are left.
+    pub(super) fn keep_most_recent(
+        &mut self,
+        most: usize,
+        is_meant: impl Fn(&V) -> bool,
+        keep: &BTreeSet<AssetId>,
+    ) {
+        let meant = self.entries.iter().filter(|(id, entry)| !keep.contains(id) && is_meant(&entry.value));
+        let mut by_use: Vec<(u64, AssetId)> = meant.map(|(id, entry)| (entry.used_at, *id)).collect();
+        by_use.sort_unstable();
+        let too_many = by_use.len().saturating_sub(most);
+        for (_, id) in by_use.into_iter().take(too_many) {
+            self.used_bytes -= self.entries.remove(&id).map_or(0, |entry| entry.bytes);
+        }
+    }
+
     /// Inserts a value of `bytes`. The caller has made room for it.
     pub(super) fn insert(&mut self, id: AssetId, value: V, bytes: u64) {
         self.clock += 1;
@@ -115,6 +132,17 @@ mod tests {
         assert!(!store.contains(id(3)));
         assert!(!store.make_room(41, 0, &keep));
         assert!(store.contains(id(1)) && store.contains(id(2)));
+    }
+
+    #[test]
+    fn only_the_most_recent_of_a_kind_are_kept() {
+        let mut store = full_store();
+        store.get(id(1));
+        store.keep_most_recent(1, |name| *name != "c", &BTreeSet::new());
+        assert!(store.contains(id(1)) && !store.contains(id(2)) && store.contains(id(3)));
+        assert_eq!(store.used_bytes(), 60);
+        store.keep_most_recent(0, |_| true, &BTreeSet::from([id(3)]));
+        assert!(!store.contains(id(1)) && store.contains(id(3)));
     }
 
     #[test]

@@ -63,6 +63,42 @@ async fn a_scene_and_its_meshes_are_requested_once_across_sessions() {
 }
 
 #[tokio::test]
+async fn a_scene_that_the_master_did_not_have_is_requested_again() {
+    let (body, other) = (scene(1, &[]), scene(2, &[]));
+    let mut master = FakeMaster::start(persistent(1, LARGE_CACHE).0, &[&other]);
+    master.announce(0, &body, b"v").await;
+    let reason = master.receive_failure(0).await;
+    assert!(reason.contains("does not have"), "{reason}");
+    // The scene was replaced before the request arrived, and is shown again when that is undone.
+    master.send(ToWorker::Cancel { before: FrameId(1) }).await;
+    master.corrupt(&body, &body);
+    for (frame, body) in [(1, &other), (2, &body)] {
+        master.announce(frame, body, b"v").await;
+        master.send(ToWorker::Segment(lease(frame, 0..8))).await;
+        assert_eq!(master.receive_pixels().await.1, expected(body, b"v", 0..8));
+    }
+    assert_eq!(master.requests.len(), 3);
+}
+
+#[tokio::test]
+async fn a_scene_body_that_arrives_after_its_frame_was_dropped_is_of_use_later() {
+    let (body, other) = (scene(1, &[]), scene(2, &[]));
+    let mut master = FakeMaster::start(persistent(1, LARGE_CACHE).0, &[&body, &other]);
+    master.announce(0, &body, b"v").await;
+    let (id, offset, _) = master.receive_request().await;
+    // The frame is superseded by one of another scene while its body is on the way, and both scenes are shown later.
+    master.send(ToWorker::Cancel { before: FrameId(1) }).await;
+    master.announce(1, &other, b"v").await;
+    master.send_asset(id, offset).await;
+    master.announce(2, &body, b"v").await;
+    for (frame, body) in [(1, &other), (2, &body)] {
+        master.send(ToWorker::Segment(lease(frame, 0..8))).await;
+        assert_eq!(master.receive_pixels().await, (lease(frame, 0..8), expected(body, b"v", 0..8).into()));
+    }
+    assert_eq!(master.requests.len(), 2, "each body once");
+}
+
+#[tokio::test]
 async fn a_ping_is_answered_while_all_threads_render() {
     let body = scene(1, &[]);
     let (kept, gate) = persistent(2, LARGE_CACHE);

@@ -3,6 +3,7 @@
 
 pub(crate) mod peer_endpoint;
 pub(crate) mod routing;
+pub(crate) mod scene_table;
 pub(crate) mod transfers;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,8 +14,9 @@ use rayfarm_protocol::AssetId;
 use rayfarm_protocol::codec::{self, CodecError};
 use rayfarm_protocol::limits::{MAX_ASSET_BYTES, MAX_DECODE_BYTES};
 use rayfarm_tracer::mesh::{CompiledMesh, MeshId};
-use rayfarm_tracer::scene::Scene;
 use rayfarm_tracer::texture::{Texture, TextureId};
+
+use crate::farm_scene::FarmScene;
 
 pub use transfers::TransferStatus;
 
@@ -61,6 +63,7 @@ pub enum AssetError {
 #[derive(Debug)]
 pub struct Assets {
     scene: AssetId,
+    drawn: Arc<FarmScene>,
     blobs: BTreeMap<AssetId, Bytes>,
 }
 
@@ -83,15 +86,12 @@ impl AsRef<[u8]> for TextureBytes {
 }
 
 impl Assets {
-    /// The scene's body, and those of `meshes` and `textures` that it refers to.
+    /// The scene's body, and those of its meshes and textures that it refers to.
     ///
     /// # Errors
     /// The scene or a mesh is too long, or one that it refers to is missing.
-    pub fn new(
-        scene: &Scene,
-        meshes: Vec<Arc<CompiledMesh>>,
-        textures: Vec<Arc<Texture>>,
-    ) -> Result<Self, AssetError> {
+    pub fn new(drawn: FarmScene) -> Result<Self, AssetError> {
+        let FarmScene { scene, meshes, textures } = &drawn;
         let body = codec::encode(scene)?;
         if body.len() > MAX_DECODE_BYTES {
             return Err(AssetError::SceneTooLong { bytes: body.len(), limit: MAX_DECODE_BYTES });
@@ -99,30 +99,35 @@ impl Assets {
         let scene_id = AssetId::of(&body);
         let mut blobs = BTreeMap::from([(scene_id, Bytes::from(body))]);
         let mut missing: BTreeSet<MeshId> = scene.mesh_ids();
-        for mesh in meshes.into_iter().filter(|mesh| missing.remove(&mesh.id())) {
+        for mesh in meshes.iter().filter(|mesh| missing.remove(&mesh.id())) {
             let (id, bytes) = (AssetId(mesh.id().0), mesh.bytes().len());
             if bytes as u64 > MAX_ASSET_BYTES {
                 return Err(AssetError::MeshTooLong { bytes, limit: MAX_ASSET_BYTES });
             }
-            blobs.insert(id, Bytes::from_owner(MeshBytes(mesh)));
+            blobs.insert(id, Bytes::from_owner(MeshBytes(mesh.clone())));
         }
         if let Some(id) = missing.first() {
             return Err(AssetError::MissingMesh(AssetId(id.0)));
         }
         let mut missing: BTreeSet<TextureId> = scene.texture_ids();
         // The tracer's own bound on textures is far below that on assets.
-        for texture in textures.into_iter().filter(|texture| missing.remove(&texture.id())) {
-            blobs.insert(AssetId(texture.id().0), Bytes::from_owner(TextureBytes(texture)));
+        for texture in textures.iter().filter(|texture| missing.remove(&texture.id())) {
+            blobs.insert(AssetId(texture.id().0), Bytes::from_owner(TextureBytes(texture.clone())));
         }
         match missing.first() {
             Some(id) => Err(AssetError::MissingTexture(AssetId(id.0))),
-            None => Ok(Self { scene: scene_id, blobs }),
+            None => Ok(Self { scene: scene_id, blobs, drawn: Arc::new(drawn) }),
         }
     }
 
     /// The hash of the scene body.
     pub fn scene(&self) -> AssetId {
         self.scene
+    }
+
+    /// The scene with its meshes and textures.
+    pub(crate) fn drawn(&self) -> &Arc<FarmScene> {
+        &self.drawn
     }
 
     /// The size of all assets together, in bytes.
@@ -141,10 +146,18 @@ mod tests {
     use glam::{DMat3, DVec3};
     use rayfarm_tracer::image::RgbImage;
     use rayfarm_tracer::mesh::{Mesh, NamedMaterial};
-    use rayfarm_tracer::scene::{Filter, Material, Model, NormalMode, TextureMap};
+    use rayfarm_tracer::scene::{Filter, Material, Model, NormalMode, Scene, TextureMap};
 
     use super::*;
     use crate::testing::test_scene;
+
+    fn assets(
+        scene: &Scene,
+        meshes: Vec<Arc<CompiledMesh>>,
+        textures: Vec<Arc<Texture>>,
+    ) -> Result<Assets, AssetError> {
+        Assets::new(FarmScene { scene: scene.clone(), meshes, textures })
+    }
 
     fn triangle() -> Arc<CompiledMesh> {
         let mesh = Mesh {
@@ -174,19 +187,19 @@ mod tests {
     fn assets_are_named_by_their_hash_and_share_the_mesh() {
         let mesh = triangle();
         let scene = scene_with(mesh.id());
-        let assets = Assets::new(&scene, vec![mesh.clone(), mesh.clone()], Vec::new()).unwrap();
-        let bytes = assets.get(AssetId(mesh.id().0)).unwrap();
+        let found = assets(&scene, vec![mesh.clone(), mesh.clone()], Vec::new()).unwrap();
+        let bytes = found.get(AssetId(mesh.id().0)).unwrap();
         assert_eq!(bytes.as_ptr(), mesh.bytes().as_ptr());
         assert_eq!(AssetId::of(&bytes).0, mesh.id().0);
-        let body = assets.get(assets.scene()).unwrap();
+        let body = found.get(found.scene()).unwrap();
         assert_eq!(codec::decode::<Scene>(&body, MAX_DECODE_BYTES).unwrap(), scene);
     }
 
     #[test]
     fn unused_meshes_are_left_out() {
         let mesh = triangle();
-        let assets = Assets::new(&test_scene::scene(), vec![mesh.clone()], Vec::new()).unwrap();
-        assert_eq!(assets.get(AssetId(mesh.id().0)), None);
+        let found = assets(&test_scene::scene(), vec![mesh.clone()], Vec::new()).unwrap();
+        assert_eq!(found.get(AssetId(mesh.id().0)), None);
     }
 
     #[test]
@@ -198,18 +211,18 @@ mod tests {
         let (named, other) = (texture(1), texture(2));
         let maps = vec![TextureMap::new(named.id(), Filter::Nearest)];
         let scene = Scene { textures: maps, ..test_scene::scene() };
-        let assets = Assets::new(&scene, Vec::new(), vec![named.clone(), other.clone()]).unwrap();
-        let bytes = assets.get(AssetId(named.id().0)).unwrap();
+        let found = assets(&scene, Vec::new(), vec![named.clone(), other.clone()]).unwrap();
+        let bytes = found.get(AssetId(named.id().0)).unwrap();
         assert_eq!(bytes.as_ptr(), named.bytes().as_ptr());
         assert_eq!(AssetId::of(&bytes).0, named.id().0);
-        assert_eq!(assets.get(AssetId(other.id().0)), None);
-        let error = Assets::new(&scene, Vec::new(), vec![other]).unwrap_err();
+        assert_eq!(found.get(AssetId(other.id().0)), None);
+        let error = assets(&scene, Vec::new(), vec![other]).unwrap_err();
         assert!(error.to_string().contains(&named.id().to_string()), "{error}");
     }
 
     #[test]
     fn a_missing_mesh_is_reported() {
-        let error = Assets::new(&scene_with(MeshId([0xab; 32])), Vec::new(), Vec::new()).unwrap_err();
+        let error = assets(&scene_with(MeshId([0xab; 32])), Vec::new(), Vec::new()).unwrap_err();
         assert!(error.to_string().contains("abababab"), "{error}");
     }
 }

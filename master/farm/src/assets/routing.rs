@@ -124,6 +124,11 @@ impl AssetRouting {
         }
     }
 
+    /// Removes the copies of all assets but those that `is_kept` selects.
+    pub fn retain(&mut self, is_kept: impl Fn(AssetId) -> bool) {
+        self.copies.retain(|id, _| is_kept(*id));
+    }
+
     /// Removes a worker whose session has ended, with its copies.
     pub fn remove_worker(&mut self, worker: WorkerId) {
         self.peers.remove(&worker);

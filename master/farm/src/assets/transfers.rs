@@ -46,6 +46,11 @@ impl Transfers {
         }
     }
 
+    /// Drops the transfers of all assets but those that `is_kept` selects: their scenes are not shown any more.
+    pub(crate) fn retain(&mut self, is_kept: impl Fn(AssetId) -> bool) {
+        self.pending.retain(|id, _| is_kept(*id));
+    }
+
     /// Adds this session to `status`, if it waits for anything.
     pub(crate) fn add_to(&self, status: &mut TransferStatus) {
         if self.pending.is_empty() {

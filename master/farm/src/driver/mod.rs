@@ -4,7 +4,7 @@
 //! waits there: messages to workers go into bounded queues, and a worker whose queue is full is disconnected. Pixels are
 //! decoded and hashed outside of the lock.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -30,6 +30,7 @@ use crate::accounting::pace::Pace;
 use crate::accounting::{Accounts, TimelineSink};
 use crate::admission::Door;
 use crate::assets::Assets;
+use crate::assets::scene_table::SceneTable;
 use crate::descriptors;
 use crate::error::FarmError;
 use crate::finished::FinishedFrame;
@@ -52,7 +53,7 @@ const MAX_UNFETCHED: usize = 8;
 /// The farm's state and its clock.
 pub(crate) struct Driver {
     started: Instant,
-    pub(crate) assets: Assets,
+    pub(crate) assets: Arc<SceneTable>,
     framebuffers: Arc<Framebuffers>,
     inner: Mutex<Inner>,
     /// Notified when the scheduler's next timeout is earlier than the armed one.
@@ -129,7 +130,7 @@ impl Driver {
     /// [`FarmError::Random`], when segments are to be verified and the system gives no random numbers.
     pub(crate) fn new(
         options: &FarmOptions,
-        assets: Assets,
+        assets: Arc<SceneTable>,
         arbiter_queue: mpsc::UnboundedSender<Dispute>,
     ) -> Result<Self, FarmError> {
         let key = match options.verify_percent {
@@ -247,6 +248,15 @@ impl Driver {
         self.drive(&mut inner, Event::RequestsDropped { next });
     }
 
+    /// Replaces the scene for all frames that are requested from now on.
+    pub(crate) fn replace_scene(&self, scene: Arc<Assets>) {
+        let mut inner = self.lock();
+        let of_requests = inner.requests.values().map(|request| request.announce.scene);
+        let shown: BTreeSet<_> = of_requests.chain(inner.open_segments.scenes()).collect();
+        self.assets.replace(scene, &shown);
+        inner.sessions.retain_assets(|id| self.assets.has(id));
+    }
+
     /// The announcement of a frame: serialised once, the same bytes for all workers.
     fn announcement(&self, frame: FrameId, view: &FrameView) -> Result<FrameAnnounce, FarmError> {
         view.validate().map_err(FarmError::View)?;
@@ -254,7 +264,7 @@ impl Driver {
         let (FrameView { width, height, .. }, format) = (*view, wire_format(view.format));
         Ok(FrameAnnounce {
             frame,
-            scene: self.assets.scene(),
+            scene: self.assets.current(),
             width,
             height,
             format,

@@ -68,7 +68,8 @@ impl Driver {
         let second = open.second.as_ref().map(|second| second.digest.clone());
         let Lease { first_row, row_count, .. } = open.lease;
         let rows = first_row..first_row.saturating_add(row_count);
-        let dispute = Dispute { frame, segment, view: open.view, rows, first, second };
+        let scene = open.announce.scene;
+        let dispute = Dispute { frame, segment, scene, view: open.view, rows, first, second };
         // The queue is closed only while the farm shuts down.
         self.arbiter_queue.send(dispute).is_err().then_some(no_fault)
     }

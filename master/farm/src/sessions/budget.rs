@@ -12,9 +12,9 @@ use crate::bucket::{Bucket, Rate};
 const MESSAGES: Rate = Rate { burst: 8192.0, per_second: 200.0 };
 /// Failures: at most one for each announced frame, and a master announces few frames beyond 60 a second.
 const FAILURES: Rate = Rate { burst: 128.0, per_second: 60.0 };
-/// Requests for one asset: the first, and some after failed transfers.
+/// Requests for one asset, until the scene is replaced: the first, and some after failed transfers.
 const REQUESTS_OF_ASSET: u32 = 4;
-/// Requests for assets that the scene does not have.
+/// Requests for assets that no scene of the farm has, until the scene is replaced.
 const MAX_UNKNOWN: u32 = 64;
 
 /// A worker sends more than its work needs.
@@ -30,7 +30,7 @@ pub(crate) enum OverBudget {
     #[error("it requests an asset more than {REQUESTS_OF_ASSET} times")]
     Requests,
     /// Too many requests for unknown assets.
-    #[error("it requests more than {MAX_UNKNOWN} assets that the scene does not have")]
+    #[error("it requests more than {MAX_UNKNOWN} assets that no scene of the farm has")]
     Unknown,
     /// A report about an asset that it has not requested, or has reported before.
     #[error("it reports an asset as received that it has not requested")]
@@ -42,7 +42,7 @@ pub(crate) enum OverBudget {
 pub(crate) struct Budget {
     messages: Bucket,
     failures: Bucket,
-    /// Numbers of requests and of reports about assets of the scene.
+    /// Numbers of requests and of reports about assets of the farm's scenes.
     assets: BTreeMap<AssetId, (u32, u32)>,
     unknown: u32,
 }
@@ -57,7 +57,17 @@ impl Budget {
         }
     }
 
-    /// Counts a message. `has_asset` states whether the scene has an asset.
+    /// Begins to count again after the scene was replaced: a worker that keeps few assets may need one again that it had.
+    /// Open requests remain, because reports about them may follow.
+    pub(crate) fn scene_replaced(&mut self, has_asset: impl Fn(AssetId) -> bool) {
+        self.unknown = 0;
+        self.assets.retain(|id, (requests, reports)| {
+            (*requests, *reports) = (requests.saturating_sub(*reports).min(1), 0);
+            *requests > 0 && has_asset(*id)
+        });
+    }
+
+    /// Counts a message. `has_asset` is whether a scene of the farm has an asset.
     ///
     /// # Errors
     /// A message beyond the budget.
@@ -82,6 +92,8 @@ impl Budget {
                 self.unknown += 1;
                 within(self.unknown <= MAX_UNKNOWN, OverBudget::Unknown)
             }
+            // Its scene may have been replaced while it was in transfer.
+            ToMaster::HaveAsset { id } if !has_asset(*id) => Ok(()),
             ToMaster::HaveAsset { id } => {
                 let (requests, reports) = self.assets.get_mut(id).ok_or(OverBudget::Reports)?;
                 *reports += 1;
@@ -148,6 +160,26 @@ mod tests {
         let need = ToMaster::NeedAsset { id: AssetId([200; 32]), offset: 0, again: false };
         assert_eq!(budget.count(&need, |_| false, now), Err(OverBudget::Unknown));
         assert!(budget.assets.is_empty());
+    }
+
+    #[test]
+    fn counts_begin_again_when_the_scene_is_replaced() {
+        let now = Instant::now();
+        let mut budget = Budget::new(now);
+        let id = AssetId([1; 32]);
+        let (need, have) = (ToMaster::NeedAsset { id, offset: 0, again: false }, ToMaster::HaveAsset { id });
+        for _ in 0..3 {
+            (0..REQUESTS_OF_ASSET - 1).for_each(|_| assert_eq!(budget.count(&need, any, now), Ok(())));
+            budget.scene_replaced(any);
+        }
+        assert_eq!(budget.count(&have, any, now), Ok(()), "a request is open");
+        assert_eq!(budget.count(&have, any, now), Err(OverBudget::Reports));
+        assert_eq!(budget.count(&have, |_| false, now), Ok(()), "no scene has it any more");
+        budget.scene_replaced(|_| false);
+        assert!(budget.assets.is_empty());
+        (0..MAX_UNKNOWN).for_each(|_| assert_eq!(budget.count(&need, |_| false, now), Ok(())));
+        budget.scene_replaced(any);
+        assert_eq!(budget.count(&need, |_| false, now), Ok(()));
     }
 
     #[test]

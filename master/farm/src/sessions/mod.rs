@@ -187,6 +187,12 @@ impl Sessions {
         }
     }
 
+    /// Drops what is known about transfers of all assets but those that `is_kept` selects.
+    pub(crate) fn retain_assets(&mut self, is_kept: impl Fn(AssetId) -> bool) {
+        self.routing.retain(&is_kept);
+        self.sessions.values_mut().for_each(|session| session.transfers.retain(&is_kept));
+    }
+
     /// Bytes sent and received by all sessions, ended ones included.
     pub(crate) fn byte_count(&self) -> ByteCount {
         let mut sum = self.ended;

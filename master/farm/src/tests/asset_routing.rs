@@ -11,7 +11,8 @@ use rayfarm_tracer::texture::Texture;
 use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 
 use crate::farm::Farm;
-use crate::options::{FarmOptions, FarmScene};
+use crate::farm_scene::FarmScene;
+use crate::options::FarmOptions;
 use crate::testing::test_scene::{scene, view};
 use rayfarm_scheduler::SegmentPolicy;
 

@@ -15,8 +15,9 @@ use tokio::sync::oneshot;
 
 use crate::error::{FarmError, UnknownWorker};
 use crate::farm::Farm;
+use crate::farm_scene::FarmScene;
 use crate::finished::FinishedFrame;
-use crate::options::{FarmOptions, FarmScene};
+use crate::options::FarmOptions;
 use crate::status::FarmStatus;
 use crate::supervisor::LocalWorkerCommand;
 use crate::testing::fake_worker::{self, Script, is_picture};
@@ -30,6 +31,7 @@ mod decoding;
 mod formats;
 mod identity;
 mod invalid_peers;
+mod scenes;
 mod verification;
 
 /// Time limit of a wait, so that a farm that hangs fails its test.

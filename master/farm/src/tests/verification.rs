@@ -1,16 +1,21 @@
 //! Verification over 127.0.0.1, with workers that send wrong pixels.
 
+use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rayfarm_protocol::{Hello, handshake};
-use rayfarm_tracer::scene::FrameView;
+use glam::Vec3;
+use rayfarm_protocol::{AssetId, Hello, handshake};
+use rayfarm_tracer::scene::{Background, FrameView, Scene};
 use tokio::net::TcpStream;
 use tokio_util::sync::CancellationToken;
 
+use crate::assets::Assets;
+use crate::assets::scene_table::SceneTable;
 use crate::farm::Farm;
-use crate::options::{FarmOptions, FarmScene};
+use crate::farm_scene::FarmScene;
+use crate::options::FarmOptions;
 use crate::status::FarmStatus;
 use crate::testing::fake_worker::{self, Script, is_picture};
 use crate::testing::test_scene::{scene, view};
@@ -24,8 +29,9 @@ async fn farm(policy: SegmentPolicy, verify_percent: u8) -> Farm {
     let listen = Some(SocketAddr::from(([127, 0, 0, 1], 0)));
     let options = FarmOptions { listen, policy, verify_percent, ..FarmOptions::default() };
     let scene = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
-    let renderer = Arc::new(|view: &FrameView, rows| Ok(fake_worker::pixels(view, rows)));
-    Farm::start_with(options, scene, Some(renderer), CancellationToken::new()).await.unwrap()
+    let scenes = Arc::new(SceneTable::new(Arc::new(Assets::new(scene).unwrap())));
+    let renderer = Arc::new(|_, view: &FrameView, rows| Ok(fake_worker::pixels(view, rows)));
+    Farm::start_with(options, scenes, Some(renderer), CancellationToken::new()).await.unwrap()
 }
 
 async fn in_time<T>(what: impl Future<Output = T>) -> T {
@@ -161,16 +167,27 @@ async fn a_second_rendering_that_does_not_fit_is_refused() {
     farm.shut_down().await;
 }
 
+/// The assets of the scene with another background.
+fn gray(background: f32) -> Arc<Assets> {
+    let scene = Scene { background: Background::Color(Vec3::splat(background)), ..scene() };
+    Arc::new(Assets::new(FarmScene { scene, meshes: Vec::new(), textures: Vec::new() }).unwrap())
+}
+
 #[test]
 fn the_renderer_of_the_master_uses_the_real_tracer() {
-    let drawn = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
-    let render = arbiter::row_renderer(drawn, CancellationToken::new());
-    let whole = render(&view(), 0..view().height).unwrap();
+    let scenes = Arc::new(SceneTable::new(gray(1.0)));
+    let white = scenes.current();
+    let render = arbiter::row_renderer(scenes.clone(), CancellationToken::new());
+    let whole = render(white, &view(), 0..view().height).unwrap();
     let row_bytes = view().width as usize * 3;
     assert_eq!(whole.len(), row_bytes * view().height as usize);
-    assert_eq!(render(&view(), 8..11).unwrap(), whole[8 * row_bytes..11 * row_bytes]);
+    assert_eq!(render(white, &view(), 8..11).unwrap(), whole[8 * row_bytes..11 * row_bytes]);
+    scenes.replace(gray(0.0), &BTreeSet::new());
+    let black = scenes.current();
+    assert_eq!(render(black, &view(), 0..1).unwrap(), vec![0; row_bytes]);
+    assert_eq!(render(white, &view(), 0..1).unwrap(), whole[..row_bytes], "each frame in its own scene");
+    assert!(render(AssetId([7; 32]), &view(), 0..1).is_err(), "a scene that the table does not have");
     let stopped = CancellationToken::new();
     stopped.cancel();
-    let drawn = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
-    assert!(arbiter::row_renderer(drawn, stopped)(&view(), 0..8).is_err());
+    assert!(arbiter::row_renderer(scenes, stopped)(white, &view(), 0..8).is_err());
 }

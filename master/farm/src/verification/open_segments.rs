@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use rayfarm_protocol::{FrameAnnounce, FrameId, Lease};
+use rayfarm_protocol::{AssetId, FrameAnnounce, FrameId, Lease};
 use rayfarm_scheduler::{Finding, WorkerId};
 use rayfarm_tracer::scene::FrameView;
 
@@ -50,6 +50,11 @@ impl OpenSegments {
         self.0.range((frame, 0)..=(frame, u32::MAX)).next().map(|(_, segment)| &segment.announce)
     }
 
+    /// The scenes of all frames with open segments.
+    pub(crate) fn scenes(&self) -> impl Iterator<Item = AssetId> {
+        self.0.values().map(|segment| segment.announce.scene)
+    }
+
     /// Compares a second rendering with the first. Both digests should be computed before, outside of locks.
     pub(crate) fn compare(&mut self, lease: &Lease, second: Rendering) -> Finding {
         let Some(segment) = self.0.get_mut(&(lease.frame, lease.segment)) else { return Finding::Unknown };
@@ -68,7 +73,7 @@ impl OpenSegments {
 #[cfg(test)]
 mod tests {
     use bytes::Bytes;
-    use rayfarm_protocol::{AssetId, PixelFormat};
+    use rayfarm_protocol::PixelFormat;
 
     use super::*;
     use crate::testing::test_scene::view;

@@ -8,6 +8,7 @@ use crate::app::cli::ObservabilityArgs;
 use crate::app::control::{self, Console, Place};
 use crate::error::CommandError;
 use crate::viewer::KnobSender;
+use crate::viewer::edits::EditorHandle;
 
 /// Timeline and control, as the command line requests them.
 pub(super) struct Observability {
@@ -28,7 +29,7 @@ impl Observability {
         Ok(Self { timeline, control: args.control.clone(), over: CancellationToken::new() })
     }
 
-    /// Records the timeline of a farm from now on, and accepts commands for it and for the knobs of `view`. The command `quit`
+    /// Records the timeline of a farm from now on, and accepts commands for it, for the knobs of `view` and for its scene. The command `quit`
     /// cancels `quit`. Must be called inside a runtime.
     ///
     /// # Errors
@@ -36,7 +37,7 @@ impl Observability {
     pub(super) fn begin(
         &self,
         farm: &Farm,
-        view: Option<KnobSender>,
+        view: Option<(KnobSender, Option<EditorHandle>)>,
         quit: &CancellationToken,
     ) -> Result<(), CommandError> {
         if let Some(timeline) = &self.timeline {
@@ -44,7 +45,8 @@ impl Observability {
         }
         match &self.control {
             Some(place) => {
-                let console = Console::new(farm.control(), view, quit.clone());
+                let (view, editor) = view.map_or((None, None), |(view, editor)| (Some(view), editor));
+                let console = Console::new(farm.control(), view, quit.clone()).with_editor(editor);
                 control::start(place, console, self.over.clone())
             }
             None => Ok(()),

@@ -5,6 +5,7 @@ use rayfarm_tracer::scene::knobs::KNOBS;
 
 use crate::app::knob_values;
 use crate::viewer::KnobChange;
+use crate::viewer::edits::EditCommand;
 
 /// A command of one line.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,8 @@ pub(super) enum Command {
     Set(KnobChange),
     /// Shows pictures of paths at rest with or without most of their noise.
     Denoise(bool),
+    /// Edits the scene. The line names the change when it is undone.
+    Edit(EditCommand, String),
 }
 
 /// Workers that a command applies to.
@@ -46,7 +49,7 @@ pub(super) enum WorkerSelector {
 const DENOISE: &str = "denoise";
 
 /// Syntax and effect of each command.
-pub(super) const COMMANDS: [(&str, &str); 11] = [
+pub(super) const COMMANDS: [(&str, &str); 29] = [
     ("workers", "list the connected workers"),
     ("status", "report the progress of the run"),
     ("drain ID|NAME", "disconnect a worker after it has finished its leases"),
@@ -56,6 +59,27 @@ pub(super) const COMMANDS: [(&str, &str); 11] = [
     ("resume [ID|NAME]", "grant a paused worker, or all, leases again"),
     ("set KNOB VALUE", "give a knob of the view another value"),
     ("set denoise on|off", "filter the noise of paths in the picture at rest"),
+    ("object list", "list the objects of the scene with their names and items"),
+    (
+        "object add KIND KEY = VALUE, ...",
+        "add a model, sphere, triangle, rectangle, box, disk, plane or group",
+    ),
+    ("object move NAME X Y Z", "move an object by a vector"),
+    ("object rotate NAME X Y Z", "turn an object by degrees about x, y and z"),
+    ("object scale NAME FACTOR|X Y Z", "scale an object by one factor or three"),
+    ("object set NAME KEY VALUE", "give a key of an object another value"),
+    ("object remove NAME", "remove an object"),
+    ("material NAME KEY VALUE", "give a key of a material another value"),
+    ("light N KEY VALUE", "give a key of a light another value"),
+    ("light add KEY = VALUE, ...", "add a light"),
+    ("light remove N", "remove a light"),
+    ("background KEY VALUE", "give a key of the background another value"),
+    ("background { KEY = VALUE, ... }", "replace all keys of the background"),
+    ("render KEY VALUE", "give a key of [render] another value"),
+    ("ambient VALUE", "give the ambient light another value"),
+    ("undo", "undo the last change of the scene"),
+    ("redo", "repeat the change that was undone last"),
+    ("save FILE", "write the scene to a file"),
     ("help", "print this list"),
     ("quit", "end the run"),
 ];
@@ -69,6 +93,9 @@ impl Command {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
+        if let Some(edit) = EditCommand::parse(word, rest) {
+            return edit.map(|edit| Self::Edit(edit, line.to_owned()));
+        }
         let command = match word {
             "workers" => Self::Workers,
             "status" => Self::Status,

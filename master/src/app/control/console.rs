@@ -9,6 +9,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::command::{COMMANDS, Command, WorkerSelector};
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
+use crate::viewer::edits::EditorHandle;
 use crate::viewer::{KICK_REASON, KnobSender};
 
 /// Executor of the commands of one or more connections.
@@ -17,6 +18,8 @@ pub(crate) struct Console {
     farm: FarmControl,
     /// `None` in a run without a view.
     view: Option<KnobSender>,
+    /// `None` in a run without a view, or where the scene cannot be edited.
+    editor: Option<EditorHandle>,
     quit: CancellationToken,
 }
 
@@ -42,10 +45,15 @@ pub(super) enum Then {
 impl Console {
     /// An executor for `farm` and the knobs of `view`. Cancels `quit` at the command of that name.
     pub(crate) fn new(farm: FarmControl, view: Option<KnobSender>, quit: CancellationToken) -> Self {
-        Self { farm, view, quit }
+        Self { farm, view, editor: None, quit }
     }
 
-    /// Executes a line.
+    /// The executor with an editor of the scene.
+    pub(crate) fn with_editor(self, editor: Option<EditorHandle>) -> Self {
+        Self { editor, ..self }
+    }
+
+    /// Executes a line. Waits while a changed scene is loaded.
     pub(super) fn answer(&self, line: &Line) -> Answer {
         let text = match line {
             Line::Text(text) => text,
@@ -86,6 +94,12 @@ impl Console {
             Command::Denoise(on) => {
                 self.view()?.denoise(*on)?;
                 json!({ "ok": true, "denoise": on })
+            }
+            Command::Edit(edit, line) => {
+                let editor = self.editor.as_ref();
+                let editor =
+                    editor.ok_or("the scene of this run cannot be edited: that needs a view of a scene")?;
+                editor.perform(edit.clone(), line)?
             }
             Command::Allow(worker) => {
                 let worker = find_kicked(&status, worker)?;

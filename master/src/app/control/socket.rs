@@ -103,7 +103,10 @@ impl Server {
                 let Some(line) = line else { continue };
                 let answer = match self.opening(is_trusted, &line) {
                     Some(answer) => answer,
-                    None => self.console.answer(&line),
+                    None => {
+                        let console = self.console.clone();
+                        tokio::task::spawn_blocking(move || console.answer(&line)).await.ok()?
+                    }
                 };
                 let written = write(stream, &answer).await;
                 match answer.then {

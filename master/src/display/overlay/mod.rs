@@ -9,6 +9,8 @@ use rayfarm_farm::BannedWorker;
 use rayfarm_farm::Reachable;
 use rayfarm_farm::accounting::duration_text;
 
+use rayfarm_tracer::simd_level;
+
 use super::canvas::{Canvas, GLYPH, Rect};
 use super::numbers::{counted, three_digits};
 use crate::viewer::film::FilmProgress;
@@ -21,6 +23,8 @@ pub(super) mod legend;
 const LINE: usize = GLYPH + 3;
 /// Distance between text and the edge of its panel, in dots.
 const MARGIN: usize = 5;
+/// Lines of a fault that are shown; the log has all of it.
+const MAX_FAULT_LINES: usize = 8;
 const WHITE: u32 = 0x00f4_f4f4;
 const SOFT: u32 = 0x00c4_ccd4;
 
@@ -56,6 +60,8 @@ pub(super) struct Overlay {
     pub(super) help: bool,
     /// Message about a farm that renders nothing, in the middle of the window.
     pub(super) message: Option<Vec<String>>,
+    /// Fault in the files of the scene, at the lower edge: the picture is of the scene before.
+    pub(super) fault: Option<String>,
 }
 
 impl Overlay {
@@ -74,6 +80,9 @@ impl Overlay {
         if let Some(accounts) = &self.accounts {
             accounts.draw(canvas);
         }
+        if let Some(fault) = &self.fault {
+            draw_fault(canvas, fault);
+        }
         if self.help {
             draw_help(canvas);
         } else if let Some(message) = &self.message {
@@ -87,6 +96,8 @@ impl Overlay {
 pub(super) struct Figures {
     /// Completed frames per second; `None` at rest, when no frame is requested.
     pub(super) fps: Option<f64>,
+    /// Lowest and highest rate within the last second, by the times between frames, where known.
+    pub(super) fps_range: Option<(f64, f64)>,
     /// Mean time of a frame.
     pub(super) frame_time: Duration,
     /// Time from an input to its picture on the screen, where known.
@@ -115,6 +126,9 @@ impl Figures {
     /// Lines of the overlay.
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![self.speed()];
+        if let Some((lowest, highest)) = self.fps_range.filter(|_| self.fps.is_some()) {
+            lines.push(format!("{} to {} FPS", three_digits(lowest), three_digits(highest)));
+        }
         let samples = match self.film {
             None if self.samples > 1 => format!(", {} samples", self.samples),
             _ => String::new(),
@@ -139,6 +153,7 @@ impl Figures {
         if let Some(progress) = self.progress {
             lines.push(format!("next frame: {:.0} %", progress.clamp(0.0, 1.0) * 100.0));
         }
+        lines.push(format!("rayfarm {}, {}", env!("CARGO_PKG_VERSION"), simd_level()));
         lines.push("H: keys".to_owned());
         lines
     }
@@ -191,6 +206,18 @@ pub(super) fn waiting_for_workers(
 /// Message while all workers are paused.
 pub(super) fn all_paused() -> Vec<String> {
     vec!["All workers are paused.".to_owned(), String::new(), "P: resume".to_owned()]
+}
+
+/// Draws a fault in the files of the scene at the lower edge.
+fn draw_fault(canvas: &mut Canvas, fault: &str) {
+    let scale = Panel::suited_to(canvas.height());
+    let columns = (canvas.width() / (GLYPH * scale)).saturating_sub(4).max(1);
+    let mut lines = vec!["The scene has a fault and is shown as it was before:".to_owned()];
+    lines.extend(fault.lines().flat_map(|line| broken(line, columns)).take(MAX_FAULT_LINES));
+    let panel = Panel::fit(canvas, &lines);
+    let x = canvas.width().saturating_sub(panel.width()) / 2;
+    let y = canvas.height().saturating_sub(panel.height() + MARGIN * panel.scale);
+    panel.draw(canvas, x, y, 1);
 }
 
 fn draw_centred(canvas: &mut Canvas, lines: &[String], bright: usize) {

@@ -10,6 +10,7 @@ fn canvas(width: usize, height: usize) -> Canvas {
 fn figures() -> Figures {
     Figures {
         fps: Some(31.25),
+        fps_range: None,
         frame_time: Duration::from_micros(32_100),
         latency: Some(Duration::from_micros(64_200)),
         size: (1024, 768),
@@ -56,6 +57,28 @@ fn figures_are_legible_on_the_canvas() {
     assert_eq!(line(3, 19), "1,234,567 triangles");
     assert_eq!(line(4, 15), "latency 64.2 ms");
     assert_eq!(line(5, 16), "next frame: 42 %");
+}
+
+#[test]
+fn the_range_of_the_rate_and_the_build_have_lines() {
+    let lines = Figures { fps_range: Some((20.0, 40.0)), ..figures() }.lines();
+    assert_eq!(lines[1], "20.0 to 40.0 FPS");
+    let build = &lines[lines.len() - 2];
+    assert!(build.contains(env!("CARGO_PKG_VERSION")) && build.contains(simd_level()), "{build}");
+    let resting = Figures { fps: None, fps_range: Some((20.0, 40.0)), ..figures() }.lines();
+    assert!(!resting.iter().any(|line| line.contains("40.0")), "{resting:?}");
+}
+
+#[test]
+fn a_fault_of_the_scene_is_legible_at_the_lower_edge() {
+    let mut canvas = canvas(640, 480);
+    let overlay = Overlay { fault: Some("room.toml:3:1: unknown key".to_owned()), ..Overlay::default() };
+    overlay.draw(&mut canvas);
+    let drawn = |y: usize| canvas.pixels()[y * 640..(y + 1) * 640].contains(&WHITE);
+    assert!((440..480).any(drawn) && !(0..400).any(drawn), "the picture above remains visible");
+    let mut small = Canvas::default();
+    small.resize(40, 30);
+    Overlay { fault: Some("long ".repeat(500)), ..Overlay::default() }.draw(&mut small);
 }
 
 #[test]

@@ -323,6 +323,8 @@ impl Shown {
             screen.message(&panel::keys());
         } else if viewer.status().workers.is_empty() {
             screen.message(&waiting(viewer));
+        } else if let Some(fault) = &viewer.statistics().scene_fault {
+            screen.message(&panel::scene_fault(fault, columns));
         }
         self.encoder.update(&cells, columns, bytes);
     }

@@ -12,6 +12,9 @@ const TEXT: Rgb = [236, 236, 236];
 const SOFT: Rgb = [160, 168, 176];
 const GROUND: Rgb = [24, 27, 31];
 
+/// Lines of a fault that are shown; the log has all of it.
+const MAX_FAULT_LINES: usize = 6;
+
 /// Rows of the panel.
 pub(super) const PANEL_ROWS: usize = 2;
 
@@ -73,6 +76,15 @@ impl Screen<'_> {
             self.write(row, column.saturating_sub(1), &format!(" {line:width$} "), TEXT);
         }
     }
+}
+
+/// The message about a fault in the files of the scene, in lines of at most `columns` characters.
+pub(super) fn scene_fault(fault: &str, columns: usize) -> Vec<String> {
+    let mut lines = vec!["The scene has a fault and is shown as it was before:".to_owned()];
+    let characters: Vec<char> = fault.chars().collect();
+    let pieces = characters.chunks(columns.saturating_sub(4).max(8)).take(MAX_FAULT_LINES);
+    lines.extend(pieces.map(|piece| piece.iter().collect()));
+    lines
 }
 
 /// The list of keys.

@@ -33,6 +33,8 @@ const DISTANCES: (f64, f64) = (1e-4, 1e3);
 #[derive(Clone, Debug)]
 pub(crate) struct CameraControl {
     home: Camera,
+    /// Camera of a scene that has replaced the first one.
+    next_home: Option<Camera>,
     /// `None` until a movement, so that the untouched camera is the scene's own, bit for bit.
     pose: Option<Pose>,
     frame: Frame,
@@ -42,7 +44,13 @@ pub(crate) struct CameraControl {
 impl CameraControl {
     /// Control that starts at `home`. `bounds` are those of everything finite in the scene.
     pub(crate) fn new(home: Camera, bounds: Option<(DVec3, DVec3)>) -> Self {
-        Self { home, pose: None, frame: Frame::of(&home), scene_size: scene_size(&home, bounds) }
+        Self {
+            home,
+            next_home: None,
+            pose: None,
+            frame: Frame::of(&home),
+            scene_size: scene_size(&home, bounds),
+        }
     }
 
     /// The current camera.
@@ -60,7 +68,15 @@ impl CameraControl {
 
     /// Restores the scene's camera.
     pub(crate) fn reset(&mut self) {
+        if let Some(home) = self.next_home.take() {
+            (self.home, self.frame) = (home, Frame::of(&home));
+        }
         self.pose = None;
+    }
+
+    /// Sets the camera that the next reset restores. The current camera remains.
+    pub(crate) fn set_home(&mut self, home: Camera) {
+        self.next_home = Some(home);
     }
 
     /// Moves camera and look-at point for `seconds`. `direction` is right, up and forward, each in -1..=1.

@@ -7,6 +7,7 @@
 //! [`film`](super::film) shows is published after each.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rayfarm_farm::{Farm, FarmError, FinishedFrame, ViewRequest};
@@ -78,7 +79,7 @@ impl Viewer {
         let (channels, handle) = Channels::new(farm.entrance(), farm.status());
         let viewer = Self {
             farm,
-            state: ViewState { request, hidden: false, denoised },
+            state: ViewState { request, scene: 0, hidden: false, denoised },
             visibility: Visibility::default(),
             camera,
             requests: Requests::new(policy, controller),
@@ -104,7 +105,7 @@ impl Viewer {
         let (channels, handle) = Channels::new(farm.entrance(), farm.status());
         let viewer = Self {
             farm,
-            state: ViewState { request, hidden: false, denoised: false },
+            state: ViewState { request, scene: 0, hidden: false, denoised: false },
             visibility: Visibility::default(),
             camera: CameraControl::new(request.view.camera, None),
             requests: Requests::of_sequence(animation, plan),
@@ -327,6 +328,16 @@ fn apply(
             }
             state.denoised = on;
         }
+        InputAction::ShowScene(update) => {
+            farm.replace_scene(Arc::clone(&update.assets));
+            state.scene += 1;
+            state.request = update.applied(state.request);
+            if let Some(home) = update.camera() {
+                camera.set_home(home);
+            }
+            figures.set_scene_fault(None);
+        }
+        InputAction::SceneFault(fault) => figures.set_scene_fault(Some(fault)),
         InputAction::Worker(command) => command.perform(&farm.control()),
         InputAction::Quit => return ControlFlow::Break(()),
     }
@@ -341,6 +352,8 @@ async fn until(at: Option<Instant>) {
     }
 }
 
+#[cfg(test)]
+mod edit_tests;
 #[cfg(test)]
 mod film_tests;
 #[cfg(test)]

@@ -46,8 +46,8 @@ pub(super) struct Requests {
     /// Index, within the animation or the plan, of the next frame to request.
     next: u64,
     open: VecDeque<Open>,
-    /// View at the last request.
-    wanted: Option<ViewRequest>,
+    /// View at the last request, and the number of its scene.
+    wanted: Option<(ViewRequest, u64)>,
     /// Last request, unless it was dropped.
     requested: Option<Requested>,
     /// Passes of the view at rest, if it is rendered in passes.
@@ -147,7 +147,7 @@ impl Requests {
 
     /// Replaces the last request after a change of the view or of the display's visibility.
     pub(super) fn replace(&mut self, farm: &impl Renderer, state: &ViewState) {
-        if self.wanted != Some(state.request) {
+        if self.wanted != Some((state.request, state.scene)) {
             self.moved_at = Some(Instant::now());
         }
         self.request_instead(farm, state);

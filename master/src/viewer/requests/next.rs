@@ -28,7 +28,7 @@ impl Requests {
         let now = Instant::now();
         let since_start = self.since_start(now);
         let wanted = &state.request;
-        self.note_change(farm, wanted, since_start);
+        self.note_change(farm, state, since_start);
         let mode = self.controller.as_mut().map(|controller| controller.next(since_start));
         let moves_alone = self.controller.is_none() && self.stillness.motion(since_start) == Motion::Moving;
         let is_moving = self.policy.animation.is_moving() || is_moving(mode) || moves_alone;
@@ -115,9 +115,15 @@ impl Requests {
         })
     }
 
-    /// Records the view, which may have changed.
-    fn note_change(&mut self, farm: &impl Renderer, wanted: &ViewRequest, now: Duration) {
-        let Some(before) = self.wanted.replace(*wanted).filter(|before| before != wanted) else { return };
+    /// Records view and scene, which may have changed.
+    fn note_change(&mut self, farm: &impl Renderer, state: &ViewState, now: Duration) {
+        let (wanted, scene) = (&state.request, state.scene);
+        let before = self.wanted.replace((*wanted, scene)).filter(|before| *before != (*wanted, scene));
+        let Some((before, former_scene)) = before else { return };
+        if scene != former_scene {
+            // Another scene is another picture, even of the same view.
+            self.passes = None;
+        }
         // Another view may need the same frame, which is then requested again: the view rests only after a frame of its own.
         self.requested = None;
         match &mut self.controller {

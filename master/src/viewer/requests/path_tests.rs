@@ -141,7 +141,7 @@ fn moving_pictures_of_paths_have_one_sample_and_a_sequence_has_all() {
     let (plan, _sender, _sequence) = SequencePlan::new(&[0, 1], &[]);
     let requests = Requests::of_sequence(SPINNING, plan);
     let request = ViewRequest { view: paths(40), scale: RenderScale::Full };
-    let state = ViewState { request, hidden: false, denoised: false };
+    let state = ViewState { request, scene: 0, hidden: false, denoised: false };
     let mut view = View { requests, recorder: Recorder::default(), state };
     view.requests.fill(&view.recorder, &view.state);
     assert_eq!(ranges(&view, 0), [(0, 40), (0, 40)]);

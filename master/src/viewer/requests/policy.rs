@@ -27,6 +27,8 @@ impl Renderer for Farm {
 pub(crate) struct ViewState {
     /// Picture in the size of the display.
     pub(crate) request: ViewRequest,
+    /// Number of times that the scene was replaced.
+    pub(crate) scene: u64,
     /// Whether the display is minimised, unmapped or covered.
     pub(crate) hidden: bool,
     /// Whether the picture at rest is shown without most of its noise, if it is rendered in passes.

@@ -50,7 +50,7 @@ impl View {
         let request = ViewRequest { view, scale: RenderScale::Full };
         let policy = RequestPolicy { animation, limit: None, continuous };
         let requests = Requests::new(policy, controller);
-        let state = ViewState { request, hidden: false, denoised: false };
+        let state = ViewState { request, scene: 0, hidden: false, denoised: false };
         let mut view = Self { requests, recorder: Recorder::default(), state };
         view.requests.fill(&view.recorder, &view.state);
         view
@@ -206,7 +206,7 @@ fn a_sequence_requests_each_frame_of_its_plan_once_and_waits_for_slots() {
     let numbers: Vec<u64> = (0..20).map(|index| 2 * index + 1).collect();
     let (plan, _sender, _sequence) = SequencePlan::new(&numbers, &[]);
     let request = ViewRequest { view: test_scene::view(), scale: RenderScale::Full };
-    let state = ViewState { request, hidden: false, denoised: false };
+    let state = ViewState { request, scene: 0, hidden: false, denoised: false };
     let requests = Requests::of_sequence(SPINNING, plan);
     let mut view = View { requests, recorder: Recorder::default(), state };
     view.requests.fill(&view.recorder, &view.state);

@@ -63,6 +63,14 @@ pub(in crate::scene) fn shown(path: &Path) -> String {
 }
 
 impl SceneError {
+    /// The message without the line of a scene file that only the program knows, because it is being edited; other places remain.
+    pub fn message(&self) -> String {
+        match self {
+            Self::InScene { message, .. } => escaped(message).to_string(),
+            other => other.to_string(),
+        }
+    }
+
     pub(in crate::scene) fn in_file(path: &Path, message: impl Into<String>) -> Self {
         Self::InFile { path: path.to_owned(), message: message.into() }
     }

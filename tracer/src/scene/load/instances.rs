@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::limits::LoadLimits;
+use super::loader::{Caches, ModelCache, ModelKey};
 use super::model::load_model;
 use super::textures::Textures;
+use crate::files::FileStamp;
 use crate::material::Material;
 use crate::mesh::{CompileOptions, CompiledMesh, MeshId};
 use crate::scene::data::{Model, NormalMode};
@@ -27,6 +29,7 @@ pub(super) struct Models {
     /// By real path: the texture coordinates that the instances of a file need.
     uvs: BTreeMap<PathBuf, Uvs>,
     pub(super) textures: Textures,
+    cache: ModelCache,
     /// By real path and crease angle.
     loaded: BTreeMap<(PathBuf, Option<u64>), LoadedModel>,
     /// Material slots of all instances so far.
@@ -71,8 +74,8 @@ impl Models {
         scene: &Path,
         models: impl Iterator<Item = &'t ModelText>,
         materials: MaterialsText<'_>,
-        options: LoadOptions,
-        limits: LoadLimits,
+        (options, limits): (LoadOptions, LoadLimits),
+        caches: &Caches,
     ) -> Result<Self, Fault> {
         let folder = scene.parent().unwrap_or(Path::new(""));
         let mut all = Self {
@@ -82,13 +85,15 @@ impl Models {
             limits,
             smooth: BTreeSet::new(),
             uvs: BTreeMap::new(),
-            textures: Textures::new(limits.texture_bytes),
+            textures: Textures::with_cache(limits.texture_bytes, &caches.pictures),
+            cache: caches.models.clone(),
             loaded: BTreeMap::new(),
             slots: 0,
             warnings: Vec::new(),
         };
         for model in models {
             let path = named(folder, &model.file);
+            all.cache.note(FileStamp::of(&path));
             let real = path.canonicalize().map_err(|e| Fault {
                 at: model.at,
                 message: format!(
@@ -136,7 +141,10 @@ impl Models {
                     _ => crease_angle,
                 };
                 let options = LoadOptions { crease_angle, ..self.options };
-                let (mesh, warnings) = load_model(&path, compile, uvs, options)?;
+                let bits = crease_angle.map(f64::to_bits);
+                let key = ModelKey { path: real.clone(), crease_angle: bits, normals, uvs };
+                let load = |files: &mut Vec<FileStamp>| load_model(&path, compile, uvs, options, files);
+                let (mesh, warnings) = self.cache.get_or_read(key, load)?;
                 self.warnings.extend(warnings);
                 entry.insert(LoadedModel { path, mesh, own_materials: None })
             }

@@ -1,9 +1,11 @@
 //! Loading of complete scenes: files are read, models compiled, and everything that a file leaves open is decided.
 
 mod background;
+mod cache;
 mod framing;
 mod instances;
 mod limits;
+mod loader;
 mod model;
 mod moved;
 mod scene_file;
@@ -17,10 +19,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use limits::LoadLimits;
+pub use loader::SceneLoader;
 pub use model::{compile_model, compile_model_with};
 
 use super::data::Scene;
-use super::import::{Kind, LoadOptions, SceneError};
+use super::import::{LoadOptions, SceneError};
 use crate::mesh::CompiledMesh;
 use crate::texture::Texture;
 
@@ -65,10 +68,5 @@ pub fn load_limited(
     options: LoadOptions,
     limits: LoadLimits,
 ) -> Result<LoadedScene, SceneError> {
-    let loaded = match Kind::of(path)? {
-        Kind::Scene => scene_file::load(path, options, limits)?,
-        Kind::Obj | Kind::Compiled => model::load_bare(path, options, limits)?,
-    };
-    loaded.scene.validate().map_err(|fault| SceneError::in_file(path, fault.to_string()))?;
-    Ok(loaded)
+    SceneLoader::new(options, limits).load(path)
 }

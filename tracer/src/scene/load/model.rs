@@ -6,8 +6,10 @@ use std::sync::Arc;
 use super::LoadedScene;
 use super::framing;
 use super::limits::LoadLimits;
+use super::loader::{Caches, ModelKey};
 use super::moved;
 use super::textures::Textures;
+use crate::files::FileStamp;
 use crate::mesh::{CompileOptions, CompiledMesh, Mesh, MeshReport};
 use crate::scene::import::{Kind, LoadOptions, MAX_MODEL_BYTES, SceneError, Up, Uvs, bytes, load_obj};
 
@@ -35,7 +37,7 @@ pub fn compile_model_with(
     compile: CompileOptions,
     options: LoadOptions,
 ) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
-    let (mesh, mut warnings) = load_model(path, compile, Uvs::Whole, options)?;
+    let (mesh, mut warnings) = load_model(path, compile, Uvs::Whole, options, &mut Vec::new())?;
     let from = path.parent().unwrap_or(Path::new(""));
     let moved = moved::texture_names(&mesh, from, folder)
         .map_err(|source| SceneError::Mesh { path: path.to_owned(), source })?;
@@ -55,12 +57,22 @@ pub(super) fn load_bare(
     path: &Path,
     options: LoadOptions,
     limits: LoadLimits,
+    caches: &Caches,
 ) -> Result<LoadedScene, SceneError> {
     // The instance is rotated upright in place of the mesh: compiled meshes cannot be changed.
     let unturned = LoadOptions { up: None, ..options };
-    let (mesh, mut warnings) = load_model(path, CompileOptions::default(), Uvs::Textured, unturned)?;
+    let compile = CompileOptions::default();
+    let real = path.canonicalize().map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
+    let key = ModelKey {
+        path: real,
+        crease_angle: options.crease_angle.map(f64::to_bits),
+        normals: compile.normals,
+        uvs: Uvs::Textured,
+    };
+    let load = |files: &mut Vec<FileStamp>| load_model(path, compile, Uvs::Textured, unturned, files);
+    let (mesh, mut warnings) = caches.models.get_or_read(key, load)?;
     let mut scene = framing::bare_model(&mesh, options.up.unwrap_or_default(), options.size);
-    let mut textures = Textures::new(limits.texture_bytes);
+    let mut textures = Textures::with_cache(limits.texture_bytes, &caches.pictures);
     scene.materials = textures.of_model(path, &mesh, options.allow_parent_textures, &mut warnings);
     let (maps, textures, notes) = textures.take_parts();
     scene.textures = maps;
@@ -69,13 +81,16 @@ pub(super) fn load_bare(
     Ok(LoadedScene { scene, meshes: vec![mesh], mesh_files, textures, warnings })
 }
 
-/// Loads and compiles a model, or reads a compiled one. Returns the mesh and warnings.
+/// Loads and compiles a model, or reads a compiled one. Returns the mesh and warnings, and adds the files that it reads, with
+/// their state before that.
 pub(super) fn load_model(
     path: &Path,
     compile: CompileOptions,
     uvs: Uvs,
     options: LoadOptions,
+    files: &mut Vec<FileStamp>,
 ) -> Result<(Arc<CompiledMesh>, Vec<String>), SceneError> {
+    files.push(FileStamp::of(path));
     let failed = |source| SceneError::Mesh { path: path.to_owned(), source };
     match Kind::of(path)? {
         Kind::Scene => Err(SceneError::in_file(path, "a scene file, where a model was expected")),
@@ -85,7 +100,7 @@ pub(super) fn load_model(
             Ok((Arc::new(mesh), Vec::new()))
         }
         Kind::Obj => {
-            let (mut mesh, mut warnings) = load_obj(path, uvs, options)?;
+            let (mut mesh, mut warnings) = load_obj(path, uvs, options, files)?;
             turn_upright(&mut mesh, options.up.unwrap_or_default());
             let (compiled, report) = CompiledMesh::compile_with(&mesh, compile).map_err(failed)?;
             warnings.extend(describe(path, report));

@@ -11,6 +11,7 @@ use super::background::background;
 use super::framing;
 use super::instances::{MaterialsText, Models, named};
 use super::limits::LoadLimits;
+use super::loader::Caches;
 use super::textures::Textures;
 use crate::mesh::CompiledMesh;
 use crate::scene::data::{Background, Camera, Lens, Scene, Volume, VolumeBoundary};
@@ -21,10 +22,26 @@ use crate::scene::toml::{
 use crate::scene::{MetallicRoughness, NormalMap};
 
 /// Loads a scene file and everything that it names.
-pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Result<LoadedScene, SceneError> {
+pub(super) fn load(
+    path: &Path,
+    options: LoadOptions,
+    limits: LoadLimits,
+    caches: &Caches,
+) -> Result<LoadedScene, SceneError> {
     refuse_for_scene(path, options)?;
     let content = bytes(path, MAX_SCENE_BYTES)?;
-    let text = text_of(path, &content)?;
+    load_text(path, text_of(path, &content)?, options, limits, caches)
+}
+
+/// Loads the text of a scene file and everything that it names.
+pub(super) fn load_text(
+    path: &Path,
+    text: &str,
+    options: LoadOptions,
+    limits: LoadLimits,
+    caches: &Caches,
+) -> Result<LoadedScene, SceneError> {
+    refuse_for_scene(path, options)?;
     let locate = |fault: Fault| {
         let (line, column) = toml::place(text, fault.at);
         SceneError::InScene { path: path.to_owned(), line, column, message: fault.message }
@@ -34,7 +51,7 @@ pub(super) fn load(path: &Path, options: LoadOptions, limits: LoadLimits) -> Res
     let materials = MaterialsText { materials: &read.materials, textures: &read.textures };
     let bounding = read.volumes.iter().filter_map(VolumeText::model);
     let of_file = read.models.iter().chain(bounding);
-    let mut models = Models::open(path, of_file, materials, options, limits).map_err(locate)?;
+    let mut models = Models::open(path, of_file, materials, (options, limits), caches).map_err(locate)?;
     let mut loaded = assemble(path, read, &mut models, &locate)?;
     warnings.append(&mut models.warnings);
     loaded.warnings = warnings;

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::loader::PictureCache;
 use super::sky;
+use crate::files::FileStamp;
 use crate::image;
 use crate::material::Material;
 use crate::mesh::{CompiledMesh, NamedMaterial, TextureFile};
@@ -15,8 +17,9 @@ use crate::texture::{Filter, LEAST_ALPHA, Texture, TextureId, TextureMap, Tiling
 /// Textures by the real paths of their picture files, and how materials look them up.
 pub(super) struct Textures {
     maps: Vec<TextureMap>,
+    cache: PictureCache,
     /// The texture of each picture file, or the reason why it is none.
-    loaded: BTreeMap<(PathBuf, Use), Result<Arc<Texture>, String>>,
+    loaded: BTreeMap<(PathBuf, PictureUse), Result<Arc<Texture>, String>>,
     /// Warnings about pictures that are used.
     notes: BTreeSet<String>,
     /// Bytes of all loaded textures.
@@ -26,8 +29,8 @@ pub(super) struct Textures {
 }
 
 /// Purpose for which a picture is read.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Use {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum PictureUse {
     /// Colours, and alpha if it cuts something out.
     Color,
     /// A mask that cuts out: alpha, or brightness where the alpha cuts nothing out.
@@ -46,20 +49,33 @@ pub(super) struct Listed {
 
 impl Textures {
     /// No textures yet, and at most `max_bytes` of them.
+    #[cfg(test)]
     pub(super) fn new(max_bytes: u64) -> Self {
-        Self { maps: Vec::new(), loaded: BTreeMap::new(), notes: BTreeSet::new(), bytes: 0, max_bytes }
+        Self::with_cache(max_bytes, &PictureCache::default())
+    }
+
+    /// No textures yet, and at most `max_bytes` of them; pictures of earlier loads are taken from `cache`.
+    pub(super) fn with_cache(max_bytes: u64, cache: &PictureCache) -> Self {
+        Self {
+            maps: Vec::new(),
+            cache: cache.clone(),
+            loaded: BTreeMap::new(),
+            notes: BTreeSet::new(),
+            bytes: 0,
+            max_bytes,
+        }
     }
 
     /// Adds a picture file with its lookup to the scene's list of textures. The error is a message that names the picture.
     pub(super) fn add(&mut self, picture: &Path, filter: Filter, tiling: Tiling) -> Result<Listed, String> {
-        let texture = self.load(picture, Use::Color)?;
+        let texture = self.load(picture, PictureUse::Color)?;
         Ok(Listed { index: self.list(&texture, filter, tiling), cuts: texture.has_alpha() })
     }
 
     /// Adds the picture file of a panorama, or of a face of a cube map, to the scene's list of textures. The error is a message that
     /// names the picture.
     pub(super) fn add_sky(&mut self, picture: &Path) -> Result<u32, String> {
-        let texture = self.load(picture, Use::Sky)?;
+        let texture = self.load(picture, PictureUse::Sky)?;
         Ok(self.list(&texture, Filter::Bilinear, Tiling::default()))
     }
 
@@ -70,20 +86,25 @@ impl Textures {
         Some((texture.width(), texture.height()))
     }
 
-    fn load(&mut self, picture: &Path, used: Use) -> Result<Arc<Texture>, String> {
-        let texture = match self.loaded.entry((real(picture)?, used)) {
+    fn load(&mut self, picture: &Path, used: PictureUse) -> Result<Arc<Texture>, String> {
+        self.cache.note(FileStamp::of(picture));
+        let key = (real(picture)?, used);
+        let texture = match self.loaded.entry(key.clone()) {
             Entry::Occupied(entry) => entry.into_mut(),
             // Messages name the file as the scene or model does.
             Entry::Vacant(entry) => {
                 let room = Room { used: self.bytes, limit: self.max_bytes };
-                let texture = read(picture, used, room, &mut self.notes);
+                let read = |files: &mut Vec<FileStamp>| {
+                    files.push(FileStamp::of(picture));
+                    read_noting(picture, used, room)
+                };
+                let texture = self.cache.get_or_read(key, read).and_then(|(texture, notes)| {
+                    room.check(picture, 4 * u64::from(texture.width()) * u64::from(texture.height()))?;
+                    self.notes.extend(notes);
+                    Ok(texture)
+                });
                 self.bytes += texture.as_ref().map_or(0, |texture| texture.bytes().len() as u64);
-                if texture.is_ok() && image::ends_early(picture) {
-                    let message =
-                        "the JPEG picture has no end: what is missing of it is grey; get the file again";
-                    self.notes.insert(format!("{}: {message}", shown(picture)));
-                }
-                entry.insert(texture.map(Arc::new))
+                entry.insert(texture)
             }
         };
         texture.clone()
@@ -122,7 +143,7 @@ impl Textures {
         mesh: &CompiledMesh,
         about: &mut Warnings,
     ) -> Material {
-        let mut add = |texture: &Option<TextureFile>, used: Use| {
+        let mut add = |texture: &Option<TextureFile>, used: PictureUse| {
             let TextureFile { file, tiling } = texture.as_ref().filter(|_| mesh.has_uvs())?;
             let failed = |reason: String| {
                 let material = excerpt(&slot.name, 60);
@@ -133,16 +154,16 @@ impl Textures {
             let texture = texture.map_err(failed).ok()?;
             let cuts = texture.has_alpha();
             // A mask that cuts nothing out has no effect.
-            (used == Use::Color || cuts)
+            (used == PictureUse::Color || cuts)
                 .then(|| Listed { index: self.list(&texture, Filter::Bilinear, *tiling), cuts })
         };
-        let texture = add(&slot.texture, Use::Color);
-        let emission_texture = add(&slot.emission_texture, Use::Color);
+        let texture = add(&slot.texture, PictureUse::Color);
+        let emission_texture = add(&slot.emission_texture, PictureUse::Color);
         // A picture that is named for both has colours; they are no mask.
         let own =
             |named: &TextureFile| slot.texture.as_ref().is_some_and(|texture| texture.file == named.file);
         let cutout = match &slot.cutout {
-            Some(named) => add(&slot.cutout, if own(named) { Use::Color } else { Use::Mask }),
+            Some(named) => add(&slot.cutout, if own(named) { PictureUse::Color } else { PictureUse::Mask }),
             None => texture,
         };
         Material {
@@ -194,8 +215,38 @@ struct Room {
     limit: u64,
 }
 
+impl Room {
+    /// Refuses a picture that takes more bytes as a texture than there is room for.
+    fn check(self, picture: &Path, bytes: u64) -> Result<(), String> {
+        if bytes <= self.limit.saturating_sub(self.used) {
+            return Ok(());
+        }
+        Err(format!(
+            "{}: with it the textures of the scene would take more than {} MiB, the limit; make pictures smaller",
+            shown(picture),
+            self.limit >> 20
+        ))
+    }
+}
+
+/// Reads a picture as a texture, with the notes about it.
+fn read_noting(picture: &Path, used: PictureUse, room: Room) -> Result<(Arc<Texture>, Vec<String>), String> {
+    let mut notes = BTreeSet::new();
+    let texture = read(picture, used, room, &mut notes)?;
+    if image::ends_early(picture) {
+        let message = "the JPEG picture has no end: what is missing of it is grey; get the file again";
+        notes.insert(format!("{}: {message}", shown(picture)));
+    }
+    Ok((Arc::new(texture), notes.into_iter().collect()))
+}
+
 /// Reads a picture as a texture, if there is room for it, and adds warnings about it to `notes`.
-fn read(picture: &Path, used: Use, room: Room, notes: &mut BTreeSet<String>) -> Result<Texture, String> {
+fn read(
+    picture: &Path,
+    used: PictureUse,
+    room: Room,
+    notes: &mut BTreeSet<String>,
+) -> Result<Texture, String> {
     let too_large = |error| format!("{}: {error}", shown(picture));
     let high_range = image::has_high_range(picture);
     let undecoded = |error: image::ImageError| match recognised_file(picture) {
@@ -206,22 +257,16 @@ fn read(picture: &Path, used: Use, room: Room, notes: &mut BTreeSet<String>) -> 
     };
     let (width, height) = image::size(picture).map_err(undecoded)?;
     check_size(width, height).map_err(too_large)?;
-    if 4 * u64::from(width) * u64::from(height) > room.limit.saturating_sub(room.used) {
-        return Err(format!(
-            "{}: with it the textures of the scene would take more than {} MiB, the limit; make pictures smaller",
-            shown(picture),
-            room.limit >> 20
-        ));
-    }
-    if used == Use::Sky {
+    room.check(picture, 4 * u64::from(width) * u64::from(height))?;
+    if used == PictureUse::Sky {
         let sky = image::load_sky(picture).map_err(undecoded)?;
         return sky::texture(picture, &sky, notes).map_err(too_large);
     }
     let (mut pixels, alpha) = image::load_with_alpha(picture).map_err(undecoded)?;
     let alpha = match (used, alpha) {
-        (Use::Color | Use::Sky, alpha) => alpha.unwrap_or_default(),
-        (Use::Mask, Some(alpha)) if alpha.iter().any(|&alpha| alpha < LEAST_ALPHA) => alpha,
-        (Use::Mask, _) => {
+        (PictureUse::Color | PictureUse::Sky, alpha) => alpha.unwrap_or_default(),
+        (PictureUse::Mask, Some(alpha)) if alpha.iter().any(|&alpha| alpha < LEAST_ALPHA) => alpha,
+        (PictureUse::Mask, _) => {
             let brightness = pixels.pixels.chunks_exact(3).map(brightness).collect();
             pixels.pixels.fill(u8::MAX);
             brightness

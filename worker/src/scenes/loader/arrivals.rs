@@ -135,7 +135,8 @@ impl<R: Renderer> SceneLoader<R> {
     /// Handles the master's report that it does not have an asset.
     pub(crate) fn handle_asset_unknown(&mut self, id: AssetId) {
         if self.incoming.contains_key(&id) {
-            self.fail(id, &format!("the master does not have asset {id}"));
+            let failed = self.failed_without(id, &format!("the master does not have asset {id}"));
+            self.absent.extend(failed);
         }
     }
 

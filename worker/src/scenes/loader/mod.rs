@@ -23,6 +23,10 @@ pub(crate) use step::{AssetRequest, SceneResult, SceneWork, Step};
 /// Most assets in transfer at a time. More than one, so that the next asset arrives while one is decoded.
 const MAX_REQUESTS: usize = 4;
 
+/// Most compiled scenes in memory beyond those in use. A scene that is edited becomes another one with each change, and a
+/// compiled scene takes more memory than its body, with which it counts.
+const MAX_SCENES: usize = 16;
+
 /// Most failed scenes that are remembered. A remembered scene is not requested again for every frame.
 const MAX_FAILED: usize = 64;
 
@@ -62,10 +66,14 @@ pub(crate) struct SceneLoader<R: Renderer> {
     store: AssetStore<Stored<R>>,
     /// Each asset with the number of bytes reserved for it.
     incoming: BTreeMap<AssetId, (Incoming, u64)>,
+    /// The scene bodies among them, also those whose loads were dropped.
+    bodies: BTreeSet<AssetId>,
     queue: VecDeque<AssetId>,
     loads: BTreeMap<AssetId, Load<R>>,
     /// Scenes that cannot be loaded, with the reason.
     failed: BTreeMap<AssetId, String>,
+    /// Those of them for which the master did not have an asset.
+    absent: BTreeSet<AssetId>,
     /// Scenes of the announced frames.
     current: BTreeSet<AssetId>,
     steps: VecDeque<Step<R>>,
@@ -81,9 +89,11 @@ impl<R: Renderer> SceneLoader<R> {
         Self {
             store: AssetStore::new(cache_bytes),
             incoming: BTreeMap::new(),
+            bodies: BTreeSet::new(),
             queue: VecDeque::new(),
             loads: BTreeMap::new(),
             failed: BTreeMap::new(),
+            absent: BTreeSet::new(),
             current: BTreeSet::new(),
             steps: VecDeque::new(),
             has_disk: false,
@@ -95,9 +105,11 @@ impl<R: Renderer> SceneLoader<R> {
     pub(crate) fn reset(&mut self, has_disk: bool, serves_peers: bool) {
         (self.has_disk, self.serves_peers) = (has_disk, serves_peers);
         self.incoming.clear();
+        self.bodies.clear();
         self.queue.clear();
         self.loads.clear();
         self.failed.clear();
+        self.absent.clear();
         self.steps.clear();
     }
 
@@ -110,10 +122,15 @@ impl<R: Renderer> SceneLoader<R> {
     /// compilation.
     pub(crate) fn set_current(&mut self, scenes: BTreeSet<AssetId>) {
         self.loads.retain(|id, _| scenes.contains(id));
+        // The master may have the assets of a scene again that it shows again, when a change of the scene was undone.
+        for scene in self.absent.extract_if(.., |id| !scenes.contains(id)) {
+            self.failed.remove(&scene);
+        }
         self.current = scenes;
         let needed = self.in_use();
         self.queue.retain(|id| needed.contains(id));
         self.incoming.retain(|id, (state, _)| !matches!(state, Incoming::Queued) || needed.contains(id));
+        self.bodies.retain(|id| self.incoming.contains_key(id));
     }
 
     /// Loads a scene, unless it is being loaded. Leads to a [`Step::Ready`] or a [`Step::Failed`].
@@ -129,6 +146,7 @@ impl<R: Renderer> SceneLoader<R> {
                 parts: BTreeSet::new(),
                 cancel: CancelGuard::default(),
             });
+            self.bodies.insert(scene);
             self.enqueue(scene);
         }
     }
@@ -204,7 +222,7 @@ impl<R: Renderer> SceneLoader<R> {
         if let Some((state, _)) = self.incoming.get_mut(&id) {
             *state = Incoming::Decoding;
         }
-        let work = match self.loads.contains_key(&id) {
+        let work = match self.bodies.contains(&id) {
             true => SceneWork::DecodeScene { id, body: bytes },
             false => SceneWork::DecodePart { id, bytes },
         };
@@ -233,6 +251,7 @@ impl<R: Renderer> SceneLoader<R> {
 
     /// Ends the arrival of an asset and returns the number of bytes that were reserved for it.
     fn release(&mut self, id: AssetId) -> u64 {
+        self.bodies.remove(&id);
         self.incoming.remove(&id).map_or(0, |(_, bytes)| bytes)
     }
 
@@ -276,18 +295,31 @@ impl<R: Renderer> SceneLoader<R> {
         let mut needed = self.in_use();
         needed.extend(&parts);
         // Where it does not fit, the scene is used and not kept.
+        self.evict_scenes(&needed);
         if self.store.make_room(body_bytes, reserved, &needed) {
             self.store.insert(id, Stored::Scene { scene: Arc::clone(&scene), parts }, body_bytes);
         }
         self.steps.push_back(Step::Ready(id, scene));
     }
 
-    /// Fails all scenes that need an asset.
+    /// Evicts the least recently used scenes beyond [`MAX_SCENES`], except those in `needed`.
+    fn evict_scenes(&mut self, needed: &BTreeSet<AssetId>) {
+        let is_scene = |stored: &Stored<R>| matches!(stored, Stored::Scene { .. });
+        self.store.keep_most_recent(MAX_SCENES, is_scene, needed);
+    }
+
+    /// Fails all scenes that need an asset. They are not loaded again in this session.
     fn fail(&mut self, asset: AssetId, reason: &str) {
-        self.incoming.remove(&asset);
+        self.failed_without(asset, reason);
+    }
+
+    /// [`Self::fail`], which returns the scenes.
+    fn failed_without(&mut self, asset: AssetId, reason: &str) -> Vec<AssetId> {
+        self.release(asset);
         self.queue.retain(|queued| *queued != asset);
         let affected = self.loads.iter().filter(|(id, load)| **id == asset || load.parts.contains(&asset));
-        for scene in affected.map(|(id, _)| *id).collect::<Vec<_>>() {
+        let affected: Vec<AssetId> = affected.map(|(id, _)| *id).collect();
+        for &scene in &affected {
             self.loads.remove(&scene);
             if self.failed.len() >= MAX_FAILED {
                 self.failed.clear();
@@ -296,6 +328,7 @@ impl<R: Renderer> SceneLoader<R> {
             self.steps.push_back(Step::Failed(scene, reason.to_owned()));
         }
         self.start_requests();
+        affected
     }
 
     /// Ids of the current scenes, of the scenes being loaded, and of the parts of both.

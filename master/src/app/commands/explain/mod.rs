@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 
 use bytes::Bytes;
-use rayfarm_farm::{Assets, ViewRequest, wire_format};
+use rayfarm_farm::{Assets, FarmScene, ViewRequest, wire_format};
 use rayfarm_protocol::message::Message;
 use rayfarm_protocol::{FrameAnnounce, FrameId, ToWorker, codec};
 use rayfarm_tracer::scene::knobs::KNOBS;
@@ -241,8 +241,12 @@ fn memory(compiled: &CompiledScene, meshes: &[MeshFacts], textures: &[TextureFac
 
 /// Number of bytes that a worker receives, from the code that sends them.
 fn travel(source: &Source, view: &FrameView) -> Result<Travel, CommandError> {
-    let assets = Assets::new(&source.scene, source.meshes.clone(), source.textures.clone())
-        .map_err(CommandError::wrong_input)?;
+    let drawn = FarmScene {
+        scene: source.scene.clone(),
+        meshes: source.meshes.clone(),
+        textures: source.textures.clone(),
+    };
+    let assets = Assets::new(drawn).map_err(CommandError::wrong_input)?;
     let scene_body = assets.get(assets.scene()).map_or(0, |body| body.len());
     let bytes = codec::encode(view).map_err(CommandError::failed)?;
     let announcement = ToWorker::Frame(FrameAnnounce {

@@ -20,6 +20,7 @@ use crate::app::picture::DENOISE_NEEDS_PATHS;
 use crate::app::trust;
 use crate::display::SceneInfo;
 use crate::error::CommandError;
+use crate::viewer::edits::{EditorHandle, SceneEditor};
 use crate::viewer::film::passes::has_passes;
 use crate::viewer::{
     CameraControl, FrameLogFile, RequestPolicy, Statistics, Viewer, ViewerConfig, ViewerHandle,
@@ -89,6 +90,7 @@ async fn start(
     observability: &Observability,
     stop: &CancellationToken,
 ) -> Result<(Viewer, ViewerHandle, FarmControl), CommandError> {
+    let editor = editor(&source, args);
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let security = trust::security(&args.farm)?;
     let farm = Farm::start(args.farm.options(security), scene).await.map_err(CommandError::failed)?;
@@ -97,8 +99,21 @@ async fn start(
     }
     let control = farm.control();
     let (viewer, handle) = Viewer::interactive(farm, config);
-    observability.begin(viewer.farm(), Some(handle.knob_sender()), stop)?;
+    let knobs = handle.knob_sender();
+    let editor = editor
+        .map(|editor| EditorHandle::start(editor, knobs.clone()))
+        .transpose()
+        .map_err(CommandError::failed)?;
+    observability.begin(viewer.farm(), Some((knobs, editor)), stop)?;
     Ok((viewer, handle, control))
+}
+
+/// The editor of the scene, which also watches its files. Where there is none, the scene is shown as it is.
+fn editor(source: &Source, args: &ViewArgs) -> Option<SceneEditor> {
+    let is_scene = source.path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    let bare = (!is_scene).then(|| args.models.load_options(args.picture.size));
+    let editor = SceneEditor::new(&source.path, source.loader.clone(), &source.scene, bare);
+    editor.inspect_err(|error| tracing::warn!("the scene cannot be edited: {error}")).ok()
 }
 
 /// Fails if frames were shown that have rows of workers which sent wrong pixels.

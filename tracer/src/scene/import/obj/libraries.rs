@@ -14,6 +14,7 @@ use super::geometry::MaterialRun;
 use super::materials::{self, Library};
 use super::picture::Place;
 use super::slots::find;
+use crate::files::FileStamp;
 
 /// Largest number of libraries of one model.
 const MAX_LIBRARIES: usize = 1024;
@@ -24,13 +25,15 @@ const MAX_TOTAL_BYTES: u64 = 4 * MAX_LIBRARY_BYTES;
 /// Largest number of words in a name with blanks.
 const MAX_WORDS: usize = 16;
 
-/// Reads all libraries that a model names, each once. Returns their materials and the warnings about their contents.
+/// Reads all libraries that a model names, each once. Returns their materials and the warnings about their contents, and adds
+/// the files that it reads or misses, with their state before that.
 pub(super) fn read(
     model: &Path,
     lines: &[(usize, String)],
     runs: &[MaterialRun],
     options: LoadOptions,
     warnings: &mut Warnings,
+    stamps: &mut Vec<FileStamp>,
 ) -> (Library, Vec<String>) {
     let folder = model.parent().unwrap_or(Path::new(""));
     let mut reader = Reader {
@@ -42,6 +45,8 @@ pub(super) fn read(
         library: Library::new(),
         messages: Vec::new(),
         missing: Vec::new(),
+        folder,
+        stamps,
     };
     let mut names = BTreeSet::new();
     for (line, text) in lines {
@@ -69,6 +74,8 @@ struct Reader<'p> {
     messages: Vec<String>,
     /// Missing libraries, with the lines that name them.
     missing: Vec<(usize, String, Missing)>,
+    folder: &'p Path,
+    stamps: &'p mut Vec<FileStamp>,
 }
 
 impl Reader<'_> {
@@ -76,7 +83,13 @@ impl Reader<'_> {
     fn named(&mut self, line: usize, name: &str, warnings: &mut Warnings) {
         let found = match self.files.find(Path::new(""), name) {
             Ok(found) => found,
-            Err(reason) => return self.missing.push((line, tidy(name), reason)),
+            Err(reason) => {
+                // Created later, it changes the model.
+                if reason == Missing::NotThere {
+                    self.stamps.push(FileStamp::of(&self.folder.join(tidy(name))));
+                }
+                return self.missing.push((line, tidy(name), reason));
+            }
         };
         if !self.known.insert(found.path.clone()) {
             return;
@@ -100,6 +113,7 @@ impl Reader<'_> {
     }
 
     fn parsed(&mut self, found: &Found) -> Result<(Library, Vec<String>), String> {
+        self.stamps.push(FileStamp::of(&found.path));
         let content = bytes(&found.path, MAX_LIBRARY_BYTES).map_err(|error| error.to_string())?;
         let name = excerpt(&found.name, 100);
         self.bytes += content.len() as u64;

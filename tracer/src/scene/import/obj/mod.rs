@@ -30,6 +30,7 @@ use super::read::{MAX_MODEL_BYTES, bytes};
 use super::text::decoded;
 use super::warnings::Warnings;
 use super::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError};
+use crate::files::FileStamp;
 use crate::material::Material;
 use crate::mesh::{Mesh, NamedMaterial};
 use geometry::{Geometry, MaterialRun};
@@ -50,16 +51,24 @@ pub(in crate::scene) enum Uvs {
     Whole,
 }
 
-/// Reads a model. Returns the mesh and warnings about ignored parts. In a file with neither normals nor smoothing
+/// [`load_noting`] without the files.
+#[cfg(test)]
+fn load(path: &Path, wanted: Uvs, options: LoadOptions) -> Result<(Mesh, Vec<String>), SceneError> {
+    load_noting(path, wanted, options, &mut Vec::new())
+}
+
+/// Reads a model. Returns the mesh and warnings about ignored parts, and adds the material libraries that it reads or misses,
+/// with their state before that. In a file with neither normals nor smoothing
 /// groups, faces that meet at the crease angle at most are smooth.
 ///
 /// # Errors
 /// A file that cannot be read, an invalid line, an index out of range, a used vertex that is not finite, a file
 /// without faces.
-pub(in crate::scene) fn load(
+pub(in crate::scene) fn load_noting(
     path: &Path,
     wanted: Uvs,
     options: LoadOptions,
+    files: &mut Vec<FileStamp>,
 ) -> Result<(Mesh, Vec<String>), SceneError> {
     let content = bytes(path, MAX_MODEL_BYTES)?;
     let mut warnings = Warnings::about(path);
@@ -79,7 +88,7 @@ pub(in crate::scene) fn load(
     drop(text);
     drop(content);
     let (library, messages) =
-        libraries::read(path, &geometry.libraries, &geometry.runs, options, &mut warnings);
+        libraries::read(path, &geometry.libraries, &geometry.runs, options, &mut warnings, files);
     let uvs = wanted_uvs(wanted, &geometry, &library, &mut warnings);
     let mut mesh = vertices::mesh(&geometry);
     mesh.colors = colors::of_model(&geometry);

@@ -3,6 +3,7 @@
 mod keys;
 mod models;
 mod pictures;
+mod reloads;
 mod scenes;
 mod skies;
 mod textures;
