@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{self, FrameView, Integrator, LoadedScene, Scene};
+use rayfarm_tracer::scene::{self, FrameView, Integrator, LoadedScene, Scene, SceneAnimation};
 use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{LightArgs, ModelArgs, PictureArgs, QualityArgs, Size};
@@ -32,6 +32,8 @@ pub(super) struct Source {
     pub(super) mesh_files: Vec<PathBuf>,
     /// Textures of its materials.
     pub(super) textures: Vec<Arc<Texture>>,
+    /// Movements over frames, if the scene has keys.
+    pub(super) animation: Option<SceneAnimation>,
 }
 
 impl Source {
@@ -40,13 +42,13 @@ impl Source {
     /// # Errors
     /// The mistake in the file, with its line where there is one.
     pub(super) fn load(path: &Path, models: ModelArgs, size: Option<Size>) -> Result<Self, CommandError> {
-        let LoadedScene { scene, meshes, mesh_files, textures, warnings } =
+        let LoadedScene { scene, meshes, mesh_files, textures, warnings, animation } =
             scene::load_with(path, models.load_options(size)).map_err(CommandError::wrong_input)?;
         for warning in warnings {
             tracing::warn!("{warning}");
         }
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, path: path.to_owned(), scene, meshes, mesh_files, textures })
+        Ok(Self { name, path: path.to_owned(), scene, meshes, mesh_files, textures, animation })
     }
 
     /// Request of the first frame: settings of the scene, overridden by the command line.
