@@ -95,13 +95,17 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// A new file that is removed when dropped unless it was renamed.
-pub(crate) struct Temporary {
+#[derive(Debug)]
+pub struct Temporary {
     path: Option<PathBuf>,
 }
 
 impl Temporary {
     /// Creates a new file in the folder of `target`. An existing link of that name is not followed.
-    pub(crate) fn create_next_to(target: &Path) -> io::Result<(Self, File)> {
+    ///
+    /// # Errors
+    /// Errors of the operating system.
+    pub fn create_next_to(target: &Path) -> io::Result<(Self, File)> {
         // Process and counter make the name unique, so that no two writers share a temporary file.
         static COUNTER: AtomicU32 = AtomicU32::new(0);
         loop {
@@ -119,8 +123,16 @@ impl Temporary {
         }
     }
 
+    /// Path of the file.
+    pub fn path(&self) -> &Path {
+        self.path.as_deref().unwrap_or(Path::new(""))
+    }
+
     /// Renames the file, replacing an existing one.
-    pub(crate) fn rename_to(mut self, target: &Path) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// Errors of the operating system; the file is then removed.
+    pub fn rename_to(mut self, target: &Path) -> io::Result<()> {
         if let Some(path) = &self.path {
             fs::rename(path, target)?;
         }

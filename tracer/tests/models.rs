@@ -16,7 +16,7 @@ mod generator;
 
 use generator::Content;
 
-const SCENES: [&str; 15] = [
+const SCENES: [&str; 16] = [
     "room.toml",
     "room-soft.toml",
     "table.toml",
@@ -25,6 +25,7 @@ const SCENES: [&str; 15] = [
     "instances.toml",
     "lights.toml",
     "textured.toml",
+    "carousel.toml",
     "box.toml",
     "balls-glass.toml",
     "balls-metal.toml",

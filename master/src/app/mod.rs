@@ -3,6 +3,7 @@
 pub(crate) mod cli;
 pub(crate) mod commands;
 pub(crate) mod control;
+mod eta;
 mod knob_values;
 pub(crate) mod logging;
 pub(crate) mod output;
@@ -11,3 +12,4 @@ mod plan;
 pub(crate) mod progress;
 pub(crate) mod reports;
 pub(crate) mod trust;
+pub(crate) mod video;

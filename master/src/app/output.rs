@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use rayfarm_tracer::image;
 use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
 
 use super::picture::Picture;
+use super::video::{VideoFormat, VideoWriter};
 use crate::error::CommandError;
 
 /// Extensions of pictures.
@@ -31,6 +33,13 @@ pub(crate) enum OutputPattern {
     None,
     /// One file.
     Single(PathBuf),
+    /// One file with all frames.
+    Video {
+        /// Its path.
+        path: PathBuf,
+        /// Its format.
+        format: VideoFormat,
+    },
     /// A file per frame. Its name is `prefix`, the frame number with at least `digits` digits, and `suffix`.
     Sequence {
         /// Folder of the files.
@@ -45,37 +54,60 @@ pub(crate) enum OutputPattern {
 }
 
 impl OutputPattern {
-    /// Parses `picture.png`, `frame-%04d.png` or `none`, for a run of `frames` frames.
+    /// Parses `picture.png`, `frame-%04d.png`, `turn.mp4` or `none`, for a run of `frames` frames.
     ///
     /// # Errors
-    /// A name without a known extension, an invalid `%`, or one name for many frames.
+    /// A name without a known extension, an invalid `%`, one name for many frames, or a number in the name of a video.
     pub(crate) fn parse(output: &Path, frames: u32) -> Result<Self, CommandError> {
         if output == Path::new(NONE) {
             return Ok(Self::None);
         }
         let refuse =
             |problem: String| Err(CommandError::WrongInput(format!("{}: {problem}", output.display())));
+        let video = VideoFormat::of(output);
         let known = output
             .extension()
             .and_then(|extension| extension.to_str())
             .is_some_and(|extension| EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(extension)));
-        if !known {
-            return refuse("pictures are written as .png or .ppm, linear ones as .exr or .hdr; end the name with one of them".to_owned());
+        if !known && video.is_none() {
+            return refuse(
+                "pictures are written as .png or .ppm, linear ones as .exr or .hdr, videos as .gif, .apng, .mp4 or .webm; end \
+                 the name with one of them"
+                    .to_owned(),
+            );
         }
         let Some(name) = output.file_name().and_then(|name| name.to_str()) else {
             return refuse("the file's name is not Unicode text".to_owned());
         };
         let folder = output.parent().unwrap_or(Path::new("")).to_owned();
-        match split_number(name) {
+        let name = split_number(name);
+        if let (Some(format), Ok(name)) = (video, &name) {
+            return match name {
+                Name::Plain(name) => Ok(Self::Video { path: folder.join(name), format }),
+                Name::Numbered { .. } => {
+                    refuse("a video has all frames: leave the number out of its name".to_owned())
+                }
+            };
+        }
+        match name {
             Err(problem) => refuse(problem),
             Ok(Name::Plain(name)) if frames == 1 => Ok(Self::Single(folder.join(name))),
             Ok(Name::Plain(name)) => refuse(format!(
-                "{frames} frames would overwrite each other; number them, as in {}",
-                folder.join(numbered_example(&name)).display()
+                "{frames} frames would overwrite each other; number them, as in {}, or write a video, as in {}",
+                folder.join(numbered_example(&name)).display(),
+                folder.join(&name).with_extension("apng").display()
             )),
             Ok(Name::Numbered { prefix, digits, suffix }) => {
                 Ok(Self::Sequence { folder, prefix, digits, suffix })
             }
+        }
+    }
+
+    /// Path and format of the video, if the output is one.
+    pub(crate) fn video(&self) -> Option<(&Path, VideoFormat)> {
+        match self {
+            Self::Video { path, format } => Some((path, *format)),
+            _ => None,
         }
     }
 
@@ -93,7 +125,7 @@ impl OutputPattern {
     pub(crate) fn path(&self, index: u64) -> Option<PathBuf> {
         match self {
             Self::None => None,
-            Self::Single(path) => Some(path.clone()),
+            Self::Single(path) | Self::Video { path, .. } => Some(path.clone()),
             Self::Sequence { folder, prefix, digits, suffix } => {
                 Some(folder.join(format!("{prefix}{index:0digits$}{suffix}")))
             }
@@ -201,18 +233,26 @@ fn with_retries<E>(
     save()
 }
 
-/// Writer of frames: encodes and writes on blocking threads, at most [`MAX_PENDING`] frames at a time.
+/// Writer of frames: encodes and writes on blocking threads, at most [`MAX_PENDING`] frames at a time, or in one file by a
+/// [`VideoWriter`].
 #[derive(Debug)]
 pub(crate) struct FrameWriter {
     pattern: OutputPattern,
     pending: VecDeque<JoinHandle<Result<(), image::ImageError>>>,
+    video: Option<VideoWriter>,
     written: u64,
 }
 
 impl FrameWriter {
     /// A writer before its first frame.
     pub(crate) fn new(pattern: OutputPattern) -> Self {
-        Self { pattern, pending: VecDeque::new(), written: 0 }
+        Self { pattern, pending: VecDeque::new(), video: None, written: 0 }
+    }
+
+    /// The same, with the writer of the video that the pattern names.
+    #[must_use]
+    pub(crate) fn with_video(self, video: Option<VideoWriter>) -> Self {
+        Self { video, ..self }
     }
 
     /// Waits until another frame can be accepted. Cancel safe.
@@ -220,6 +260,9 @@ impl FrameWriter {
     /// # Errors
     /// The failure of an earlier frame.
     pub(crate) async fn ready(&mut self) -> Result<(), CommandError> {
+        if let Some(video) = &mut self.video {
+            return video.ready().await.map_err(CommandError::failed);
+        }
         while self.pending.len() >= MAX_PENDING {
             self.finish_one().await?;
         }
@@ -235,7 +278,33 @@ impl FrameWriter {
     {
         let Some(path) = self.pattern.path(index) else { return };
         let picture = picture();
+        if let Some(video) = &mut self.video {
+            video.write(Box::new(move || picture()?.into().into_srgb()));
+            return;
+        }
         self.pending.push_back(tokio::task::spawn_blocking(move || save(&picture()?.into(), &path)));
+    }
+
+    /// Completes the files after the last frame. A video that lacks frames, because the run has ended early, or that `interrupted`
+    /// ends, leaves no file.
+    ///
+    /// # Errors
+    /// As [`Self::finish`].
+    pub(crate) async fn conclude(
+        &mut self,
+        is_complete: bool,
+        interrupted: &CancellationToken,
+    ) -> Result<(), CommandError> {
+        let Some(video) = &mut self.video else { return self.finish().await };
+        if is_complete {
+            tokio::select! {
+                biased;
+                () = interrupted.cancelled() => {}
+                finished = video.finish() => return finished.map_err(CommandError::failed),
+            }
+        }
+        video.abort().await;
+        if is_complete { Err(CommandError::Interrupted(String::new())) } else { Ok(()) }
     }
 
     /// Waits until all accepted frames are on the disk.
@@ -256,9 +325,14 @@ impl FrameWriter {
         self.pattern != OutputPattern::None
     }
 
-    /// Number of frames that are completely on the disk.
+    /// Whether the frames are those of a video.
+    pub(crate) fn is_video(&self) -> bool {
+        self.video.is_some()
+    }
+
+    /// Number of frames that are completely on the disk, or in the video.
     pub(crate) fn written(&self) -> u64 {
-        self.written
+        self.video.as_ref().map_or(self.written, VideoWriter::encoded)
     }
 
     async fn finish_one(&mut self) -> Result<(), CommandError> {
@@ -299,6 +373,23 @@ mod tests {
     }
 
     #[test]
+    fn a_video_has_any_number_of_frames() {
+        for (name, format) in [
+            ("a.gif", VideoFormat::Gif),
+            ("a.APNG", VideoFormat::Apng),
+            ("a/b.mp4", VideoFormat::Mp4),
+            ("a.webm", VideoFormat::WebM),
+        ] {
+            for frames in [1, 7] {
+                let pattern = parse(name, frames).unwrap();
+                assert_eq!(pattern.video(), Some((Path::new(name), format)));
+                assert!(!pattern.is_linear() && !pattern.has_layers());
+            }
+        }
+        assert_eq!(parse("a.png", 1).unwrap().video(), None);
+    }
+
+    #[test]
     fn none_has_no_file() {
         for frames in [1, 7] {
             assert_eq!(parse("none", frames).unwrap().path(0), None);
@@ -331,6 +422,7 @@ mod tests {
     #[test]
     fn invalid_names_are_refused() {
         for (name, hint) in [
+            ("turn-%d.gif", "leave the number out"),
             ("picture", ".png or .ppm"),
             ("picture.jpg", ".png or .ppm"),
             (".png", ".png or .ppm"),

@@ -5,6 +5,7 @@ use std::path::Path;
 use rayfarm_tracer::image::{self, Channels, ImageError, Layer, LinearImage, RgbImage};
 
 use super::cli::Aov;
+use super::video::VideoError;
 
 /// Name of the layer of the frame itself.
 pub(crate) const BEAUTY: &str = "beauty";
@@ -33,6 +34,17 @@ impl Picture {
         let beauty = Layer { name, channels: Channels::Color, picture: beauty };
         let layer = |(aov, picture): (Aov, _)| Layer { name: aov.name(), channels: aov.channels(), picture };
         Self::Linear(std::iter::once(beauty).chain(auxiliary.into_iter().map(layer)).collect())
+    }
+
+    /// The colours of a display, as frames of videos have them.
+    ///
+    /// # Errors
+    /// Linear light, which no video has.
+    pub(crate) fn into_srgb(self) -> Result<RgbImage, VideoError> {
+        match self {
+            Self::Srgb(picture) => Ok(picture),
+            Self::Linear(_) => Err(VideoError::new("a frame of linear light, where colours were expected")),
+        }
     }
 
     /// Writes the picture in the format of the file's extension.

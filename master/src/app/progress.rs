@@ -8,6 +8,7 @@ use rayfarm_farm::Entrance;
 use rayfarm_farm::FarmStatus;
 use rayfarm_farm::accounting::duration_text;
 
+use super::eta::Eta;
 use crate::log_bar::{show_below_log, show_nothing_below_log};
 use crate::viewer::film::FilmProgress;
 
@@ -24,6 +25,8 @@ pub(crate) struct Progress {
     done: u64,
     fps: f64,
     left: Option<Duration>,
+    eta: Eta,
+    started: Instant,
     /// Progress of the picture, if it is rendered in passes.
     film: Option<FilmProgress>,
     entrance: Entrance,
@@ -51,6 +54,8 @@ impl Progress {
             done: 0,
             fps: 0.0,
             left: None,
+            eta: Eta::default(),
+            started: now,
             film: None,
             entrance,
             local_workers,
@@ -78,10 +83,11 @@ impl Progress {
 
     /// Shows the state of the farm. To be called several times a second.
     pub(crate) fn update(&mut self, status: &FarmStatus) {
-        self.left = match &self.film {
+        let predicted = match &self.film {
             None => status.totals.left,
             Some(film) => film.left.filter(|_| !film.is_complete()),
         };
+        self.left = self.eta.left(self.started.elapsed(), predicted);
         let left = self.left.map_or(String::new(), |left| format!("{} left, ", duration_text(left)));
         self.bar.set_message(format!("{left}{}", self.state(status)));
         self.remind_of_workers(status.workers.is_empty());

@@ -25,7 +25,7 @@ const KNOBS_HEADING: &str = "\n## Knobs\n";
 const NOT_IN_HELP: [&str; 2] = ["trace", "release"];
 
 /// A scene that ends where an unknown key is refused, for each table.
-const TABLES: [&str; 17] = [
+const TABLES: [&str; 22] = [
     "",
     "[render]\n",
     "[camera]\n",
@@ -43,6 +43,11 @@ const TABLES: [&str; 17] = [
     "[[rectangle]]\n",
     "[[box]]\n",
     "[[group]]\n",
+    "[[camera_key]]\ntime = 0\n[[camera_key]]\n",
+    "[[model]]\nfile = \"a.obj\"\n[[model.key]]\ntime = 0\n[[model.key]]\n",
+    "[[sphere]]\n[[sphere.key]]\ntime = 0\n[[sphere.key]]\n",
+    "[[light]]\n[[light.key]]\ntime = 0\n[[light.key]]\n",
+    "[[group]]\n[[group.key]]\ntime = 0\n[[group.key]]\n",
 ];
 
 fn document(name: &str) -> String {

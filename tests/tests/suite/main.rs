@@ -19,5 +19,6 @@ mod resume;
 mod same_picture;
 mod tradeoff;
 mod trust;
+mod video;
 mod window;
 mod window_controls;

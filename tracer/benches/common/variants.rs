@@ -209,6 +209,7 @@ impl Setting {
             mesh_files,
             textures: self.textures,
             warnings,
+            animation: None,
         })
     }
 }

@@ -6,6 +6,8 @@
 //!
 //! Import needs the feature `import`: [`load`](fn@load) reads a scene file (`toml`) or a model (`import`).
 
+#[cfg(feature = "import")]
+mod animation;
 mod data;
 #[cfg(feature = "import")]
 mod import;
@@ -16,6 +18,8 @@ mod load;
 mod toml;
 mod validate;
 
+#[cfg(feature = "import")]
+pub use animation::CameraPath;
 pub use data::{
     Attenuation, Background, Camera, CameraKind, Disk, FovAxis, FrameView, Integrator, Lens, Light,
     LightKind, Model, Motion, NormalMode, PathSettings, PixelFormat, Plane, RenderSettings, Sampler, Scene,
@@ -26,7 +30,7 @@ pub use import::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError, Up};
 pub use knobs::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setting, Shading};
 #[cfg(feature = "import")]
 pub use load::{
-    LoadLimits, LoadedScene, SceneLoader, compile_model, compile_model_with, load, load_limited, load_with,
+    LoadLimits, LoadedScene, SceneAnimation, SceneLoader, compile_model, compile_model_with, load, load_limited, load_with,
 };
 pub use validate::{
     MAX_CLAMP, MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_EXPOSURE, MAX_IOR, MAX_LIGHT, MAX_LIGHTS,

@@ -52,6 +52,11 @@ pub(crate) struct FarmArgs {
 }
 
 impl FarmArgs {
+    /// Whether segments are verified, and frames may be rendered again.
+    pub(crate) fn verifies(&self) -> bool {
+        self.verify > 0
+    }
+
     /// Local workers to start.
     pub(crate) fn local_workers(&self) -> u32 {
         if self.no_local_workers { 0 } else { self.local_workers }

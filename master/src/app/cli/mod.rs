@@ -12,6 +12,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::app::control::Place;
+use crate::viewer::VideoRate;
 pub(crate) use values::Size;
 use values::{frame_count, frame_index, ray_count, size, thread_count, worker_count};
 
@@ -175,7 +176,7 @@ pub(crate) struct RenderArgs {
     /// A scene (.toml), or a model (.obj or compiled).
     pub(crate) scene: PathBuf,
     /// Picture to write: .png or .ppm, or .exr or .hdr for linear light without exposure and tone curve; frame-%04d.png
-    /// numbers a sequence from 0000; none writes no file.
+    /// numbers a sequence from 0000; none writes no file. Or a video: .apng or .gif, and .mp4 or .webm through ffmpeg.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
     /// Auxiliary pictures of each frame, separated by commas, as layers of its .exr file.
@@ -194,9 +195,12 @@ pub(crate) struct RenderArgs {
     pub(crate) error: ErrorArgs,
     #[command(flatten)]
     pub(crate) passes: PassesArgs,
-    /// Number of frames of the whole camera path.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = frame_count)]
-    pub(crate) frames: u32,
+    /// Number of frames of the whole camera path [default: up to the last key of the scene for sequences and videos, else 1].
+    #[arg(long, value_name = "N", value_parser = frame_count)]
+    pub(crate) frames: Option<u32>,
+    /// Frames per second, of videos and of the keys of the scene: 25, 23.976 or 30000/1001 [default: 25].
+    #[arg(long, value_name = "RATE", value_parser = VideoRate::parse)]
+    pub(crate) fps: Option<VideoRate>,
     /// Begin at frame N, counted from 0; each frame is the same picture as in a run of all frames.
     #[arg(long, value_name = "N", default_value = "0", value_parser = frame_index)]
     pub(crate) first_frame: u32,

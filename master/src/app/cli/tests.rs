@@ -62,7 +62,7 @@ fn view_is_the_default_command() {
 fn defaults_are_as_documented() {
     let args = render("rayfarm-master render a.toml -o b.png");
     assert_eq!((args.scene, args.output), ("a.toml".into(), "b.png".into()));
-    assert_eq!((args.frames, args.json, args.fps_log), (1, false, None));
+    assert_eq!((args.frames, args.json, args.fps_log), (None, false, None));
     assert_eq!((args.farm.listen, args.farm.local_workers(), args.farm.threads), (None, 1, None));
     assert_eq!(args.farm.segment, SegmentPolicy::Adaptive);
     assert_eq!(args.picture.size, None);

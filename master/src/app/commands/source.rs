@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{FrameView, Integrator, LoadLimits, LoadedScene, Scene, SceneLoader};
+use rayfarm_tracer::scene::{FrameView, Integrator, LoadLimits, LoadedScene, Scene, SceneAnimation, SceneLoader};
 use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{LightArgs, ModelArgs, PictureArgs, QualityArgs, Size};
@@ -34,6 +34,8 @@ pub(super) struct Source {
     pub(super) textures: Vec<Arc<Texture>>,
     /// The loader, with the files that it has read.
     pub(super) loader: SceneLoader,
+    /// Movements over frames, if the scene has keys.
+    pub(super) animation: Option<SceneAnimation>,
 }
 
 impl Source {
@@ -43,13 +45,13 @@ impl Source {
     /// The mistake in the file, with its line where there is one.
     pub(super) fn load(path: &Path, models: ModelArgs, size: Option<Size>) -> Result<Self, CommandError> {
         let mut loader = SceneLoader::new(models.load_options(size), LoadLimits::default());
-        let LoadedScene { scene, meshes, mesh_files, textures, warnings } =
+        let LoadedScene { scene, meshes, mesh_files, textures, warnings, animation } =
             loader.load(path).map_err(CommandError::wrong_input)?;
         for warning in warnings {
             tracing::warn!("{warning}");
         }
         let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { name, path: path.to_owned(), scene, meshes, mesh_files, textures, loader })
+        Ok(Self { name, path: path.to_owned(), scene, meshes, mesh_files, textures, loader, animation })
     }
 
     /// Request of the first frame: settings of the scene, overridden by the command line.

@@ -25,6 +25,7 @@ use super::film::still::{Added, Redeveloped, StillFilm, alone};
 use super::frame_log::FrameLogFile;
 use super::handle::{Channels, PresentedFrame, ViewerHandle};
 use super::input_action::InputAction;
+use super::keyed_scene::KeyedScene;
 use super::orbit::Animation;
 use super::quality_controller::QualityController;
 use super::requests::{Answered, RequestPolicy, Requests, ViewState};
@@ -100,6 +101,7 @@ impl Viewer {
         animation: Animation,
         numbers: &[u64],
         auxiliary: &[Shading],
+        keys: Option<KeyedScene>,
     ) -> (Self, ViewerHandle, FrameSequence) {
         let (plan, sender, sequence) = SequencePlan::new(numbers, auxiliary);
         let (channels, handle) = Channels::new(farm.entrance(), farm.status());
@@ -108,7 +110,7 @@ impl Viewer {
             state: ViewState { request, scene: 0, hidden: false, denoised: false },
             visibility: Visibility::default(),
             camera: CameraControl::new(request.view.camera, None),
-            requests: Requests::of_sequence(animation, plan),
+            requests: Requests::of_sequence(animation, plan, keys),
             film: StillFilm::new(false),
             developing: None,
             figures: ViewerState::new(),

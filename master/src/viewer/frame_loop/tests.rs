@@ -276,7 +276,7 @@ async fn a_sequence_delivers_each_frame_of_its_plan_once_and_in_order() {
     let numbers: Vec<u64> = (3..40).chain(50..60).collect();
     let animation = Animation { spin: 1.0, ..STILL };
     let farm = farm(Script::Correct).await;
-    let (viewer, handle, mut sequence) = Viewer::sequence(farm, request(), animation, &numbers, &[]);
+    let (viewer, handle, mut sequence) = Viewer::sequence(farm, request(), animation, &numbers, &[], None);
     let task = spawn(viewer, CancellationToken::new());
     let mut arrived = Vec::new();
     while let Some(frame) = sequence.next().await {

@@ -27,6 +27,7 @@ use rayfarm_farm::accounting::FrameAccount;
 use rayfarm_farm::{FrameId, ViewRequest};
 
 use super::film::pass::{Part, Pass};
+use super::keyed_scene::KeyedScene;
 use super::open_requests::OPEN_REQUESTS;
 use super::orbit::Animation;
 use super::quality_controller::{QualityController, QualityMode, Stillness};
@@ -43,6 +44,10 @@ pub(super) struct Requests {
     policy: RequestPolicy,
     /// Frames of a sequence; `None` for an interactive view.
     plan: Option<SequencePlan>,
+    /// Scenes and cameras of the frames of a sequence, where the scene has keys.
+    keys: Option<KeyedScene>,
+    /// Frame of `keys` whose scene was requested last.
+    keyed: Option<u64>,
     /// Index, within the animation or the plan, of the next frame to request.
     next: u64,
     open: VecDeque<Open>,
@@ -68,6 +73,8 @@ impl Requests {
         Self {
             policy,
             plan: None,
+            keys: None,
+            keyed: None,
             next: 0,
             open: VecDeque::new(),
             wanted: None,
@@ -81,10 +88,10 @@ impl Requests {
         }
     }
 
-    /// Requests of a sequence: each frame of the plan once.
-    pub(super) fn of_sequence(animation: Animation, plan: SequencePlan) -> Self {
+    /// Requests of a sequence: each frame of the plan once, with its scene and camera where the scene has keys.
+    pub(super) fn of_sequence(animation: Animation, plan: SequencePlan, keys: Option<KeyedScene>) -> Self {
         let policy = RequestPolicy { animation, limit: Some(plan.len()), continuous: true };
-        Self { plan: Some(plan), ..Self::new(policy, None) }
+        Self { plan: Some(plan), keys, ..Self::new(policy, None) }
     }
 
     /// Number of frames after which the run ends.

@@ -36,7 +36,12 @@ impl Requests {
         if mode.is_some_and(|next| self.open.iter().any(|open| open.gives_way_to(next))) {
             self.drop_all(farm);
         }
-        let Next { request, number, slot, pass } = next;
+        let Next { mut request, number, slot, pass } = next;
+        if let Err(fault) = self.replace_scene(farm, number) {
+            // Frames are checked before the run. A frame of another scene would be wrong: a view without pixels ends the run.
+            tracing::error!("frame {number}: {fault}");
+            request.view.width = 0;
+        }
         self.passes = pass.map(|(passes, _)| passes);
         self.films = self.passes.map_or(self.films, |passes| passes.film);
         // A request that replaces another one is as old as the camera that it shows.
@@ -47,6 +52,16 @@ impl Requests {
         self.requested = Some(Requested { request, wanted: *wanted, mode });
         self.next += 1;
         true
+    }
+
+    /// Replaces the scene by that of a frame, where the frames have different ones.
+    fn replace_scene(&mut self, farm: &impl Renderer, number: u64) -> Result<(), String> {
+        let Some(keys) = self.keys.as_ref().filter(|_| self.keyed != Some(number)) else { return Ok(()) };
+        if let Some(scene) = keys.assets(number)? {
+            farm.replace_scene(scene);
+        }
+        self.keyed = Some(number);
+        Ok(())
     }
 
     /// The next frame, if one is needed.
@@ -70,6 +85,7 @@ impl Requests {
                 (number, Some(slot))
             }
         };
+        let request = self.keys.as_ref().map_or(request, |keys| keys.request(&request, number));
         let request = animation.request(&request, number);
         let request = self.plan.as_ref().map_or(request, |plan| plan.request(self.next, request));
         let has_passes = self.plan.is_none() && film_passes::has_passes(&request.view);

@@ -139,7 +139,7 @@ fn moving_pictures_of_paths_have_one_sample_and_a_sequence_has_all() {
     assert_eq!(kinds, [(1, PixelFormat::Rgb8); 2]);
 
     let (plan, _sender, _sequence) = SequencePlan::new(&[0, 1], &[]);
-    let requests = Requests::of_sequence(SPINNING, plan);
+    let requests = Requests::of_sequence(SPINNING, plan, None);
     let request = ViewRequest { view: paths(40), scale: RenderScale::Full };
     let state = ViewState { request, scene: 0, hidden: false, denoised: false };
     let mut view = View { requests, recorder: Recorder::default(), state };

@@ -1,6 +1,8 @@
 //! What is requested, by which rules, and of whom.
 
-use rayfarm_farm::{Farm, FrameId, ViewRequest};
+use std::sync::Arc;
+
+use rayfarm_farm::{Assets, Farm, FrameId, ViewRequest};
 
 use crate::viewer::orbit::Animation;
 
@@ -10,6 +12,8 @@ pub(in crate::viewer) trait Renderer {
     fn request(&self, request: ViewRequest) -> FrameId;
     /// Drops all requested frames.
     fn drop_requests(&self);
+    /// Replaces the scene for all frames that are requested from now on.
+    fn replace_scene(&self, scene: Arc<Assets>);
 }
 
 impl Renderer for Farm {
@@ -19,6 +23,10 @@ impl Renderer for Farm {
 
     fn drop_requests(&self) {
         self.drop_requests();
+    }
+
+    fn replace_scene(&self, scene: Arc<Assets>) {
+        self.replace_scene(scene);
     }
 }
 

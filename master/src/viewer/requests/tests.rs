@@ -1,7 +1,9 @@
 //! Requests to a renderer that only records them.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
+use rayfarm_farm::Assets;
 use rayfarm_farm::testing::test_scene;
 use rayfarm_tracer::scene::{FrameView, RenderScale};
 
@@ -14,6 +16,7 @@ pub(super) const SPINNING: Animation = Animation { spin: 1.0, ..STILL };
 /// Requests, and the number of times that all were dropped.
 #[derive(Default)]
 pub(super) struct Recorder {
+    pub(super) scenes: RefCell<Vec<(usize, rayfarm_protocol::AssetId)>>,
     pub(super) requests: RefCell<Vec<ViewRequest>>,
     pub(super) dropped: RefCell<usize>,
 }
@@ -26,6 +29,11 @@ impl Renderer for Recorder {
 
     fn drop_requests(&self) {
         *self.dropped.borrow_mut() += 1;
+    }
+
+    fn replace_scene(&self, scene: Arc<Assets>) {
+        let next = self.requests.borrow().len();
+        self.scenes.borrow_mut().push((next, scene.scene()));
     }
 }
 
@@ -207,7 +215,7 @@ fn a_sequence_requests_each_frame_of_its_plan_once_and_waits_for_slots() {
     let (plan, _sender, _sequence) = SequencePlan::new(&numbers, &[]);
     let request = ViewRequest { view: test_scene::view(), scale: RenderScale::Full };
     let state = ViewState { request, scene: 0, hidden: false, denoised: false };
-    let requests = Requests::of_sequence(SPINNING, plan);
+    let requests = Requests::of_sequence(SPINNING, plan, None);
     let mut view = View { requests, recorder: Recorder::default(), state };
     view.requests.fill(&view.recorder, &view.state);
     let mut held = VecDeque::new();

@@ -1,5 +1,6 @@
 //! Loading of complete scenes: files are read, models compiled, and everything that a file leaves open is decided.
 
+mod animated;
 mod background;
 mod cache;
 mod framing;
@@ -18,6 +19,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use animated::SceneAnimation;
 pub use limits::LoadLimits;
 pub use loader::SceneLoader;
 pub use model::{compile_model, compile_model_with};
@@ -38,6 +40,9 @@ pub struct LoadedScene {
     pub mesh_files: Vec<PathBuf>,
     /// Every texture of the scene, once.
     pub textures: Vec<Arc<Texture>>,
+    /// Movements of the scene over frames, if it has any. The scene is as it is at time 0, but for the camera: see
+    /// [`SceneAnimation::camera`].
+    pub animation: Option<SceneAnimation>,
     /// Messages about accepted input that is probably a mistake, each with its place.
     pub warnings: Vec<String>,
 }

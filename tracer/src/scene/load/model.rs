@@ -78,7 +78,7 @@ pub(super) fn load_bare(
     scene.textures = maps;
     warnings.extend(notes);
     let mesh_files = vec![path.to_owned()];
-    Ok(LoadedScene { scene, meshes: vec![mesh], mesh_files, textures, warnings })
+    Ok(LoadedScene { scene, meshes: vec![mesh], mesh_files, textures, warnings, animation: None })
 }
 
 /// Loads and compiles a model, or reads a compiled one. Returns the mesh and warnings, and adds the files that it reads, with

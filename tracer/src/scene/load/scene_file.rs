@@ -7,6 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::LoadedScene;
+use super::animated::SceneAnimation;
 use super::background::background;
 use super::framing;
 use super::instances::{MaterialsText, Models, named};
@@ -42,11 +43,10 @@ pub(super) fn load_text(
     caches: &Caches,
 ) -> Result<LoadedScene, SceneError> {
     refuse_for_scene(path, options)?;
-    let locate = |fault: Fault| {
-        let (line, column) = toml::place(text, fault.at);
-        SceneError::InScene { path: path.to_owned(), line, column, message: fault.message }
-    };
-    let read = toml::read(text).map_err(locate)?;
+    let locate = |fault: Fault| located(path, text, fault);
+    let mut read = toml::read(text, 0.0).map_err(locate)?;
+    read.camera_path.keeps_direction = matches!(read.camera, Some(CameraText { aim: Aim::Direction(_), .. }));
+    let animation = SceneAnimation::of(path, text, &read);
     let mut warnings: Vec<String> = read.warnings.iter().cloned().map(|w| locate(w).to_string()).collect();
     let materials = MaterialsText { materials: &read.materials, textures: &read.textures };
     let bounding = read.volumes.iter().filter_map(VolumeText::model);
@@ -55,7 +55,14 @@ pub(super) fn load_text(
     let mut loaded = assemble(path, read, &mut models, &locate)?;
     warnings.append(&mut models.warnings);
     loaded.warnings = warnings;
+    loaded.animation = animation;
     Ok(loaded)
+}
+
+/// A fault with its place in the text of a scene file.
+pub(super) fn located(path: &Path, text: &str, fault: Fault) -> SceneError {
+    let (line, column) = toml::place(text, fault.at);
+    SceneError::InScene { path: path.to_owned(), line, column, message: fault.message }
 }
 
 /// Refuses options for which a scene file has keys of its own.
@@ -145,7 +152,7 @@ fn assemble(
         scene.lights.push(framing::default_light(&scene.camera));
         scene.has_default_light = true;
     }
-    Ok(LoadedScene { scene, meshes, mesh_files, textures, warnings: Vec::new() })
+    Ok(LoadedScene { scene, meshes, mesh_files, textures, warnings: Vec::new(), animation: None })
 }
 
 /// A volume with its model.

@@ -124,7 +124,7 @@ mod tests {
 
     fn render(keys: &str) -> Result<RenderSettings, String> {
         let text = format!("[render]\n{keys}");
-        read(&text).map(|scene| scene.render).map_err(|fault| {
+        read(&text, 0.0).map(|scene| scene.render).map_err(|fault| {
             let (line, column) = place(&text, fault.at);
             format!("{line}:{column} {}", fault.message)
         })

@@ -4,9 +4,11 @@ use glam::DVec3;
 
 use super::Reading;
 use super::fault::Read;
+use super::keys::{Keys, LIGHT_KEY_KEYS};
 use super::knobs;
 use super::table::Table;
 use super::value::{Value, unit};
+use crate::scene::animation::Shape;
 use crate::scene::data::{Attenuation, Integrator, Light, LightKind};
 use crate::scene::validate::{MAX_COORDINATE, MAX_LIGHT, MAX_SHADOW_SAMPLES};
 
@@ -23,6 +25,7 @@ pub(super) const LIGHT_KEYS: &[&str] = &[
     "radius",
     "shadow_samples",
     "shadows",
+    "key",
 ];
 
 #[derive(Clone, Copy, PartialEq)]
@@ -40,15 +43,21 @@ pub(super) fn light(table: Table<'_>, integrator: &Integrator, reading: &mut Rea
     let radius = table.read("radius", radius)?.unwrap_or(0.0);
     let samples = |value: Value<'_>| value.whole("from 1 to 1024", 1..=u32::from(MAX_SHADOW_SAMPLES));
     let shadow_samples = table.read("shadow_samples", samples)?.map(|samples| samples as u16);
+    let keys = Keys::of(table, "[[light.key]]", LIGHT_KEY_KEYS, reading)?;
+    let position = keys.vector_or(table, "position", reading)?;
+    let position = || position.map_or_else(|| table.required("position")?.vector(), Ok);
     let light = Light {
         kind: match kind {
-            Kind::Point => LightKind::Point { position: table.required("position")?.vector()? },
-            Kind::Spot => spot(table)?,
+            Kind::Point => LightKind::Point { position: position()? },
+            Kind::Spot => spot(table, position()?, &keys, reading)?,
             Kind::Directional => {
-                LightKind::Directional { direction: table.required("direction")?.direction()? }
+                let Some(direction) = direction(table, &keys, reading)? else {
+                    return Err(table.fault("`direction` is missing in [[light]]"));
+                };
+                LightKind::Directional { direction }
             }
         },
-        color: color(table)?,
+        color: color(table, &keys, reading)?,
         attenuation: table.read("attenuation", attenuation)?.unwrap_or(Attenuation::None),
         shadows: table.read("shadows", |value| value.boolean())?.unwrap_or(true),
         radius: if kind == Kind::Directional { 0.0 } else { radius },
@@ -63,37 +72,63 @@ pub(super) fn light(table: Table<'_>, integrator: &Integrator, reading: &mut Rea
     Ok(light)
 }
 
-fn color(table: Table<'_>) -> Read<glam::Vec3> {
+fn color<'t>(table: Table<'t>, keys: &Keys<'t>, reading: &mut Reading) -> Read<glam::Vec3> {
     let limit = f64::from(MAX_LIGHT);
-    let color = table.read("color", |value| value.color(MAX_LIGHT))?.unwrap_or(glam::Vec3::ONE);
-    let Some(intensity) = table.get("intensity") else { return Ok(color) };
-    let factor = intensity.number("from 0 to 1e30", |n| (0.0..=limit).contains(&n))?;
-    let scaled = color.as_dvec3() * factor;
+    let rgb = |value: Value<'t>| value.color(MAX_LIGHT).map(|color| color.as_dvec3());
+    let color = keys.value_or(table, "color", Shape::Within, rgb, reading)?.unwrap_or(DVec3::ONE);
+    let factor = |value: Value<'t>| value.number("from 0 to 1e30", |n| (0.0..=limit).contains(&n));
+    let Some(factor) = keys.number_or(table, "intensity", factor, reading)? else {
+        return Ok(color.as_vec3());
+    };
+    let scaled = color * factor;
     if scaled.max_element() > limit {
-        return Err(intensity.fault(format!("{intensity} times `color` must not exceed 1e30")));
+        let message = "`intensity` in [[light]] times `color` must not exceed 1e30";
+        return Err(table
+            .get("intensity")
+            .map_or_else(|| table.fault(message), |value| value.fault(message)));
     }
     Ok(scaled.as_vec3())
 }
 
-fn spot(table: Table<'_>) -> Read<LightKind> {
-    let position = table.required("position")?.vector()?;
-    let aim = table
-        .one_of(&["direction", "look_at"])?
-        .ok_or_else(|| table.fault("`direction` is missing in [[light]] (a spot needs it, or `look_at`)"))?;
+/// The unit direction of a light, if it has one.
+fn direction<'t>(table: Table<'t>, keys: &Keys<'t>, reading: &mut Reading) -> Read<Option<DVec3>> {
+    let read = |value: Value<'t>| value.direction();
+    let Some(direction) = keys.value_or(table, "direction", Shape::Round, read, reading)? else {
+        return Ok(None);
+    };
+    match unit(direction) {
+        Some(direction) => Ok(Some(direction)),
+        None => Err(table.fault("`direction` in [[light.key]] passes through 0: add a key in between")),
+    }
+}
+
+fn spot<'t>(table: Table<'t>, position: DVec3, keys: &Keys<'t>, reading: &mut Reading) -> Read<LightKind> {
+    table.one_of(&["direction", "look_at"])?;
+    let point = keys.vector_or(table, "look_at", reading)?;
+    let own = direction(table, keys, reading)?;
+    let direction = match (own, point) {
+        (Some(direction), None) => direction,
+        (None, Some(point)) => unit(point - position).ok_or_else(|| {
+            let expected = "another point than the light's `position`";
+            let fault = || table.fault(format!("`look_at` in [[light.key]] must be {expected}"));
+            table.get("look_at").map_or_else(fault, |value| value.must_be(expected))
+        })?,
+        (Some(_), Some(_)) => {
+            let message = "`direction` contradicts `look_at` in [[light]] with its keys; keep one of them";
+            return Err(table.fault(message));
+        }
+        (None, None) => {
+            let message = "`direction` is missing in [[light]] (a spot needs it, or `look_at`)";
+            return Err(table.fault(message));
+        }
+    };
     let beam = |value: Value<'_>| value.number("above 0 and at most 360 degrees", |n| n > 0.0 && n <= 360.0);
     let beam_angle = table.read("beam_angle", beam)?.unwrap_or(40.0);
     let edge = |value: Value<'_>| {
         value.number("of degrees from 0 to half the `beam_angle`", |n| (0.0..=beam_angle / 2.0).contains(&n))
     };
     let penumbra = table.read("penumbra", edge)?.unwrap_or(0.0);
-    Ok(LightKind::Spot { position, direction: axis(aim, position)?, beam_angle, penumbra })
-}
-
-fn axis(aim: Value<'_>, position: DVec3) -> Read<DVec3> {
-    if aim.name == "direction" {
-        return aim.direction();
-    }
-    unit(aim.vector()? - position).ok_or_else(|| aim.must_be("another point than the light's `position`"))
+    Ok(LightKind::Spot { position, direction, beam_angle, penumbra })
 }
 
 fn attenuation(value: Value<'_>) -> Read<Attenuation> {

@@ -7,6 +7,7 @@ mod background;
 mod camera;
 mod fault;
 mod groups;
+mod keys;
 mod knobs;
 mod light;
 mod material;
@@ -35,6 +36,7 @@ use table::Table;
 use value::Value;
 
 use crate::material::Material;
+use crate::scene::animation::CameraPath;
 use crate::scene::data::{Disk, Integrator, Light, Motion, Plane, RenderSettings, Sphere, Triangle};
 use crate::scene::validate::{
     MAX_DISKS, MAX_LIGHT, MAX_LIGHTS, MAX_MATERIALS, MAX_MODELS, MAX_PLANES, MAX_SPHERES, MAX_TRIANGLES,
@@ -51,6 +53,7 @@ const KEYS: &[&str] = &[
     "ambient",
     "render",
     "camera",
+    "camera_key",
     "background",
     "light",
     "material",
@@ -91,6 +94,12 @@ pub(super) struct SceneText {
     pub(super) volumes: Vec<VolumeText>,
     /// Objects that move while the shutter is open; models have the indices of `models`.
     pub(super) motions: Vec<Motion>,
+    /// Path of the camera over frames.
+    pub(super) camera_path: CameraPath,
+    /// Whether an object, a group or a light has keys.
+    pub(super) moves: bool,
+    /// Time of the last key, in seconds; 0 without keys.
+    pub(super) last_key: f64,
     /// Accepted input that is probably a mistake.
     pub(super) warnings: Vec<Fault>,
 }
@@ -104,6 +113,12 @@ struct Reading {
     shutter: Shutter,
     /// Whether a table has a pose at time 1.
     has_ends: bool,
+    /// Time at which objects with keys are read, in seconds.
+    time: f64,
+    /// Time of the last key so far, in seconds.
+    last_key: f64,
+    /// Whether an object, a group or a light has keys.
+    moves: bool,
 }
 
 impl Reading {
@@ -122,12 +137,12 @@ impl Reading {
     }
 }
 
-/// Reads a scene file's text.
+/// Reads a scene file's text. Objects with keys are as they are at a time, in seconds.
 ///
 /// # Errors
 /// The first fault in the text: no TOML, an unknown key, a value of the wrong type or out of range, an unknown
 /// material, an unsupported feature.
-pub(super) fn read(text: &str) -> Read<SceneText> {
+pub(super) fn read(text: &str, time: f64) -> Read<SceneText> {
     check_size(text)?;
     let document = DeTable::parse(text).map_err(|e| {
         let at = e.span().map_or(0, |span| span.start);
@@ -137,7 +152,7 @@ pub(super) fn read(text: &str) -> Read<SceneText> {
     })?;
     let top = Table::of("the scene file", 0, document.get_ref(), KEYS)?;
     let mut first = FirstFault::default();
-    let scene = read_sections(top, &mut first);
+    let scene = read_sections(top, time, &mut first);
     first.into_result()?;
     // Without a fault every section has been read.
     scene.ok_or_else(|| top.fault("the scene file cannot be read"))
@@ -178,8 +193,8 @@ fn check_size(text: &str) -> Read<()> {
 }
 
 /// Reads all sections, so that the first fault in the text is found; `None` if there is one.
-fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
-    let mut reading = Reading::default();
+fn read_sections(top: Table<'_>, time: f64, first: &mut FirstFault) -> Option<SceneText> {
+    let mut reading = Reading { time, ..Reading::default() };
     let reading = &mut reading;
     let ambient = first.keep(top.read("ambient", |value| value.color(MAX_LIGHT)));
     let render = |table: Table<'_>| view::render(table, reading);
@@ -191,6 +206,8 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
     let camera = |table: Table<'_>| camera::camera(table, integrator, reading);
     let camera = section(top, "camera", "[camera]", camera::CAMERA_KEYS, camera, first);
     reading.shutter = camera.flatten().map_or(Shutter::default(), |camera| camera.shutter);
+    let kind = camera.flatten().map(|camera| camera.kind);
+    let camera_path = first.keep(keys::camera_path(top, kind, reading));
     let background = |table: Table<'_>| background::background(table, reading);
     let background =
         section(top, "background", "[background]", background::BACKGROUND_KEYS, background, first);
@@ -224,6 +241,9 @@ fn read_sections(top: Table<'_>, first: &mut FirstFault) -> Option<SceneText> {
         triangles: objects.triangles,
         volumes,
         motions,
+        camera_path: camera_path?,
+        moves: reading.moves,
+        last_key: reading.last_key,
         warnings: std::mem::take(&mut reading.warnings),
     })
 }

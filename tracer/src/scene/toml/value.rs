@@ -178,6 +178,19 @@ impl<'t> Value<'t> {
         self.number("that is finite and up to 1e30", |n| n.abs() <= MAX_COORDINATE)
     }
 
+    /// Factors along three axes, none of them zero.
+    pub(super) fn scale(&self) -> Read<DVec3> {
+        let expected = "one number, or three in an array, none of them 0";
+        let scale = if self.value.get_ref().is_array() {
+            self.vector()?
+        } else {
+            let fits = |n: f64| n.abs() <= MAX_COORDINATE;
+            DVec3::splat(self.number("(or an array of three), not 0 and up to 1e30", fits)?)
+        };
+        let flat = scale.to_array().contains(&0.0);
+        if flat { Err(self.must_be(expected)) } else { Ok(scale) }
+    }
+
     /// A number above 0 and up to 1e30.
     pub(super) fn positive(&self) -> Read<f64> {
         self.number("above 0", |n| n > 0.0 && n <= MAX_COORDINATE)

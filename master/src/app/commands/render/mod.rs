@@ -27,16 +27,18 @@ use crate::app::trust;
 use crate::display::Display;
 use crate::error::CommandError;
 use crate::viewer::orbit::Animation;
-use crate::viewer::{FrameLogFile, Viewer};
+use crate::viewer::{FrameLogFile, KeyedScene, Viewer};
 
 mod denoised;
 mod files;
 mod film_file;
+mod keyed;
 mod passes;
 mod repair;
 #[cfg(test)]
 mod tests;
 mod totals;
+mod video;
 
 /// Time that local workers have to connect before the run begins without them, and the interval of looking for them.
 const STARTUP_TIMEOUT: Duration = Duration::from_secs(5);
@@ -48,14 +50,20 @@ const STARTUP_POLL: Duration = Duration::from_millis(2);
 /// A wrong scene or output, found before anything is rendered; a farm that cannot listen or go on; a full disk; an
 /// interruption; frames with wrong pixels that could not be rendered again.
 pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
-    let pattern = OutputPattern::parse(&args.output, args.frames)?;
+    let pattern = OutputPattern::parse(&args.output, args.frames.unwrap_or(1))?;
     pattern.path(args.first_frame.into()).as_deref().map(check_writable).transpose()?;
+    video::check(&args, &pattern)?;
     let source = Source::load(&args.scene, args.models, args.picture.size)?;
+    let frames = keyed::frames(&args, &pattern, &source);
     let request = within_error(&args.error, &source, source.request(&args.picture)?)?;
     let request = in_format_of(&args, &pattern, request)?;
-    let passes = PassRules::of(&args, &source, &request)?;
+    let keys = keyed::keys(&args, &source);
+    let first = keys.as_ref().map_or(request, |keys| keys.request(&request, 0));
+    let passes = PassRules::of(&args, &source, &first)?;
     let (request, denoised) = denoised_of(&args, request)?;
-    let plan = plan(&args, &pattern, &request)?;
+    let plan = plan(&args, frames, &pattern, &request)?;
+    keyed::check(keys.as_ref(), &request, &plan)?;
+    let video = video::start(&args, &pattern, &request, &plan)?;
     let triangles = source.compiled()?.triangle_count();
     let record_bytes = args.observability.record_bytes();
     let log = args.fps_log.as_deref().map(|path| FrameLogFile::create(path, record_bytes)).transpose()?;
@@ -63,9 +71,17 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let totals = Totals::new(triangles, log);
     let aov = if args.denoise { with_guides(&args.aov) } else { args.aov };
     let run = Run {
-        animation: animation(&args.picture, args.frames),
+        animation: animation(&args.picture, frames),
+        keys,
         wait_for_workers: args.wait_for_workers,
-        files: FrameFiles::new(request, aov, denoised, plan, FrameWriter::new(pattern), totals),
+        files: FrameFiles::new(
+            request,
+            aov,
+            denoised,
+            plan,
+            FrameWriter::new(pattern).with_video(video),
+            totals,
+        ),
         observability,
         passes,
         samples_so_far: None,
@@ -133,14 +149,19 @@ fn denoised_of(
 }
 
 /// The frames to render.
-fn plan(args: &RenderArgs, pattern: &OutputPattern, request: &ViewRequest) -> Result<Plan, CommandError> {
+fn plan(
+    args: &RenderArgs,
+    frames: u32,
+    pattern: &OutputPattern,
+    request: &ViewRequest,
+) -> Result<Plan, CommandError> {
     let FrameView { width, height, .. } = request.view;
     let existing = match (args.resume, args.skip_existing) {
         (true, _) => Existing::Resume { width, height, layers: layers(args) },
         (_, true) => Existing::Skip,
         _ => Existing::Replace,
     };
-    Plan::new(args.first_frame.into(), args.frames.into(), existing, pattern)
+    Plan::new(args.first_frame.into(), frames.into(), existing, pattern)
 }
 
 /// Names of the layers of each file that has layers.
@@ -152,6 +173,8 @@ fn layers(args: &RenderArgs) -> Vec<&'static str> {
 /// One run of `render`.
 struct Run {
     animation: Animation,
+    /// Frames of a scene that has keys.
+    keys: Option<KeyedScene>,
     /// Number of workers that must be connected before the run begins, however long that takes.
     wait_for_workers: Option<u32>,
     files: FrameFiles,
@@ -163,6 +186,13 @@ struct Run {
 }
 
 impl Run {
+    /// The request for a frame.
+    fn request(&self, number: u64) -> ViewRequest {
+        let request = self.files.request;
+        let request = self.keys.as_ref().map_or(request, |keys| keys.request(&request, number));
+        self.animation.request(&request, number)
+    }
+
     /// Starts a farm, renders everything with it, and shuts it down whatever happened.
     fn carry_out(
         mut self,
@@ -240,9 +270,10 @@ impl Run {
         progress: &mut Progress,
         interrupted: &CancellationToken,
     ) -> Result<(Farm, Result<(), CommandError>), CommandError> {
-        let files = &mut self.files;
+        let (files, keys) = (&mut self.files, self.keys.clone());
+        let (numbers, auxiliary) = (&files.plan.frames, files.auxiliary());
         let (viewer, handle, sequence) =
-            Viewer::sequence(farm, files.request, self.animation, &files.plan.frames, &files.auxiliary());
+            Viewer::sequence(farm, files.request, self.animation, numbers, &auxiliary, keys);
         files.totals.begin();
         let stop = interrupted.clone();
         let rendering = runtime.spawn(async move { viewer.run(&stop).await });
@@ -261,7 +292,7 @@ impl Run {
         interrupted: &CancellationToken,
     ) -> Result<RenderReport, CommandError> {
         let files = &mut self.files;
-        let written = files.writer.finish().await;
+        let written = files.writer.conclude(rendered.is_ok(), interrupted).await;
         let FrameFiles { totals, writer, plan, denoised, .. } = files;
         let filtered = if denoised.is_some() { ", denoised" } else { "" };
         progress.finish(&(totals.summary(writer.written(), plan, writer.has_files()) + filtered));
@@ -287,6 +318,12 @@ impl Run {
         }
         if !writer.has_files() {
             return format!("{} of {frames} frames are rendered", totals.frames());
+        }
+        if writer.is_video() {
+            let rendered = totals.frames();
+            return format!(
+                "{rendered} of {frames} frames were rendered; a video is written whole or not at all"
+            );
         }
         let resume = if frames > 1 { "; the same command with --resume goes on" } else { "" };
         format!("{} of {frames} frames are written{}{resume}", writer.written(), plan.already())

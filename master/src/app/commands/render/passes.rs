@@ -59,7 +59,7 @@ impl PassRules {
                     "{option} adds up passes, and --denoise needs all samples at once: leave one of them out"
                 ));
             }
-            Some(option) if args.frames != 1 => {
+            Some(option) if args.frames.is_some_and(|frames| frames != 1) => {
                 return refuse(format!("{option} is for one picture: leave --frames out"));
             }
             _ => {}
@@ -207,7 +207,7 @@ impl Run {
     ) -> Result<(), CommandError> {
         self.files.totals.begin();
         for number in self.files.plan.frames.clone() {
-            let whole = self.animation.request(&self.files.request, number);
+            let whole = self.request(number);
             let started = Instant::now();
             let mut picture = Picture::new(whole, rules.continued.take(), rules.time);
             let rendered = self.render_picture(farm, &mut picture, &rules, progress, interrupted).await;

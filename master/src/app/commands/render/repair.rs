@@ -70,7 +70,7 @@ impl Run {
 
     async fn render_again(&mut self, farm: &mut Farm, wrong: Vec<u64>) -> Result<(), String> {
         let requests = wrong.into_iter().flat_map(|number| {
-            let frame = self.animation.request(&self.files.request, number);
+            let frame = self.request(number);
             let auxiliary = self.files.aov.iter().map(move |aov| frame.auxiliary(aov.shading()));
             std::iter::once(frame).chain(auxiliary).map(move |request| (number, request))
         });
@@ -80,6 +80,10 @@ impl Run {
             while open.len() < OPEN_REQUESTS
                 && let Some((number, request)) = waiting.pop_front()
             {
+                if let Some(scene) = self.keys.as_ref().map(|keys| keys.assets(number)).transpose()?.flatten()
+                {
+                    farm.replace_scene(scene);
+                }
                 farm.request(request);
                 open.push_back(number);
             }

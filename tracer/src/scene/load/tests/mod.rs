@@ -1,5 +1,6 @@
 //! Scenes and models from files to loaded scenes.
 
+mod animated;
 mod keys;
 mod models;
 mod pictures;

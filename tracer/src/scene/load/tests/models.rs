@@ -51,7 +51,7 @@ fn models_that_name_one_file_share_it() {
         ("m/a.mtl", "newmtl green\nKd 0 1 0\n"),
         ("copy.obj", &TRIANGLE.replace("0 1 0", "0 9 0")),
     ]);
-    let LoadedScene { scene, meshes, mesh_files, textures, warnings } = folder.load("s.toml");
+    let LoadedScene { scene, meshes, mesh_files, textures, warnings, .. } = folder.load("s.toml");
     assert_eq!(mesh_files, [PathBuf::from("m/a.obj"), PathBuf::from("copy.obj")]);
     assert!(textures.is_empty());
     assert_eq!(warnings, [""; 0]);

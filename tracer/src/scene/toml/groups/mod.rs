@@ -16,8 +16,9 @@ use glam::{DMat3, DVec3};
 
 use super::Reading;
 use super::fault::Read;
+use super::keys::{Keys, POSE_KEYS};
 use super::material::Materials;
-use super::objects::{ModelText, MovingSphere, Name, name, scale};
+use super::objects::{ModelText, MovingSphere, Name, name};
 use super::table::Table;
 use super::value::Value;
 use crate::rotation;
@@ -25,7 +26,7 @@ use crate::scene::data::{Disk, Motion, Sphere, Triangle};
 use placement::Placement;
 use tree::Tree;
 
-pub(super) const GROUP_KEYS: &[&str] = &["name", "translate", "rotate", "scale", "matrix", "children"];
+pub(super) const GROUP_KEYS: &[&str] = &["name", "translate", "rotate", "scale", "matrix", "children", "key"];
 
 /// Largest number of groups.
 pub(super) const MAX_GROUPS: usize = 1 << 16;
@@ -51,12 +52,14 @@ pub(super) fn group(table: Table<'_>, reading: &mut Reading) -> Read<GroupText> 
             }
         }
     }
+    let keys = Keys::of(table, "[[group.key]]", POSE_KEYS, reading)?;
+    keys.contradict(table, &["matrix"])?;
     let placement = match matrix {
         Some(value) => placement_of(value)?,
         None => {
-            let degrees = table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
-            let factors = table.read("scale", scale)?.unwrap_or(DVec3::ONE);
-            let translate = table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
+            let degrees = keys.vector_or(table, "rotate", reading)?.unwrap_or(DVec3::ZERO);
+            let factors = keys.scale_or(table, reading)?.unwrap_or(DVec3::ONE);
+            let translate = keys.vector_or(table, "translate", reading)?.unwrap_or(DVec3::ZERO);
             let linear = rotation::of_model(degrees) * DMat3::from_diagonal(factors);
             Placement { linear, translate }
         }

@@ -9,7 +9,7 @@ use super::fault::{Fault, Read, shortened};
 use super::table::Table;
 
 pub(crate) use model::ModelText;
-pub(super) use model::{MODEL_KEYS, model, scale};
+pub(super) use model::{MODEL_KEYS, model};
 pub(super) use primitives::{DISK_KEYS, MovingSphere, PLANE_KEYS, SPHERE_KEYS, disk, plane, sphere};
 pub(super) use triangles::{BOX_KEYS, RECTANGLE_KEYS, TRIANGLE_KEYS, cuboid, rectangle, triangle};
 pub(crate) use volume::{BoundaryText, VolumeText};

@@ -6,12 +6,11 @@ use glam::{DMat3, DVec3};
 
 use super::super::Reading;
 use super::super::fault::Read;
+use super::super::keys::{Keys, POSE_KEYS};
 use super::super::material::Materials;
 use super::super::table::Table;
-use super::super::value::Value;
 use crate::scene::data::NormalMode;
 use crate::scene::import::Up;
-use crate::scene::validate::MAX_COORDINATE;
 
 pub(in crate::scene::toml) const MODEL_KEYS: &[&str] = &[
     "name",
@@ -25,6 +24,7 @@ pub(in crate::scene::toml) const MODEL_KEYS: &[&str] = &[
     "crease_angle",
     "translate_end",
     "rotate_end",
+    "key",
 ];
 
 /// A model whose file has not been loaded.
@@ -69,7 +69,9 @@ pub(in crate::scene::toml) fn model(
         let message = "`crease_angle` in [[model]] has no effect where `normals` is \"flat\"".to_owned();
         reading.warn(at, message);
     }
-    let [translate, rotate, scale] = placement(table)?;
+    let keys = Keys::of(table, "[[model.key]]", POSE_KEYS, reading)?;
+    keys.contradict(table, &["translate_end", "rotate_end"])?;
+    let [translate, rotate, scale] = placement(table, &keys, reading)?;
     for key in ["translate_end", "rotate_end"] {
         reading.note_end(table, key);
     }
@@ -96,24 +98,11 @@ pub(in crate::scene::toml) fn model(
 }
 
 /// Translation, rotation and scale of a file.
-pub(super) fn placement(table: Table<'_>) -> Read<[DVec3; 3]> {
-    let rotate = table.read("rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
-    let scale = table.read("scale", scale)?.unwrap_or(DVec3::ONE);
+pub(super) fn placement<'t>(table: Table<'t>, keys: &Keys<'t>, reading: &mut Reading) -> Read<[DVec3; 3]> {
+    let rotate = keys.vector_or(table, "rotate", reading)?.unwrap_or(DVec3::ZERO);
+    let scale = keys.scale_or(table, reading)?.unwrap_or(DVec3::ONE);
     let up = table.read("up", |value| value.word(&Up::WORDS))?.unwrap_or_default();
     let (rotate, scale) = up.before(rotate, scale);
-    let translate = table.read("translate", |value| value.vector())?.unwrap_or(DVec3::ZERO);
+    let translate = keys.vector_or(table, "translate", reading)?.unwrap_or(DVec3::ZERO);
     Ok([translate, rotate, scale])
-}
-
-/// Factors along three axes, none of them zero.
-pub(in crate::scene::toml) fn scale(value: Value<'_>) -> Read<DVec3> {
-    let expected = "one number, or three in an array, none of them 0";
-    let scale = if value.value.get_ref().is_array() {
-        value.vector()?
-    } else {
-        let fits = |n: f64| n.abs() <= MAX_COORDINATE;
-        DVec3::splat(value.number("(or an array of three), not 0 and up to 1e30", fits)?)
-    };
-    let flat = scale.to_array().contains(&0.0);
-    if flat { Err(value.must_be(expected)) } else { Ok(scale) }
 }

@@ -4,12 +4,13 @@ use glam::DVec3;
 
 use super::super::Reading;
 use super::super::fault::Read;
+use super::super::keys::{Keys, SPHERE_KEY_KEYS};
 use super::super::material::Materials;
 use super::super::table::Table;
 use crate::scene::data::{Disk, Plane, Sphere};
 
 pub(in crate::scene::toml) const SPHERE_KEYS: &[&str] =
-    &["name", "center", "radius", "material", "inside_out", "uv_rotate", "center_end"];
+    &["name", "center", "radius", "material", "inside_out", "uv_rotate", "center_end", "key"];
 pub(in crate::scene::toml) const PLANE_KEYS: &[&str] = &["point", "normal", "material", "size"];
 pub(in crate::scene::toml) const DISK_KEYS: &[&str] = &["name", "center", "normal", "radius", "material"];
 
@@ -23,12 +24,18 @@ pub(in crate::scene::toml) fn sphere(
     reading: &mut Reading,
 ) -> Read<MovingSphere> {
     let material = materials.referred_or_neutral(table)?;
-    let center = table.required("center")?.vector()?;
+    let keys = Keys::of(table, "[[sphere.key]]", SPHERE_KEY_KEYS, reading)?;
+    keys.contradict(table, &["center_end"])?;
+    let center = match keys.vector_or(table, "center", reading)? {
+        Some(center) => center,
+        None => table.required("center")?.vector()?,
+    };
+    let radius = keys.number_or(table, "radius", |value| value.positive(), reading)?;
     reading.note_end(table, "center_end");
     let center = reading.shutter.ends(center, table.read("center_end", |value| value.vector())?);
     let sphere = Sphere {
         center: center.opening,
-        radius: table.required("radius")?.positive()?,
+        radius: radius.map_or_else(|| table.required("radius")?.positive(), Ok)?,
         material,
         inside_out: table.read("inside_out", |value| value.boolean())?.unwrap_or(false),
         uv_rotate: table.read("uv_rotate", |value| value.vector())?.unwrap_or(DVec3::ZERO),

@@ -6,6 +6,7 @@ use glam::{DMat3, Vec3};
 
 use super::super::Reading;
 use super::super::fault::Read;
+use super::super::keys::Keys;
 use super::super::table::Table;
 use super::super::value::Value;
 use super::model::{ModelText, placement};
@@ -53,7 +54,7 @@ pub(in crate::scene::toml) fn volume(table: Table<'_>, reading: &mut Reading) ->
     let boundary = match boundary.name {
         "sphere" => BoundaryText::Whole(sphere(boundary)?),
         "box" => BoundaryText::Whole(cuboid(boundary)?),
-        _ => BoundaryText::Model(Box::new(model(table, boundary)?)),
+        _ => BoundaryText::Model(Box::new(model(table, boundary, reading)?)),
     };
     if let BoundaryText::Whole(_) = boundary {
         PLACEMENT_KEYS.iter().for_each(|key| reading.idle(table, key, "without a `model`"));
@@ -86,9 +87,9 @@ fn cuboid(value: Value<'_>) -> Read<VolumeBoundary> {
     }
 }
 
-fn model(table: Table<'_>, file: Value<'_>) -> Read<ModelText> {
+fn model(table: Table<'_>, file: Value<'_>, reading: &mut Reading) -> Read<ModelText> {
     let name = file.file_name("the name of a model file")?;
-    let [translate, rotate, scale] = placement(table)?;
+    let [translate, rotate, scale] = placement(table, &Keys::NONE, reading)?;
     Ok(ModelText {
         file: PathBuf::from(name),
         at: file.start(),

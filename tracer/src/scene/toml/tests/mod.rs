@@ -4,6 +4,7 @@ mod bounces;
 mod checkers;
 mod faults;
 mod groups;
+mod keys;
 mod motion;
 mod paths;
 mod shapes;
@@ -16,6 +17,10 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::scene::{Attenuation, Background, Filter, LightKind, NormalMode, Tiling, Wrap};
+
+fn read(text: &str) -> Read<SceneText> {
+    super::read(text, 0.0)
+}
 
 /// A scene with one object of every kind, as on the format's page.
 const WHOLE: &str = r#"
