@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use rayfarm_farm::FinishedFrame;
 use rayfarm_farm::accounting::Fading;
+use rayfarm_tracer::scene::Setting;
 use serde::Serialize;
 
 use super::film::FilmProgress;
@@ -37,6 +38,9 @@ pub(crate) struct Statistics {
     pub(crate) film: Option<FilmProgress>,
     /// Reason for which no frame can be rendered, where known.
     pub(crate) problem: Option<String>,
+    /// Integrator, samples and knobs of the view, before the quality controller; `None` before the first snapshot.
+    #[serde(skip)]
+    pub(crate) setting: Option<Setting>,
     /// Recent use of the workers' time.
     #[serde(skip)]
     pub(crate) accounts: Arc<Fading>,
@@ -48,6 +52,7 @@ impl Statistics {
         let figures = |it: &Self| (it.completed, it.latency, it.resting, it.film);
         !self.resting
             || figures(self) != figures(older)
+            || self.setting != older.setting
             || (&self.quality, &self.problem) != (&older.quality, &older.problem)
             || !Arc::ptr_eq(&self.accounts, &older.accounts)
     }
@@ -78,6 +83,7 @@ pub(super) struct ViewerState {
     rest: Duration,
     film: Option<FilmProgress>,
     problem: Option<String>,
+    setting: Option<Setting>,
 }
 
 impl ViewerState {
@@ -95,6 +101,7 @@ impl ViewerState {
             rest: Duration::ZERO,
             film: None,
             problem: None,
+            setting: None,
         }
     }
 
@@ -111,6 +118,11 @@ impl ViewerState {
     /// Sets the progress of the newest picture; `None` for one that is not rendered in passes.
     pub(super) fn set_film(&mut self, film: Option<FilmProgress>) {
         self.film = film;
+    }
+
+    /// Sets integrator, samples and knobs of the view.
+    pub(super) fn set_setting(&mut self, setting: Setting) {
+        self.setting = Some(setting);
     }
 
     /// Sets or clears the reason for which no frame can be rendered.
@@ -173,6 +185,7 @@ impl ViewerState {
             quality: quiet.map_or_else(Vec::new, |quiet| quiet.quality.clone()),
             film: self.film,
             problem: self.problem.clone(),
+            setting: self.setting,
             accounts: self.published_accounts.1.clone(),
         }
     }

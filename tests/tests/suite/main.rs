@@ -16,5 +16,6 @@ mod resume;
 mod same_picture;
 mod tradeoff;
 mod trust;
+mod web;
 mod window;
 mod window_controls;

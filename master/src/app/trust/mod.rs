@@ -5,7 +5,11 @@
 
 #[cfg(feature = "discovery")]
 mod announcement;
+#[cfg(any(feature = "discovery", feature = "web"))]
+mod host_name;
 mod state;
+#[cfg(feature = "web")]
+mod web;
 
 use rayfarm_farm::Entrance;
 use rayfarm_protocol::transport::{MasterSecurity, MasterTrust};
@@ -15,6 +19,9 @@ use crate::app::cli::{FarmArgs, TrustAction, TrustArgs};
 use crate::error::CommandError;
 
 use state::MasterState;
+
+#[cfg(feature = "web")]
+pub(crate) use web::web_security;
 
 /// Whether and how the connections of a farm are secured: with TLS where other machines can connect, unless the user refuses it.
 ///
