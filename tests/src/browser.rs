@@ -95,12 +95,12 @@ impl Browser {
         self.command("actions", &json!({ "actions": [{ "type": "key", "id": "keys", "actions": actions }] }));
     }
 
-    /// Returns the errors and warnings of the console since the last call.
+    /// Returns the errors of the console since the last call.
     pub fn console(&self) -> Vec<String> {
         let entries = self.command("se/log", &json!({ "type": "browser" }));
         let entries = entries.as_array().expect("a list of entries").iter();
-        let serious = entries.filter(|entry| entry["level"] == "SEVERE" || entry["level"] == "WARNING");
-        serious.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
+        let errors = entries.filter(|entry| entry["level"] == "SEVERE");
+        errors.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
     }
 
     /// Sends a command of the session. Fails the test where the driver refuses it.

@@ -31,8 +31,8 @@ pub(super) struct Shared {
     pub(super) steering: Steering,
     /// What does not change while the server runs.
     pub(super) facts: Value,
-    /// The newest state as JSON, for all pages.
-    pub(super) published: watch::Sender<Arc<str>>,
+    /// The newest state as JSON, for all pages; `None` before the first one.
+    pub(super) published: watch::Sender<Option<Arc<str>>>,
 }
 
 impl Shared {
@@ -51,7 +51,7 @@ impl Shared {
             audience: Audience::new(),
             steering: Steering::new(MAX_CLIENTS),
             facts: facts(info),
-            published: watch::Sender::new(Arc::from("null")),
+            published: watch::Sender::new(None),
         })
     }
 
@@ -67,9 +67,9 @@ impl Shared {
             self.audience.is_there().await;
             let text: Arc<str> = self.status().to_string().into();
             self.published.send_if_modified(|newest| {
-                let differs = *newest != text;
+                let differs = newest.as_ref() != Some(&text);
                 if differs {
-                    *newest = text;
+                    *newest = Some(text);
                 }
                 differs
             });

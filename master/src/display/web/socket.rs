@@ -47,6 +47,8 @@ pub(super) struct Client {
 struct Page {
     /// Whether the page can be seen.
     visible: bool,
+    /// Time since which it can, or could last.
+    visible_since: Instant,
     /// The picture that is on its way.
     sent: Option<Sent>,
 }
@@ -54,7 +56,8 @@ struct Page {
 #[derive(Clone, Copy, Debug)]
 struct Sent {
     number: u32,
-    /// Time of the input that the picture answers, unless another picture of the frame has been shown.
+    /// Time of the input that the picture answers, unless another picture of the frame has been shown, or the frame is older than
+    /// the page.
     input_at: Option<Instant>,
 }
 
@@ -72,7 +75,7 @@ struct Writer<'a> {
     page: &'a watch::Sender<Page>,
     replies: mpsc::Receiver<String>,
     steering: watch::Receiver<SteeringState>,
-    published: watch::Receiver<Arc<str>>,
+    published: watch::Receiver<Option<Arc<str>>>,
     viewer: ViewerHandle,
     last: Option<Last>,
     /// Lines of the log that were sent, counted from the start of the process.
@@ -94,7 +97,7 @@ impl Client {
     pub(super) async fn run(self, socket: WebSocket) {
         let (sink, stream) = socket.split();
         let (replies_in, replies) = mpsc::channel(MAX_REPLIES);
-        let page = watch::Sender::new(Page { visible: true, sent: None });
+        let page = watch::Sender::new(Page { visible: true, visible_since: Instant::now(), sent: None });
         let mut writer = Writer {
             client: &self,
             sink,
@@ -168,7 +171,10 @@ impl Client {
             ClientMessage::HandOver { grant } => steering.answer(self.id, grant, now),
             ClientMessage::Visible { visible } => {
                 *looking = visible.then(|| self.shared.audience.look());
-                page.send_modify(|page| page.visible = visible);
+                page.send_modify(|page| {
+                    page.visible = visible;
+                    page.visible_since = if visible { now } else { page.visible_since };
+                });
             }
         }
         None
@@ -235,8 +241,10 @@ impl Writer<'_> {
                 }
                 changed = self.published.changed() => {
                     changed.map_err(|_| Ended)?;
-                    let status = Arc::clone(&self.published.borrow_and_update());
-                    self.text(format!("{{\"type\":\"status\",\"status\":{status}}}")).await?;
+                    let status = self.published.borrow_and_update().clone();
+                    if let Some(status) = status {
+                        self.text(format!("{{\"type\":\"status\",\"status\":{status}}}")).await?;
+                    }
                 }
                 (frame, format) = next_picture(&mut self.viewer, &mut seen, self.last.as_ref()) => {
                     self.picture(&frame, format).await?;
@@ -254,7 +262,9 @@ impl Writer<'_> {
         self.last = Some(Last { frame: Arc::downgrade(frame), format, at: Instant::now() });
         match encoded {
             Ok(encoded) => {
-                let input_at = is_new.then_some(frame.input_at);
+                // A frame from before the page could be seen has waited for the page, not the page for it.
+                let is_current = is_new && frame.completed_at > self.page.borrow().visible_since;
+                let input_at = is_current.then_some(frame.input_at);
                 let sent = Sent { number: encoded.number, input_at };
                 self.page.send_modify(|page| page.sent = Some(sent));
                 self.send(Message::Binary(encoded.message)).await
@@ -299,7 +309,7 @@ async fn next_picture(
     last: Option<&Last>,
 ) -> (Arc<PresentedFrame>, Format) {
     loop {
-        let Page { visible, sent } = *page.borrow_and_update();
+        let Page { visible, sent, .. } = *page.borrow_and_update();
         if !visible || sent.is_some() {
             page_changed(page).await;
             continue;

@@ -118,6 +118,7 @@ function receive(message) {
 let noticeTimer = 0;
 function notice(text, milliseconds) {
   clearTimeout(noticeTimer);
+  noticeTimer = 0;
   $("notice").textContent = text;
   $("notice").hidden = !text;
   if (milliseconds) noticeTimer = setTimeout(() => notice(page.status?.view.problem ?? ""), milliseconds);
@@ -178,12 +179,19 @@ function tick(now) {
   wheel = 0;
   if (moves.length) send({ type: "input", moves: moves.slice(0, 16) });
   moves = [];
-  ticking = held.size > 0;
+  ticking = held.size > 0 && steers();
   if (ticking) requestAnimationFrame(tick);
 }
 
 // Sends input with the next frame of the screen, and goes on while a key is held.
 function schedule() {
+  if (!steers()) {
+    if (page.steering.steers) notice(`Page ${page.steering.steers} steers. Request to steer first.`, 3000);
+    moves = [];
+    drag = [0, 0];
+    wheel = 0;
+    return;
+  }
   if (ticking) return;
   ticking = true;
   lastTick = performance.now();
@@ -470,6 +478,7 @@ function makeOptions(options) {
     field.id = `option-${option}`;
     field.name = option;
     field.onchange = () => setOption(field);
+    field.onblur = () => setTimeout(() => page.status && showOptions(page.status.options ?? {}), 700);
     const label = element("label", { htmlFor: field.id, textContent: option.replaceAll("-", " "), title: summary });
     field.title = summary;
     return [label, field];
@@ -484,7 +493,8 @@ function makeOptions(options) {
 async function setOption(field) {
   const reply = await command(`set ${field.name} ${field.value}`);
   $("option-refused").textContent = reply.ok ? "" : reply.error;
-  if (!reply.ok && page.status) showOptions(page.status.options ?? {});
+  // A value that the scene does not allow is not applied: then the field shows the old one again.
+  setTimeout(() => page.status && showOptions(page.status.options ?? {}), reply.ok ? 700 : 0);
 }
 
 function showOptions(options) {

@@ -62,8 +62,8 @@ async fn send_head(
         head += &format!("Content-Length: {}\r\n", body.len());
     }
     head += "\r\n";
-    stream.write_all(head.as_bytes()).await.unwrap();
-    // The server may have refused the request before its end.
+    // The server may refuse the request before its end.
+    let _ = stream.write_all(head.as_bytes()).await;
     let _ = stream.write_all(body).await;
 }
 
