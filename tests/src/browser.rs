@@ -1,6 +1,6 @@
 //! A real browser for tests of the web display: Chromium without a window, driven over the WebDriver protocol (W3C).
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -125,12 +125,22 @@ impl Browser {
              Content-Length: {length}\r\nConnection: close\r\n\r\n"
         );
         stream.write_all((head + body).as_bytes()).unwrap();
-        let mut response = Vec::new();
-        stream.read_to_end(&mut response).expect("the driver does not reply");
-        let response = String::from_utf8(response).unwrap();
-        let (head, body) = response.split_once("\r\n\r\n").expect("a response");
+        let mut stream = BufReader::new(stream);
+        let (mut head, mut length) = (String::new(), 0);
+        // The driver keeps the connection open, so the header says where the body ends.
+        while !head.ends_with("\r\n\r\n") {
+            let start = head.len();
+            let count = stream.read_line(&mut head).expect("the driver does not reply");
+            assert!(count > 0, "the driver ends the connection after {head:?}");
+            let line = head[start..].to_ascii_lowercase();
+            if let Some(value) = line.strip_prefix("content-length:") {
+                length = value.trim().parse().expect("a length");
+            }
+        }
+        let mut body = vec![0; length];
+        stream.read_exact(&mut body).expect("the driver does not reply");
         let status = head.split(' ').nth(1).and_then(|status| status.parse().ok()).expect("a status");
-        (status, serde_json::from_str(body).unwrap_or(Value::Null))
+        (status, serde_json::from_slice(&body).unwrap_or(Value::Null))
     }
 }
 
