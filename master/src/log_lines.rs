@@ -13,11 +13,19 @@ const MAX_LINE_BYTES: usize = 2000;
 #[derive(Debug)]
 struct Lines {
     lines: VecDeque<String>,
+    /// Lines since the start of the process.
+    #[cfg(feature = "web")]
+    recorded: u64,
     /// Number of the newest lines that have not been written, while a display holds them back.
     held: Option<usize>,
 }
 
-static LINES: Mutex<Lines> = Mutex::new(Lines { lines: VecDeque::new(), held: None });
+static LINES: Mutex<Lines> = Mutex::new(Lines {
+    lines: VecDeque::new(),
+    #[cfg(feature = "web")]
+    recorded: 0,
+    held: None,
+});
 
 fn with<T>(act: impl FnOnce(&mut Lines) -> T) -> T {
     act(&mut LINES.lock().unwrap_or_else(PoisonError::into_inner))
@@ -28,6 +36,10 @@ pub(crate) fn record(bytes: &[u8]) -> bool {
     let line = without_colors(&String::from_utf8_lossy(bytes));
     with(|lines| {
         lines.lines.push_back(line);
+        #[cfg(feature = "web")]
+        {
+            lines.recorded += 1;
+        }
         if lines.lines.len() > MAX_LINES {
             lines.lines.pop_front();
         }
@@ -42,6 +54,17 @@ pub(crate) fn record(bytes: &[u8]) -> bool {
 #[cfg(feature = "terminal")]
 pub(crate) fn last() -> Option<String> {
     with(|lines| lines.lines.back().cloned())
+}
+
+/// The lines after the first `seen` of the process, at most the last `most`, and their number since the start of the process.
+#[cfg(feature = "web")]
+pub(crate) fn after(seen: u64, most: usize) -> (Vec<String>, u64) {
+    with(|lines| {
+        let unseen = usize::try_from(lines.recorded.saturating_sub(seen)).unwrap_or(usize::MAX);
+        let count = unseen.min(most).min(lines.lines.len());
+        let newest = lines.lines.iter().skip(lines.lines.len() - count);
+        (newest.cloned().collect(), lines.recorded)
+    })
 }
 
 /// Writes no line to standard error until [`release`].
@@ -79,6 +102,18 @@ fn without_colors(line: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "web")]
+    #[test]
+    fn lines_are_returned_once() {
+        let (_, before) = after(0, 0);
+        record(b"a line of a test\n");
+        let (lines, now) = after(before, 100);
+        assert!(lines.iter().any(|line| line == "a line of a test"), "{lines:?}");
+        assert!(now > before);
+        assert!(after(before, 0).0.is_empty());
+        assert!(!after(now, 100).0.iter().any(|line| line == "a line of a test"));
+    }
 
     #[test]
     fn colours_are_removed_and_text_is_kept() {

@@ -1,12 +1,14 @@
 //! Tools for tests that run the real programs. No program depends on them; they panic where a test would fail.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "used by tests only")]
 
+mod browser;
 mod process;
 mod programs;
 mod require;
 mod scenes;
 mod screen;
 
+pub use browser::Browser;
 pub use process::{Outcome, Running, wait_until};
 pub use programs::{master, worker};
 pub use require::require;

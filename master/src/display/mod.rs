@@ -1,7 +1,8 @@
 //! Displays: each shows a view and sends its input, over a [`ViewerHandle`].
 //!
-//! The window is one display; `render`, which writes frames to files, is another. The window and its input live on the main
-//! thread, as window systems require; the viewer runs on tokio's threads. Neither ever waits for the other.
+//! The window is one display, the terminal and the web page are others, and `render`, which writes frames to files, is one as
+//! well. The window and its input live on the main thread, as window systems require; the viewer runs on tokio's threads. Neither
+//! ever waits for the other.
 //! In a build without the feature `window`, a replacement reports that there is none.
 
 #[cfg(not(feature = "window"))]
@@ -23,6 +24,8 @@ mod tint;
 mod visibility;
 #[cfg(feature = "window")]
 mod watch;
+#[cfg(feature = "web")]
+pub(crate) mod web;
 #[cfg(feature = "window")]
 mod window;
 #[cfg(feature = "window")]
@@ -46,7 +49,7 @@ pub(crate) fn restore_terminal() {
 
 /// Facts about the scene and its farm that a display shows.
 #[derive(Clone, Debug)]
-#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only the window shows them"))]
+#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only the window shows all of them"))]
 pub(crate) struct SceneInfo {
     /// Name of the scene, for the title.
     pub(crate) name: String,

@@ -64,6 +64,34 @@ impl ViewerHandle {
         if newest.has_changed() { newest.clone() } else { None }
     }
 
+    /// The newest frame, whether or not this handle has returned it before.
+    #[cfg(feature = "web")]
+    pub(crate) fn newest_frame(&mut self) -> Option<Arc<PresentedFrame>> {
+        self.frames.borrow_and_update().clone()
+    }
+
+    /// Waits for a frame that this handle has not returned. Never returns after the end of the viewer.
+    #[cfg(feature = "web")]
+    pub(crate) async fn frame_changed(&mut self) {
+        if self.frames.changed().await.is_err() {
+            std::future::pending().await
+        }
+    }
+
+    /// Waits for the next change of the statistics. Never returns after the end of the viewer.
+    #[cfg(feature = "web")]
+    pub(crate) async fn statistics_changed(&mut self) {
+        if self.stats.changed().await.is_err() {
+            std::future::pending().await
+        }
+    }
+
+    /// Waits until the viewer takes no more input.
+    #[cfg(feature = "web")]
+    pub(crate) async fn ended(&self) {
+        self.input.closed().await;
+    }
+
     /// The newest snapshot of the farm, at most about 100 ms old.
     pub(crate) fn status(&self) -> Arc<FarmStatus> {
         self.status.borrow().clone()

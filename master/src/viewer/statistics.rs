@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use rayfarm_farm::FinishedFrame;
 use rayfarm_farm::accounting::Fading;
+use rayfarm_tracer::scene::Setting;
 use serde::Serialize;
 
 use super::film::FilmProgress;
@@ -41,6 +42,9 @@ pub(crate) struct Statistics {
     pub(crate) problem: Option<String>,
     /// Fault in the files of the scene, which is shown as it was before.
     pub(crate) scene_fault: Option<String>,
+    /// Integrator, samples and knobs of the view, before the quality controller; `None` before the first snapshot.
+    #[serde(skip)]
+    pub(crate) setting: Option<Setting>,
     /// Recent use of the workers' time.
     #[serde(skip)]
     pub(crate) accounts: Arc<Fading>,
@@ -52,6 +56,7 @@ impl Statistics {
         let figures = |it: &Self| (it.completed, it.latency, it.resting, it.film);
         !self.resting
             || figures(self) != figures(older)
+            || self.setting != older.setting
             || (&self.quality, &self.problem, &self.scene_fault)
                 != (&older.quality, &older.problem, &older.scene_fault)
             || !Arc::ptr_eq(&self.accounts, &older.accounts)
@@ -84,6 +89,7 @@ pub(super) struct ViewerState {
     film: Option<FilmProgress>,
     problem: Option<String>,
     scene_fault: Option<String>,
+    setting: Option<Setting>,
 }
 
 impl ViewerState {
@@ -102,6 +108,7 @@ impl ViewerState {
             film: None,
             problem: None,
             scene_fault: None,
+            setting: None,
         }
     }
 
@@ -118,6 +125,11 @@ impl ViewerState {
     /// Sets the progress of the newest picture; `None` for one that is not rendered in passes.
     pub(super) fn set_film(&mut self, film: Option<FilmProgress>) {
         self.film = film;
+    }
+
+    /// Sets integrator, samples and knobs of the view.
+    pub(super) fn set_setting(&mut self, setting: Setting) {
+        self.setting = Some(setting);
     }
 
     /// Sets or clears the reason for which no frame can be rendered.
@@ -187,6 +199,7 @@ impl ViewerState {
             film: self.film,
             problem: self.problem.clone(),
             scene_fault: self.scene_fault.clone(),
+            setting: self.setting,
             accounts: self.published_accounts.1.clone(),
         }
     }

@@ -5,10 +5,12 @@
 //! 3. [`MasterSecurity`] and [`WorkerSecurity`]: whether an end uses TLS, and with what.
 //! 4. [`read_private`], [`write_private`]: small files of mode 0600.
 //! 5. [`Connection`]: the stream that results from a handshake, with [`Connection::peer_key`].
+//! 6. [`BrowserAcceptor`]: TLS for the web page of a master.
 //!
 //! Names and dates of certificates are ignored, so nothing depends on a clock.
 
 mod bounded;
+mod browser;
 mod certificate;
 mod connection;
 mod join_line;
@@ -20,6 +22,7 @@ pub(crate) mod tls;
 
 pub use crate::key_hash::{KeyHash, KeyHashError};
 pub use bounded::Bounded;
+pub use browser::{BrowserAcceptor, BrowserStream};
 pub use connection::Connection;
 pub use join_line::{JoinLine, JoinLineError, JoinToken};
 pub use private_file::{read_private, write_private};

@@ -97,7 +97,25 @@ pub(super) fn server_config(
     Ok(Arc::new(config))
 }
 
-fn tls_error(error: &dyn std::fmt::Display) -> ProtocolError {
+/// Configuration of the connections of browsers, which have no certificate.
+///
+/// # Errors
+/// A key that does not fit the certificate.
+pub(super) fn browser_config(
+    chain: Vec<CertificateDer<'static>>,
+    private: PrivateKeyDer<'static>,
+) -> Result<Arc<ServerConfig>, Error> {
+    let mut config = ServerConfig::builder_with_details(provider(), Arc::new(NoClock))
+        .with_protocol_versions(&[&rustls::version::TLS13])?
+        .with_no_client_auth()
+        .with_single_cert(chain, private)?;
+    config.send_tls13_tickets = 0;
+    config.session_storage = Arc::new(NoServerSessionStorage {});
+    config.alpn_protocols = vec![b"http/1.1".to_vec()];
+    Ok(Arc::new(config))
+}
+
+pub(super) fn tls_error(error: &dyn std::fmt::Display) -> ProtocolError {
     ProtocolError::Tls { why: error.to_string() }
 }
 

@@ -20,5 +20,6 @@ mod same_picture;
 mod tradeoff;
 mod trust;
 mod video;
+mod web;
 mod window;
 mod window_controls;

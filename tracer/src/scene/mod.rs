@@ -30,7 +30,8 @@ pub use import::{DEFAULT_CREASE_ANGLE, LoadOptions, SceneError, Up};
 pub use knobs::{ColorDepth, ExponentPrecision, Quality, RenderScale, Setting, Shading};
 #[cfg(feature = "import")]
 pub use load::{
-    LoadLimits, LoadedScene, SceneAnimation, SceneLoader, compile_model, compile_model_with, load, load_limited, load_with,
+    LoadLimits, LoadedScene, SceneAnimation, SceneLoader, compile_model, compile_model_with, load,
+    load_limited, load_with,
 };
 pub use validate::{
     MAX_CLAMP, MAX_COORDINATE, MAX_DEPTH, MAX_DISKS, MAX_EXPOSURE, MAX_IOR, MAX_LIGHT, MAX_LIGHTS,

@@ -409,3 +409,21 @@ fn a_rate_and_an_error_are_numbers_in_their_range() {
         assert!(message.contains("such as"), "{message}");
     }
 }
+
+#[test]
+fn the_first_display_is_the_first_one_named() {
+    let kinds = |line: &str| view(line).display.kinds();
+    assert_eq!(kinds("rayfarm-master view"), [DisplayKind::Window]);
+    #[cfg(feature = "web")]
+    {
+        let (window, web) = (DisplayKind::Window, DisplayKind::Web);
+        assert_eq!(kinds("rayfarm-master view --display web"), [web]);
+        assert_eq!(kinds("rayfarm-master view --web 127.0.0.1:0"), [web]);
+        assert_eq!(kinds("rayfarm-master view --display window --web [::1]:80"), [window, web]);
+        assert_eq!(kinds("rayfarm-master view --display web,window,web --web [::1]:80"), [web, window]);
+        let address = |line: &str| view(line).display.web_address().to_string();
+        assert_eq!(address("rayfarm-master view --display web"), "127.0.0.1:8080");
+        assert_eq!(address("rayfarm-master view --web 0.0.0.0:81"), "0.0.0.0:81");
+        assert!(refused("rayfarm-master view --web localhost:80").contains("digits"));
+    }
+}

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use rayfarm_farm::ViewRequest;
 use rayfarm_tracer::CompiledScene;
 use rayfarm_tracer::mesh::CompiledMesh;
-use rayfarm_tracer::scene::{FrameView, Integrator, LoadLimits, LoadedScene, Scene, SceneAnimation, SceneLoader};
+use rayfarm_tracer::scene::{
+    FrameView, Integrator, LoadLimits, LoadedScene, Scene, SceneAnimation, SceneLoader,
+};
 use rayfarm_tracer::texture::Texture;
 
 use crate::app::cli::{LightArgs, ModelArgs, PictureArgs, QualityArgs, Size};

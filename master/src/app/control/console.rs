@@ -8,6 +8,8 @@ use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
 
 use super::command::{COMMANDS, Command, WorkerSelector};
+#[cfg(feature = "web")]
+use super::lines::LineSplitter;
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
 use crate::viewer::edits::EditorHandle;
 use crate::viewer::{KICK_REASON, KnobSender};
@@ -69,6 +71,18 @@ impl Console {
             Ok((value, then)) => Answer { line: format!("{value}\n"), then },
             Err(error) => refused(&error, Then::Listen),
         }
+    }
+
+    /// Executes a text of one line and returns its answer. Ends the run at the command `quit`.
+    #[cfg(feature = "web")]
+    pub(crate) fn execute(&self, text: &str) -> String {
+        let mut splitter = LineSplitter::default();
+        let line = text.bytes().find_map(|byte| splitter.push(byte)).or_else(|| splitter.end());
+        let answer = self.answer(&line.unwrap_or(Line::Text(String::new())));
+        if answer.then == Then::Quit {
+            self.quit();
+        }
+        answer.line
     }
 
     /// Ends the run.

@@ -7,6 +7,8 @@ use std::net::SocketAddr;
 use mdns_sd::{ServiceDaemon, ServiceInfo};
 use rayfarm_protocol::transport::KeyHash;
 
+use super::host_name::host_name;
+
 /// Type of the service.
 const SERVICE: &str = "_rayfarm._tcp.local.";
 /// Longest name of a service instance and of a host label, in bytes (RFC 1035).
@@ -24,7 +26,7 @@ impl Announcement {
     /// # Errors
     /// No socket for multicast DNS.
     pub(super) fn start(address: SocketAddr, key: KeyHash) -> Result<Self, mdns_sd::Error> {
-        let host = host_name();
+        let host = host_name().unwrap_or_else(|| "rayfarm".to_owned());
         let label = rayfarm_text::cut(&host, MAX_LABEL_BYTES - 10);
         // Two masters of one machine have different ports.
         let instance = format!("{label}-{}", address.port());
@@ -52,16 +54,4 @@ impl Drop for Announcement {
         }
         let _ = self.daemon.shutdown();
     }
-}
-
-/// Name of this machine, or `rayfarm`.
-fn host_name() -> String {
-    let file = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let command = || {
-        let output = std::process::Command::new("hostname").output().ok()?;
-        String::from_utf8(output.stdout).ok()
-    };
-    let name = file.or_else(command).unwrap_or_default();
-    let name: String = name.trim().chars().filter(|it| it.is_ascii_alphanumeric() || *it == '-').collect();
-    if name.is_empty() { "rayfarm".to_owned() } else { name }
 }

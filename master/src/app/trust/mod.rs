@@ -7,7 +7,11 @@
 #[cfg(feature = "discovery")]
 mod announcement;
 mod date;
+#[cfg(any(feature = "discovery", feature = "web"))]
+mod host_name;
 mod state;
+#[cfg(feature = "web")]
+mod web;
 mod workers;
 
 use rayfarm_farm::Entrance;
@@ -20,6 +24,9 @@ use crate::error::CommandError;
 use date::utc;
 use state::MasterState;
 use workers::{KnownWorker, WorkerFiles};
+
+#[cfg(feature = "web")]
+pub(crate) use web::web_security;
 
 /// Whether and how the connections of a farm are secured: with TLS where other machines can connect, unless the user refuses it.
 ///

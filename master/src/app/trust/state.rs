@@ -57,7 +57,20 @@ impl MasterState {
         WorkerFiles::of(&self.folder)
     }
 
-    /// Makes a new token, and a new key if requested.
+    /// The token of the web display, which is made where there is none.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written, or that other users can access.
+    #[cfg(feature = "web")]
+    pub(super) fn web_token(&self) -> Result<JoinToken, CommandError> {
+        let path = self.web_token_path();
+        match self.read_token_of(&path)? {
+            Some(token) => Ok(token),
+            None => self.new_token_of(&path),
+        }
+    }
+
+    /// Makes a new token, and a new key if requested. The web display has a new token after its next start.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -69,6 +82,12 @@ impl MasterState {
                 }
                 _ => {}
             }
+        }
+        match std::fs::remove_file(self.web_token_path()) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(self.failed("remove", &self.web_token_path(), &error));
+            }
+            _ => {}
         }
         self.new_token().map(|_| ())
     }
@@ -109,8 +128,11 @@ impl MasterState {
     }
 
     fn read_token(&self) -> Result<Option<JoinToken>, CommandError> {
-        let path = self.token_path();
-        let text = read_private(&path).map_err(|error| self.failed("read", &path, &error))?;
+        self.read_token_of(&self.token_path())
+    }
+
+    fn read_token_of(&self, path: &Path) -> Result<Option<JoinToken>, CommandError> {
+        let text = read_private(path).map_err(|error| self.failed("read", path, &error))?;
         text.map(|text| JoinToken::from_str(text.trim())).transpose().map_err(|error| {
             CommandError::Failed(format!(
                 "cannot read {}: {error}; `rayfarm-master trust rotate` makes a new token",
@@ -120,9 +142,12 @@ impl MasterState {
     }
 
     fn new_token(&self) -> Result<JoinToken, CommandError> {
-        let path = self.token_path();
+        self.new_token_of(&self.token_path())
+    }
+
+    fn new_token_of(&self, path: &Path) -> Result<JoinToken, CommandError> {
         let token = JoinToken::random().map_err(CommandError::failed)?;
-        write_private(&path, &format!("{token}\n")).map_err(|error| self.failed("write", &path, &error))?;
+        write_private(path, &format!("{token}\n")).map_err(|error| self.failed("write", path, &error))?;
         Ok(token)
     }
 
@@ -132,6 +157,10 @@ impl MasterState {
 
     fn key_path(&self) -> PathBuf {
         self.folder.join("key.pem")
+    }
+
+    fn web_token_path(&self) -> PathBuf {
+        self.folder.join("web-token")
     }
 
     fn token_path(&self) -> PathBuf {
@@ -205,6 +234,17 @@ mod tests {
         assert!(second.key == first.key && second != first);
         state(&folder).rotate(true).unwrap();
         assert!(line().key != first.key);
+    }
+
+    #[cfg(feature = "web")]
+    #[test]
+    fn the_web_token_is_kept_until_a_rotation() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = state(&folder).web_token().unwrap();
+        assert!(state(&folder).web_token().unwrap() == first);
+        assert!(state(&folder).trust().unwrap().token() != first, "it opens no farm");
+        state(&folder).rotate(false).unwrap();
+        assert!(state(&folder).web_token().unwrap() != first);
     }
 
     #[test]

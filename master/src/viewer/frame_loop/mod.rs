@@ -167,6 +167,7 @@ impl Viewer {
     fn publish(&mut self) {
         self.check_film();
         self.figures.refresh_accounts();
+        self.figures.set_setting(self.state.request.setting());
         self.channels.publish_status(self.farm.status());
         self.channels.publish_statistics(self.figures.snapshot());
     }

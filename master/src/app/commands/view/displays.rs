@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::thread;
 
-use crate::app::cli::{DisplayArgs, DisplayKind};
+use crate::app::cli::{DisplayArgs, DisplayKind, FarmArgs};
+use crate::app::control::Console;
 use crate::display::{Display, DisplayError, SceneInfo, WindowDisplay};
 use crate::error::CommandError;
 use crate::viewer::{InputAction, ViewerHandle};
@@ -21,11 +22,11 @@ enum OpenDisplay {
     /// The window, which must run on the main thread.
     Window(Box<WindowDisplay>),
     /// Any other display, with its name.
-    #[cfg_attr(
-        not(feature = "terminal"),
-        allow(dead_code, reason = "the window is the only display of this build")
-    )]
+    #[cfg_attr(not(feature = "terminal"), allow(dead_code, reason = "the terminal is the only one"))]
     Other(&'static str, RunDisplay),
+    /// Web pages, which send control commands as well.
+    #[cfg(feature = "web")]
+    Web(Box<crate::display::web::WebDisplay>),
 }
 
 impl OpenDisplays {
@@ -34,13 +35,15 @@ impl OpenDisplays {
     /// # Errors
     /// A display that this build does not have.
     pub(super) fn check_build(args: &DisplayArgs, scene: &Path) -> Result<(), CommandError> {
-        for kind in &args.display {
+        for kind in args.kinds() {
             match kind {
                 DisplayKind::Window => {
                     WindowDisplay::check_build().map_err(|problem| no_window(&problem, scene))?;
                 }
                 #[cfg(feature = "terminal")]
                 DisplayKind::Terminal => {}
+                #[cfg(feature = "web")]
+                DisplayKind::Web => {}
             }
         }
         Ok(())
@@ -52,47 +55,63 @@ impl OpenDisplays {
     /// A display that cannot be opened, with the reason and the alternatives.
     pub(super) fn open(
         args: &DisplayArgs,
+        farm: &FarmArgs,
         info: &SceneInfo,
         (width, height): (u32, u32),
         scene: &Path,
     ) -> Result<Self, CommandError> {
+        #[cfg(not(feature = "web"))]
+        let _ = farm;
         let open = |kind: &DisplayKind| match kind {
             DisplayKind::Window => WindowDisplay::open(info.clone(), width, height)
                 .map(|window| OpenDisplay::Window(Box::new(window)))
                 .map_err(|problem| no_window(&problem, scene)),
             #[cfg(feature = "terminal")]
             DisplayKind::Terminal => terminal(args),
+            #[cfg(feature = "web")]
+            DisplayKind::Web => web(args, farm, info),
         };
-        let displays = args.display.iter().map(open).collect::<Result<_, _>>()?;
+        let displays = args.kinds().iter().map(open).collect::<Result<_, _>>()?;
         Ok(Self { displays })
     }
 
     /// Runs all displays until one of them ends, and then ends the others. Blocks the calling thread, which must be the main
-    /// thread where there is a window.
+    /// thread where there is a window. `console` executes control commands of displays that have them.
     ///
     /// # Errors
     /// The first display that cannot go on.
-    pub(super) fn run(self, first: ViewerHandle) -> Result<(), DisplayError> {
+    pub(super) fn run(self, first: ViewerHandle, console: &Console) -> Result<(), DisplayError> {
+        #[cfg(not(feature = "web"))]
+        let _ = console;
         let mut window = None;
         let mut threads = Vec::new();
         let mut unused = Some(first.clone());
         for display in self.displays {
             let handle = unused.take().unwrap_or_else(|| first.further_display());
-            match display {
-                OpenDisplay::Window(display) => window = Some((display, handle)),
-                OpenDisplay::Other(name, run) => {
-                    let end = first.clone();
-                    let run = move || {
-                        let result = run(handle);
-                        // The viewer may have ended already.
-                        end.send(vec![InputAction::Quit]);
-                        result
-                    };
-                    let spawned = thread::Builder::new().name(name.to_owned()).spawn(run);
-                    let failed = |error| DisplayError::Failed(format!("no thread for the {name}: {error}"));
-                    threads.push(spawned.map_err(failed)?);
+            let (name, run): (_, RunDisplay) = match display {
+                OpenDisplay::Window(display) => {
+                    window = Some((display, handle));
+                    continue;
                 }
-            }
+                OpenDisplay::Other(name, run) => (name, run),
+                #[cfg(feature = "web")]
+                OpenDisplay::Web(display) => {
+                    let console = console.clone();
+                    let display =
+                        display.with_commands(std::sync::Arc::new(move |line| console.execute(line)));
+                    ("web", Box::new(move |viewer| display.run(viewer)))
+                }
+            };
+            let end = first.clone();
+            let run = move || {
+                let result = run(handle);
+                // The viewer may have ended already.
+                end.send(vec![InputAction::Quit]);
+                result
+            };
+            let spawned = thread::Builder::new().name(name.to_owned()).spawn(run);
+            let failed = |error| DisplayError::Failed(format!("no thread for the {name} display: {error}"));
+            threads.push(spawned.map_err(failed)?);
         }
         // The viewer ends when the last handle is dropped.
         drop(first);
@@ -125,11 +144,22 @@ fn terminal(args: &DisplayArgs) -> Result<OpenDisplay, CommandError> {
     Ok(OpenDisplay::Other("terminal", Box::new(move |viewer| display.run(viewer))))
 }
 
+/// Listens for web browsers.
+#[cfg(feature = "web")]
+fn web(args: &DisplayArgs, farm: &FarmArgs, info: &SceneInfo) -> Result<OpenDisplay, CommandError> {
+    use crate::display::web::WebDisplay;
+
+    let address = args.web_address();
+    let security = crate::app::trust::web_security(farm, address)?;
+    let display = WebDisplay::open(address, security, info.clone()).map_err(CommandError::WrongInput)?;
+    Ok(OpenDisplay::Web(Box::new(display)))
+}
+
 /// Reports that there is no window, with the command that needs none.
 fn no_window(problem: &str, scene: &Path) -> CommandError {
     CommandError::Failed(format!(
-        "cannot open a window: {problem}; without a display, run: rayfarm-master view {scene} --display terminal, or \
-         rayfarm-master render {scene} -o picture.png",
+        "cannot open a window: {problem}; without a display, run: rayfarm-master view {scene} --display terminal or \
+         --display web, or rayfarm-master render {scene} -o picture.png",
         scene = scene.display()
     ))
 }

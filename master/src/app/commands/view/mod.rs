@@ -16,6 +16,7 @@ use super::observability::Observability;
 use super::quality::view_quality;
 use super::source::{Source, animation, default_scene};
 use crate::app::cli::ViewArgs;
+use crate::app::control::Console;
 use crate::app::picture::DENOISE_NEEDS_PATHS;
 use crate::app::trust;
 use crate::display::SceneInfo;
@@ -57,7 +58,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let record_bytes = args.observability.record_bytes();
     let log = args.fps_log.as_deref().map(|path| FrameLogFile::create(path, record_bytes)).transpose()?;
     let mut observability = Observability::new(&args.observability)?;
-    let displays = OpenDisplays::open(&args.display, &info, (view.width, view.height), &path)?;
+    let displays = OpenDisplays::open(&args.display, &args.farm, &info, (view.width, view.height), &path)?;
 
     let limit = args.frames.map(u64::from);
     // A number of frames is for measuring: they are rendered although nothing changes.
@@ -67,6 +68,7 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let runtime = super::runtime()?;
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
+    let quit = stop.clone();
     let (viewer, handle, control) = runtime.block_on(start(&args, source, config, &observability, &stop))?;
     let _announced = runtime.block_on(async { trust::announce(&args.farm, handle.entrance(), &stop) });
     let statistics = handle.statistics_receiver();
@@ -75,7 +77,8 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
         farm.shut_down().await;
         result
     });
-    let shown = displays.run(handle).map_err(CommandError::from);
+    let console = Console::new(control.clone(), Some(handle.knob_sender()), quit);
+    let shown = displays.run(handle, &console).map_err(CommandError::from);
     let rendered = runtime.block_on(rendering).map_err(CommandError::failed)?;
     rendered.map_err(CommandError::from).and(shown).and(observability.end())?;
     check_frames(&control)?;
