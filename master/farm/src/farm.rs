@@ -170,10 +170,10 @@ impl Farm {
         self.driver.record_timeline(sink);
     }
 
-    /// The hash of the scene's body.
+    /// The hash of the current scene's body.
     #[cfg(test)]
     pub(crate) fn scene_id(&self) -> rayfarm_protocol::AssetId {
-        self.driver.assets.scene()
+        self.driver.assets.current()
     }
 
     /// Sets a function that is called at the start of each decoding of pixels.

@@ -58,3 +58,59 @@ impl KeyedScene {
         self.assets(number).map(drop).map_err(named)
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use rayfarm_tracer::scene::load;
+
+    use super::*;
+
+    /// A camera and a sphere that move by one and by two units a second, at ten frames a second.
+    const MOVING: &str = "[camera]\nposition = [0, 0, 9]\nlook_at = [0, 0, 0]\n\
+        [[camera_key]]\ntime = 0\nposition = [0, 0, 9]\n[[camera_key]]\ntime = 9\nposition = [9, 0, 9]\n\
+        [[sphere]]\nradius = 1\nkey = [{ time = 0, center = [0, 0, 0] }, { time = 9, center = [0, 18, 0] }]\n";
+
+    /// The frames of a scene file.
+    pub(in crate::viewer) fn keyed(text: &str) -> (KeyedScene, ViewRequest) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, text).unwrap();
+        let loaded = load(&path).unwrap();
+        let request = FrameView::of(&loaded.scene).into();
+        let scene = FarmScene { scene: loaded.scene, meshes: loaded.meshes, textures: loaded.textures };
+        let rate = VideoRate::parse("10").unwrap();
+        (KeyedScene::new(loaded.animation.unwrap(), scene, rate), request)
+    }
+
+    /// The frames of a camera and a sphere that move.
+    pub(in crate::viewer) fn moving() -> (KeyedScene, ViewRequest) {
+        keyed(MOVING)
+    }
+
+    #[test]
+    fn a_frame_has_the_camera_and_the_scene_of_its_time() {
+        let (keys, request) = moving();
+        let camera = |number| keys.request(&request, number).view.camera.position.x;
+        assert!((camera(30) - 3.0).abs() < 1e-12 && camera(0) == 0.0 && camera(999) == 9.0);
+        let scene = |number| keys.assets(number).unwrap().unwrap().scene();
+        assert_eq!(scene(30), scene(30));
+        assert!(scene(30) != scene(31) && scene(90) == scene(1000));
+        assert_eq!(keys.check(&request, 45), Ok(()));
+    }
+
+    #[test]
+    fn a_camera_alone_changes_no_scene() {
+        let camera = MOVING.split("[[sphere]]").next().unwrap();
+        let (keys, _) = keyed(&format!("{camera}[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n"));
+        assert!(keys.assets(5).unwrap().is_none());
+    }
+
+    #[test]
+    fn an_impossible_frame_is_named() {
+        let through = MOVING.replace("position = [9, 0, 9]", "position = [0, 0, -9]");
+        let (keys, request) = keyed(&through);
+        assert_eq!(keys.check(&request, 44), Ok(()));
+        let fault = keys.check(&request, 45).unwrap_err();
+        assert!(fault.contains("frame 45 (4.500 s)"), "{fault}");
+    }
+}

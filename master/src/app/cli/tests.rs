@@ -83,7 +83,7 @@ fn every_common_option_is_parsed() {
     assert_eq!(args.picture.size, Some(Size { width: 1024, height: 768 }));
     assert_eq!(samples(&args.picture.quality), 9);
     assert_eq!((args.picture.orbit, args.picture.spin), (-90.5, 2.0));
-    assert_eq!((args.frames, args.fps_log, args.json), (100, Some("log.csv".into()), true));
+    assert_eq!((args.frames, args.fps_log, args.json), (Some(100), Some("log.csv".into()), true));
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn the_other_commands_are_parsed() {
 
 #[test]
 fn the_last_of_two_equal_options_counts() {
-    assert_eq!(render("rayfarm-master render a.toml -o b.png --frames 2 --frames 3").frames, 3);
+    assert_eq!(render("rayfarm-master render a.toml -o b.png --frames 2 --frames 3").frames, Some(3));
     assert_eq!(samples(&view("rayfarm-master --samples 4 --samples 9").picture.quality), 9);
 }
 

@@ -217,10 +217,9 @@ mod tests {
         let picture = smooth();
         let mut palette = Palette::of(picture.iter().copied());
         assert!((200..=MAX_COLORS).contains(&palette.colors.len()));
-        let shown: Vec<[u8; 3]> = (0..picture.len())
-            .map(|at| palette.index(picture[at], (at % 64, at / 64)))
-            .map(|index| palette.colors[usize::from(index)])
-            .collect();
+        let indices: Vec<u8> =
+            (0..picture.len()).map(|at| palette.index(picture[at], (at % 64, at / 64))).collect();
+        let shown: Vec<[u8; 3]> = indices.iter().map(|index| palette.colors[usize::from(*index)]).collect();
         let far = picture.iter().zip(&shown).map(|(a, b)| distance(*a, *b)).max().unwrap();
         assert!(far < 40 * 40, "{far}");
         for block in 0..64 {

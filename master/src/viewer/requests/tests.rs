@@ -234,3 +234,25 @@ fn a_sequence_requests_each_frame_of_its_plan_once_and_waits_for_slots() {
     let spins: Vec<f64> = view.recorder.requests.borrow().iter().map(|request| request.view.spin).collect();
     assert_eq!(spins, numbers.iter().map(|&number| number as f64).collect::<Vec<_>>());
 }
+
+#[test]
+fn each_frame_of_a_scene_with_keys_has_its_scene_and_camera() {
+    let (keys, request) = crate::viewer::keyed_scene::tests::moving();
+    let (plan, _sender, _sequence) = SequencePlan::new(&[3, 7, 30], &[rayfarm_tracer::scene::Shading::Depth]);
+    let state = ViewState { request, hidden: false, denoised: false };
+    let requests = Requests::of_sequence(STILL, plan, Some(keys.clone()));
+    let mut view = View { requests, recorder: Recorder::default(), state };
+    view.requests.fill(&view.recorder, &view.state);
+    while !view.requests.open.is_empty() {
+        view.finish();
+        view.requests.fill(&view.recorder, &view.state);
+    }
+    let scene = |number| keys.assets(number).unwrap().unwrap().scene();
+    // A scene is replaced before the request of its frame; the auxiliary picture has the same one.
+    assert_eq!(*view.recorder.scenes.borrow(), [(0, scene(3)), (2, scene(7)), (4, scene(30))]);
+    let cameras: Vec<f64> =
+        view.recorder.requests.borrow().iter().map(|request| request.view.camera.position.x).collect();
+    for (camera, expected) in cameras.iter().zip([0.3, 0.3, 0.7, 0.7, 3.0, 3.0]) {
+        assert!((camera - expected).abs() < 1e-12, "{cameras:?}");
+    }
+}

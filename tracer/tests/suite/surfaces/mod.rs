@@ -22,7 +22,7 @@ use rayfarm_tracer::{CompiledScene, PreparedFrame, Primitive, render_rows};
 
 /// A scene with its meshes and textures, as the loader returns it.
 fn loaded(scene: Scene, meshes: Vec<Arc<CompiledMesh>>, textures: Vec<Arc<Texture>>) -> LoadedScene {
-    LoadedScene { scene, meshes, mesh_files: vec![], textures, warnings: vec![] }
+    LoadedScene { scene, meshes, mesh_files: vec![], textures, warnings: vec![], animation: None }
 }
 
 fn rendered(loaded: &LoadedScene, view: &FrameView) -> RgbImage {
@@ -51,6 +51,7 @@ fn assert_the_same_everywhere(what: &str, loaded: &LoadedScene, view: &FrameView
         mesh_files: vec![],
         textures: loaded.textures.clone(),
         warnings: vec![],
+        animation: None,
     };
     for outcome in numerics::levels(&Subject::new(what, copy), &Effort::default()).unwrap() {
         assert!(outcome.holds(), "{what}: {} bytes differ with {}", outcome.wrong, outcome.case);
