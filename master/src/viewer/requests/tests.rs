@@ -239,7 +239,7 @@ fn a_sequence_requests_each_frame_of_its_plan_once_and_waits_for_slots() {
 fn each_frame_of_a_scene_with_keys_has_its_scene_and_camera() {
     let (keys, request) = crate::viewer::keyed_scene::tests::moving();
     let (plan, _sender, _sequence) = SequencePlan::new(&[3, 7, 30], &[rayfarm_tracer::scene::Shading::Depth]);
-    let state = ViewState { request, hidden: false, denoised: false };
+    let state = ViewState { request, scene: 0, hidden: false, denoised: false };
     let requests = Requests::of_sequence(STILL, plan, Some(keys.clone()));
     let mut view = View { requests, recorder: Recorder::default(), state };
     view.requests.fill(&view.recorder, &view.state);
