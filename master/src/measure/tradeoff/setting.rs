@@ -214,6 +214,7 @@ mod tests {
         checkered: false,
         normal_mapped: false,
         metallic_roughness: false,
+        rough_textured: false,
         volumes: false,
         motion: false,
     };
