@@ -2,7 +2,6 @@
 
 mod many_lamps;
 mod skies;
-mod small;
 
 use std::sync::Arc;
 
