@@ -161,7 +161,7 @@ impl KnobSender {
     /// # Errors
     /// As [`Self::send`].
     pub(super) fn show_scene(&self, update: SceneUpdate) -> Result<(), String> {
-        self.send_action(InputAction::ShowScene(update))
+        self.send_action(InputAction::ShowScene(Box::new(update)))
     }
 
     /// Reports a fault in the files of the scene, without waiting.

@@ -74,7 +74,7 @@ pub(crate) enum InputAction {
     /// Shows pictures of paths at rest with or without most of their noise.
     Denoise(bool),
     /// Shows another scene with the same camera.
-    ShowScene(SceneUpdate),
+    ShowScene(Box<SceneUpdate>),
     /// Reports a fault in the files of the scene, which is shown as it was.
     SceneFault(String),
     /// Commands workers.

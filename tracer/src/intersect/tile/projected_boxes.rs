@@ -124,10 +124,9 @@ impl ProjectedBoxes {
             & y_from.simd_le(splat(simd, union[3]))
             & y_to.simd_ge(splat(simd, union[2]));
         if I::ON_GRID && rays.on_grid {
-            // Rays are at whole numbers plus a half.
-            let half = splat(simd, 0.5);
-            overlap &=
-                (x_to - half).floor().simd_ge(x_from - half) & (y_to - half).floor().simd_ge(y_from - half);
+            // Rays are at whole numbers plus a half, up to their error bound.
+            let [a, b] = [0.5 - rays.error, 0.5 + rays.error].map(|half| splat(simd, half));
+            overlap &= (x_to - a).floor().simd_ge(x_from - b) & (y_to - a).floor().simd_ge(y_from - b);
         }
         bits(overlap)
     }
