@@ -36,7 +36,7 @@ struct Change {
 impl GifEncoder {
     pub(super) fn new(file: File, settings: &VideoSettings) -> Result<Self, VideoError> {
         let VideoSettings { width, height, rate, .. } = *settings;
-        if rate.hundredths(1) < MIN_DELAY {
+        if rate.hundredths(100) < 100 * MIN_DELAY {
             return Err(VideoError::new(format!(
                 "a GIF has at most 50 frames per second, not {rate}: give --fps 50 or less, or write an .apng"
             )));

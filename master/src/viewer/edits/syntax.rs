@@ -60,6 +60,9 @@ fn object(rest: &str) -> Result<EditCommand, String> {
             keys => Ok(EditCommand::Change(Edit::AddObject { kind: kind.to_owned(), keys: keys.to_owned() })),
         };
     }
+    if word.is_empty() {
+        return Err("object: expected add, move, rotate, scale, set, remove or list".to_owned());
+    }
     let name_needed = || format!("object {}: expected the name or number of an object", printable(word));
     let (name, rest) = name(rest).ok_or_else(name_needed)?;
     let edit = match word {
