@@ -25,6 +25,11 @@ impl Bucket {
         Self { rate, left: rate.burst, at: now }
     }
 
+    /// Allows some more events, up to those at once.
+    pub(crate) fn give(&mut self, events: f64) {
+        self.left = (self.left + events).min(self.rate.burst);
+    }
+
     /// Whether another event is allowed, which is counted then.
     pub(crate) fn take(&mut self, now: Instant) -> bool {
         let filled = now.saturating_duration_since(self.at).as_secs_f64() * self.rate.per_second;

@@ -10,6 +10,9 @@ use crate::bucket::{Bucket, Rate};
 
 /// Small messages. A scene with thousands of textures is requested at once.
 const MESSAGES: Rate = Rate { burst: 8192.0, per_second: 200.0 };
+/// Small messages that each replaced scene causes: requests and reports of its body and what is new in it. In a sequence every frame
+/// may have a scene of its own, and small frames follow each other faster than [`MESSAGES`] would allow.
+const MESSAGES_OF_SCENE: f64 = 8.0;
 /// Failures: at most one for each announced frame, and a master announces few frames beyond 60 a second.
 const FAILURES: Rate = Rate { burst: 128.0, per_second: 60.0 };
 /// Requests for one asset, until the scene is replaced: the first, and some after failed transfers.
@@ -60,6 +63,7 @@ impl Budget {
     /// Begins to count again after the scene was replaced: a worker that keeps few assets may need one again that it had.
     /// Open requests remain, because reports about them may follow.
     pub(crate) fn scene_replaced(&mut self, has_asset: impl Fn(AssetId) -> bool) {
+        self.messages.give(MESSAGES_OF_SCENE);
         self.unknown = 0;
         self.assets.retain(|id, (requests, reports)| {
             (*requests, *reports) = (requests.saturating_sub(*reports).min(1), 0);

@@ -12,8 +12,8 @@ use super::palette::Palette;
 use super::{Encoder, VideoError, VideoSettings};
 use crate::viewer::VideoRate;
 
-/// Shortest time of a frame in hundredths of a second: programs show shorter ones for a tenth of a second.
-const MIN_DELAY: u64 = 2;
+/// Shortest time of a frame, in seconds: programs show shorter ones for a tenth of a second.
+const MIN_DELAY: f64 = 0.02;
 
 /// An encoder of GIF.
 pub(super) struct GifEncoder {
@@ -36,7 +36,8 @@ struct Change {
 impl GifEncoder {
     pub(super) fn new(file: File, settings: &VideoSettings) -> Result<Self, VideoError> {
         let VideoSettings { width, height, rate, .. } = *settings;
-        if rate.hundredths(100) < 100 * MIN_DELAY {
+        // Not by the rounded delay of one frame: at 60 frames per second, delays of one and two hundredths would alternate.
+        if rate.time(1) < MIN_DELAY {
             return Err(VideoError::new(format!(
                 "a GIF has at most 50 frames per second, not {rate}: give --fps 50 or less, or write an .apng"
             )));

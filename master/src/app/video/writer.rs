@@ -179,7 +179,8 @@ fn encode(
     }
     encoder.finish()?;
     let failed = |error: std::io::Error| VideoError::new(format!("{}: {error}", path.display()));
-    let written = std::fs::File::open(temporary.path()).map_err(failed)?;
+    // Open for writing: Windows flushes no others.
+    let written = std::fs::OpenOptions::new().write(true).open(temporary.path()).map_err(failed)?;
     written.sync_all().map_err(failed)?;
     drop(written);
     temporary.rename_to(&path).map_err(failed)

@@ -40,6 +40,15 @@ impl Commands {
         Self { execute, budget: Mutex::new(Budget { left: BURST, refilled: Instant::now() }) }
     }
 
+    /// [`Self::reply`] on another thread, because an edit waits until its scene is loaded.
+    pub(super) async fn reply_of(self: &Arc<Self>, line: &str, level: Level) -> Reply {
+        let (commands, line) = (Arc::clone(self), line.to_owned());
+        let replied = tokio::task::spawn_blocking(move || commands.reply(&line, level)).await;
+        // A panic has been reported.
+        let failed = json!({ "ok": false, "error": "the command has failed" });
+        replied.unwrap_or_else(|_| Reply::Executed(failed.to_string()))
+    }
+
     /// Executes a command of a client, if it may send it and there are not too many.
     pub(super) fn reply(&self, line: &str, level: Level) -> Reply {
         let line = line.trim();

@@ -193,7 +193,7 @@ async fn command(
             );
         }
     };
-    let (code, reply) = match shared.commands.reply(line, level) {
+    let (code, reply) = match shared.commands.reply_of(line, level).await {
         Reply::Executed(reply) => {
             let ok = serde_json::from_str(&reply).is_ok_and(|reply: Value| reply["ok"] == true);
             (if ok { StatusCode::OK } else { StatusCode::BAD_REQUEST }, reply)

@@ -10,6 +10,7 @@ use axum::Router;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use rayfarm_protocol::admission::host_number;
 use rayfarm_protocol::transport::BrowserAcceptor;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::{TcpListener, TcpStream};
@@ -17,8 +18,8 @@ use tokio_util::sync::CancellationToken;
 
 /// Most connections at a time, without WebSockets.
 const MAX_CONNECTIONS: usize = 64;
-/// Most connections of one address at a time, without WebSockets. A browser opens six.
-const MAX_CONNECTIONS_PER_ADDRESS: usize = 24;
+/// Most connections of one host at a time, without WebSockets. A browser opens six.
+const MAX_CONNECTIONS_PER_HOST: usize = 24;
 /// Time for a TLS handshake, for the header of a request, and between two requests.
 const HEADER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest life of a connection; a slow client needs that long for one picture.
@@ -115,38 +116,39 @@ where
     }
 }
 
-/// Connections by address.
+/// Connections by host: one machine has many addresses of IPv6.
 #[derive(Debug, Default)]
-struct Slots(Arc<Mutex<HashMap<IpAddr, usize>>>);
+struct Slots(Arc<Mutex<HashMap<u128, usize>>>);
 
 /// The place of a connection, freed when it is dropped.
 #[derive(Debug)]
 struct Slot {
-    address: IpAddr,
-    slots: Arc<Mutex<HashMap<IpAddr, usize>>>,
+    host: u128,
+    slots: Arc<Mutex<HashMap<u128, usize>>>,
 }
 
 impl Slots {
     /// A slot for a connection of an address; `None` where all are taken.
     fn take(&self, address: IpAddr) -> Option<Slot> {
+        let host = host_number(address);
         let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let all: usize = slots.values().sum();
-        let own = slots.get(&address).copied().unwrap_or(0);
-        if all >= MAX_CONNECTIONS || own >= MAX_CONNECTIONS_PER_ADDRESS {
+        let own = slots.get(&host).copied().unwrap_or(0);
+        if all >= MAX_CONNECTIONS || own >= MAX_CONNECTIONS_PER_HOST {
             return None;
         }
-        slots.insert(address, own + 1);
-        Some(Slot { address, slots: Arc::clone(&self.0) })
+        slots.insert(host, own + 1);
+        Some(Slot { host, slots: Arc::clone(&self.0) })
     }
 }
 
 impl Drop for Slot {
     fn drop(&mut self) {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(count) = slots.get_mut(&self.address) {
+        if let Some(count) = slots.get_mut(&self.host) {
             *count -= 1;
             if *count == 0 {
-                slots.remove(&self.address);
+                slots.remove(&self.host);
             }
         }
     }
@@ -157,11 +159,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn connections_are_bounded_in_all_and_by_address() {
+    fn connections_are_bounded_in_all_and_by_host() {
         let slots = Slots::default();
         let address = |last: u8| IpAddr::from([10, 0, 0, last]);
         let mut taken: Vec<Slot> = (0..100).filter_map(|_| slots.take(address(1))).collect();
-        assert_eq!(taken.len(), MAX_CONNECTIONS_PER_ADDRESS);
+        assert_eq!(taken.len(), MAX_CONNECTIONS_PER_HOST);
         taken.extend((2..200).filter_map(|last| slots.take(address(last))));
         assert_eq!(taken.len(), MAX_CONNECTIONS);
         drop(taken.remove(0));

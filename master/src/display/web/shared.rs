@@ -25,7 +25,7 @@ const RESTING_STATUS_EVERY: Duration = Duration::from_secs(1);
 pub(super) struct Shared {
     pub(super) viewer: ViewerHandle,
     pub(super) access: Access,
-    pub(super) commands: Commands,
+    pub(super) commands: Arc<Commands>,
     pub(super) pictures: Pictures,
     pub(super) audience: Audience,
     pub(super) steering: Steering,
@@ -46,7 +46,7 @@ impl Shared {
         Arc::new(Self {
             viewer,
             access,
-            commands,
+            commands: Arc::new(commands),
             pictures: Pictures::default(),
             audience: Audience::new(),
             steering: Steering::new(MAX_CLIENTS),

@@ -137,7 +137,7 @@ impl Client {
                     return;
                 }
             };
-            if let Some(reply) = self.apply(message, page, &mut looking)
+            if let Some(reply) = self.apply(message, page, &mut looking).await
                 && replies.send(reply).await.is_err()
             {
                 return;
@@ -146,7 +146,7 @@ impl Client {
     }
 
     /// Applies a message. Returns the reply, if it has one.
-    fn apply(
+    async fn apply(
         &self,
         message: ClientMessage,
         page: &watch::Sender<Page>,
@@ -164,7 +164,7 @@ impl Client {
             // A movement from before the handover.
             ClientMessage::Input { .. } => {}
             ClientMessage::Command { id, line } => {
-                let reply = self.command(&line, now);
+                let reply = self.command(&line, now).await;
                 return Some(format!("{{\"type\":\"reply\",\"id\":{id},\"reply\":{reply}}}"));
             }
             ClientMessage::Steer => steering.request(self.id, now),
@@ -181,13 +181,13 @@ impl Client {
     }
 
     /// The reply to a control command. A change of the view needs the right to steer.
-    fn command(&self, line: &str, now: Instant) -> String {
+    async fn command(&self, line: &str, now: Instant) -> String {
         let sets = line.split_whitespace().next() == Some("set");
         if sets && !self.shared.steering.input(self.id, now) {
             let error = "another page steers: request to steer first";
             return json!({ "ok": false, "error": error }).to_string();
         }
-        self.shared.commands.reply(line, self.level).into_line()
+        self.shared.commands.reply_of(line, self.level).await.into_line()
     }
 
     /// Records that a picture is on the screen, and with it the latency of the page that steers.

@@ -167,7 +167,8 @@ impl SceneEditor {
         distinct(main.into_iter().chain(self.loader.files().into_iter().filter(|stamp| !is_main(stamp))))
     }
 
-    /// Writes the scene to a file that loads to the same scene.
+    /// Writes the scene to a file that loads to the same scene. Changes of the scene file that are not loaded, because they have a
+    /// fault or are too new, are not overwritten.
     fn save(&mut self, file: &Path) -> Result<(), String> {
         if file.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("toml")) {
             return Err(format!("{}: a scene file ends in .toml", file.display()));
@@ -186,8 +187,19 @@ impl SceneEditor {
                 self.path.display()
             ));
         }
+        let is_own = self.has_file && is_same(file, &self.path);
+        if is_own && read(file).as_ref() != Ok(&self.file_text) {
+            return Err(format!(
+                "{}: the file has changed since the scene was loaded from it; save to another file",
+                file.display()
+            ));
+        }
         write_whole(file, text.as_bytes())
-            .map_err(|error| format!("cannot write {}: {error}", file.display()))
+            .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
+        if is_own {
+            self.file_text = text;
+        }
+        Ok(())
     }
 }
 
@@ -195,6 +207,11 @@ impl SceneEditor {
 fn distinct(stamps: impl IntoIterator<Item = FileStamp>) -> Vec<FileStamp> {
     let mut seen = BTreeSet::new();
     stamps.into_iter().filter(|stamp| seen.insert(stamp.path().to_owned())).collect()
+}
+
+/// Whether two paths name the same existing file.
+fn is_same(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 fn read(path: &Path) -> Result<String, String> {

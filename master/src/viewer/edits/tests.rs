@@ -385,8 +385,14 @@ fn changed_files_are_loaded_again_and_faults_keep_the_scene() {
     assert_eq!(edits.shown.spheres[0].radius, 0.25);
     assert_eq!(edits.run("undo").unwrap()["undone"], "the scene file has changed");
     assert_eq!(edits.shown.spheres[0].radius, 3.0);
-    // Saving over the file is no change of the scene.
     let path = edits.path("s.toml");
+    let on_disk = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, "a fault").unwrap();
+    let refused = edits.run(&format!("save {}", path.display())).unwrap_err();
+    assert!(refused.contains("has changed"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "a fault");
+    std::fs::write(&path, on_disk).unwrap();
+    // Saving over the file is no change of the scene.
     edits.edit(&format!("save {}", path.display()));
     let before = edits.shown.clone();
     assert!(edits.reload().is_none_or(|shown| shown.is_ok()) && edits.shown == before);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use rayfarm_tracer::scene::rotation;
-use toml_edit::{Array, TableLike, Value};
+use toml_edit::{Array, Item, TableLike, Value};
 
 use super::document::put;
 
@@ -14,11 +14,13 @@ pub(super) fn translate(kind: &str, table: &mut dyn TableLike, by: DVec3) -> Res
     match kind {
         "model" | "group" => {
             refuse_matrix(table)?;
+            refuse_keys(table, "translate")?;
             let from = vector(table, "translate")?.unwrap_or(DVec3::ZERO);
             put(table, "translate", array(from + by));
             move_key(table, "translate_end", by)
         }
         "sphere" => {
+            refuse_keys(table, "center")?;
             move_required(table, "center", by)?;
             move_key(table, "center_end", by)
         }
@@ -42,6 +44,7 @@ pub(super) fn rotate(kind: &str, table: &mut dyn TableLike, degrees: DVec3) -> R
     match kind {
         "model" | "group" | "box" => {
             refuse_matrix(table)?;
+            refuse_keys(table, "rotate")?;
             let from = vector(table, "rotate")?.unwrap_or(DVec3::ZERO);
             put(table, "rotate", array(from + degrees));
             move_key(table, "rotate_end", degrees)
@@ -72,6 +75,7 @@ pub(super) fn scale(kind: &str, table: &mut dyn TableLike, factors: DVec3) -> Re
     match kind {
         "model" | "group" => {
             refuse_matrix(table)?;
+            refuse_keys(table, "scale")?;
             let from = match number(table, "scale") {
                 Some(factor) => DVec3::splat(factor),
                 None => vector(table, "scale")?.unwrap_or(DVec3::ONE),
@@ -83,6 +87,7 @@ pub(super) fn scale(kind: &str, table: &mut dyn TableLike, factors: DVec3) -> Re
             if factors != DVec3::splat(factors.x) {
                 return Err(format!("a {kind} has one radius: give one factor"));
             }
+            refuse_keys(table, "radius")?;
             let radius = number(table, "radius").ok_or("`radius` is missing")?;
             put(table, "radius", Value::from(radius * factors.x));
             Ok(())
@@ -109,6 +114,21 @@ fn refuse_matrix(table: &dyn TableLike) -> Result<(), String> {
             Err("this group is placed by a `matrix`: change it with object set NAME matrix ...".to_owned())
         }
         None => Ok(()),
+    }
+}
+
+/// Refuses to change a value that the keys of an animation replace: the change would have no effect.
+fn refuse_keys(table: &dyn TableLike, key: &str) -> Result<(), String> {
+    let is_keyed = match table.get("key") {
+        Some(Item::ArrayOfTables(keys)) => keys.iter().any(|keys| keys.contains_key(key)),
+        Some(Item::Value(Value::Array(keys))) => {
+            keys.iter().filter_map(Value::as_inline_table).any(|keys| keys.contains_key(key))
+        }
+        _ => false,
+    };
+    match is_keyed {
+        true => Err(format!("its keys have `{key}`: change them with object set NAME key ...")),
+        false => Ok(()),
     }
 }
 

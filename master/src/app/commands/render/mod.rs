@@ -59,7 +59,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let request = in_format_of(&args, &pattern, request)?;
     let keys = keyed::keys(&args, &source);
     let first = keys.as_ref().map_or(request, |keys| keys.request(&request, 0));
-    let passes = PassRules::of(&args, &source, &first)?;
+    let passes = PassRules::of(&args, &source, &first, frames)?;
     let (request, denoised) = denoised_of(&args, request)?;
     let plan = plan(&args, frames, &pattern, &request)?;
     keyed::check(keys.as_ref(), &request, &plan)?;

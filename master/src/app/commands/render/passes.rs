@@ -36,7 +36,7 @@ pub(super) struct PassRules {
 }
 
 impl PassRules {
-    /// The rules of a command line; `None` for pictures whose workers render all samples at once.
+    /// The rules of a command line for a run of `frames`; `None` for pictures whose workers render all samples at once.
     ///
     /// # Errors
     /// Options for another integrator, or of one picture for several; a film that cannot be read or written.
@@ -44,6 +44,7 @@ impl PassRules {
         args: &RenderArgs,
         source: &Source,
         request: &ViewRequest,
+        frames: u32,
     ) -> Result<Option<Self>, CommandError> {
         let refuse = |problem: String| Err(CommandError::WrongInput(problem));
         let options = &args.passes;
@@ -59,8 +60,8 @@ impl PassRules {
                     "{option} adds up passes, and --denoise needs all samples at once: leave one of them out"
                 ));
             }
-            Some(option) if args.frames.is_some_and(|frames| frames != 1) => {
-                return refuse(format!("{option} is for one picture: leave --frames out"));
+            Some(option) if frames != 1 => {
+                return refuse(format!("{option} is for one picture: render with --frames 1"));
             }
             _ => {}
         }

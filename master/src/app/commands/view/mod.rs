@@ -69,7 +69,8 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
     let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let stop = interrupted.child_token();
     let quit = stop.clone();
-    let (viewer, handle, control) = runtime.block_on(start(&args, source, config, &observability, &stop))?;
+    let Started { viewer, handle, control, editor } =
+        runtime.block_on(start(&args, source, config, &observability, &stop))?;
     let _announced = runtime.block_on(async { trust::announce(&args.farm, handle.entrance(), &stop) });
     let statistics = handle.statistics_receiver();
     let rendering = runtime.spawn(async move {
@@ -77,12 +78,21 @@ pub(super) fn run(args: ViewArgs) -> Result<(), CommandError> {
         farm.shut_down().await;
         result
     });
-    let console = Console::new(control.clone(), Some(handle.knob_sender()), quit);
+    let console = Console::new(control.clone(), Some(handle.knob_sender()), quit).with_editor(editor);
     let shown = displays.run(handle, &console).map_err(CommandError::from);
     let rendered = runtime.block_on(rendering).map_err(CommandError::failed)?;
     rendered.map_err(CommandError::from).and(shown).and(observability.end())?;
     check_frames(&control)?;
     check_count(&args, &statistics, &interrupted)
+}
+
+/// A farm with a viewer over it.
+struct Started {
+    viewer: Viewer,
+    handle: ViewerHandle,
+    control: FarmControl,
+    /// `None` where the scene cannot be edited.
+    editor: Option<EditorHandle>,
 }
 
 /// Starts the farm and a viewer over it.
@@ -92,7 +102,7 @@ async fn start(
     config: ViewerConfig,
     observability: &Observability,
     stop: &CancellationToken,
-) -> Result<(Viewer, ViewerHandle, FarmControl), CommandError> {
+) -> Result<Started, CommandError> {
     let editor = editor(&source, args);
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let security = trust::security(&args.farm)?;
@@ -107,8 +117,8 @@ async fn start(
         .map(|editor| EditorHandle::start(editor, knobs.clone()))
         .transpose()
         .map_err(CommandError::failed)?;
-    observability.begin(viewer.farm(), Some((knobs, editor)), stop)?;
-    Ok((viewer, handle, control))
+    observability.begin(viewer.farm(), Some((knobs, editor.clone())), stop)?;
+    Ok(Started { viewer, handle, control, editor })
 }
 
 /// The editor of the scene, which also watches its files. Where there is none, the scene is shown as it is.
