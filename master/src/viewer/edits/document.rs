@@ -236,6 +236,6 @@ pub(super) fn table_of(keys: &str) -> Result<Table, String> {
     let text = if keys.starts_with('{') { keys.to_owned() } else { format!("{{ {keys} }}") };
     let table: Result<Value, _> = text.parse();
     let table: Option<InlineTable> = table.ok().and_then(|value| value.as_inline_table().cloned());
-    let expected = || format!("\"{}\" is not a list of keys with values: expected KEY = VALUE, ...", printable(keys));
+    let expected = || format!("\"{}\" has no keys with values: expected KEY = VALUE, ...", printable(keys));
     Ok(table.ok_or_else(expected)?.into_table())
 }

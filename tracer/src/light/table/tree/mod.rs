@@ -98,8 +98,8 @@ impl LightTree {
     }
 
     /// Selects a source for each point, by a number in [0, 1) per point. A point that no source can reach selects none. The bounds of a
-    /// node are wider than those of its parts, so a number may also lead to a node with no source that can reach the point:
-    /// it selects none.
+    /// node are wider than those of its parts, so a number may also lead to a node with no source that can reach the point.
+    /// Such a number selects none.
     #[inline(never)]
     pub(super) fn select<S: Simd>(
         &self,
