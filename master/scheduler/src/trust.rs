@@ -1,12 +1,12 @@
-//! Trust in workers, and bounds for those that the shell does not vouch for.
+//! Trust in workers, and bounds for untrusted ones.
 //!
-//! An untrusted worker may be anybody that reaches the master's port. While a trusted worker renders, its host is on
-//! *probation*: all such hosts together get a bounded share of the rows of each frame, in small leases, and no backup
-//! tasks. A trusted worker renders each of these segments again, and the probation of a host ends when enough of them
-//! were the same. Later on, a part of its segments is rendered again. A host of which a worker was banned gets no leases:
-//! a worker could return under another name.
+//! An untrusted worker may be any program that reaches the master's port. While a trusted worker renders, the hosts of
+//! untrusted workers are on *probation*: together they get a bounded share of the rows of each frame, in small leases, and
+//! no backup tasks. A trusted worker renders each of these segments again, and the probation of a host ends after
+//! [`CONFIRMATIONS`] equal segments. Later on, [`UNTRUSTED_PERCENT`] per cent of its segments are rendered again. A host
+//! of a banned worker gets no leases, because the worker could return under another name.
 //!
-//! Where no trusted worker renders, there is no bound: a frame must not wait, and there is nothing to compare with.
+//! While no trusted worker renders, there is no bound: a frame must not wait, and nothing can confirm a segment.
 
 use std::collections::BTreeMap;
 
@@ -16,17 +16,17 @@ use super::{HostId, Scheduler, WorkerId};
 
 /// Segments of a host that trusted workers must have confirmed before its probation ends.
 pub(super) const CONFIRMATIONS: u32 = 16;
-/// All hosts on probation together get one of this number of rows of each frame.
+/// Divisor of the rows of a frame: the share of all hosts on probation together.
 const PROBATION_PART: u32 = 4;
-/// A lease on probation has at most one of this number of rows of its frame: [`CONFIRMATIONS`] of them are within the
-/// share of one frame.
+/// Divisor of the rows of a frame: the largest lease on probation. [`CONFIRMATIONS`] of these leases are within the share of
+/// one frame.
 const PROBATION_LEASES: u32 = PROBATION_PART * CONFIRMATIONS;
 /// Part of the segments of an untrusted worker after its probation that is rendered again, in per cent.
 const UNTRUSTED_PERCENT: u8 = 6;
 /// Hosts of untrusted workers that are remembered. Further ones stay on probation.
 const MAX_HOSTS: usize = 4096;
 
-/// What is known of the hosts of untrusted workers.
+/// Results of comparisons for the hosts of untrusted workers.
 #[derive(Debug, Default)]
 pub(super) struct Standings {
     hosts: BTreeMap<HostId, Standing>,
@@ -34,12 +34,12 @@ pub(super) struct Standings {
     has_trusted: bool,
 }
 
-/// What is known of one host.
+/// Result of comparisons for one host.
 #[derive(Clone, Copy, Debug)]
 enum Standing {
-    /// This number of its segments was confirmed, up to [`CONFIRMATIONS`].
+    /// Number of confirmed segments, up to [`CONFIRMATIONS`].
     Confirmed(u32),
-    /// A worker of it was banned.
+    /// A worker of this host was banned.
     Banned,
 }
 
@@ -61,7 +61,7 @@ impl Standings {
         }
     }
 
-    /// Forgets what is known of a host: its probation begins.
+    /// Forgets the results for a host: its probation begins.
     pub(super) fn forget(&mut self, host: HostId) {
         self.hosts.remove(&host);
     }
@@ -110,7 +110,7 @@ impl Scheduler {
         self.workers.get(&id).is_some_and(|worker| self.standings.is_on_probation(worker))
     }
 
-    /// Notes whether there is a trusted worker that renders.
+    /// Updates whether there is a trusted worker that renders.
     pub(super) fn note_trusted(&mut self) {
         let now = self.handled_at;
         self.standings.has_trusted = self.workers.values().any(|worker| worker.vouches(now));

@@ -1,8 +1,8 @@
 //! Admission of connections before their peer is authenticated.
 //!
-//! An unauthenticated peer must not keep others out. So a new connection is always looked at, the number of pending ones is
-//! bounded for each host and in all, and a connection that has sent nothing gives way to a new one. Connections of this
-//! machine have places of their own, and so have hosts that are known.
+//! An unauthenticated peer must not exclude others. Therefore the number of pending connections is bounded for each host
+//! and in all, and a new connection replaces one that has sent nothing. Connections of this machine and of known hosts have
+//! places of their own.
 
 mod host;
 
@@ -20,7 +20,7 @@ pub use host::host_number;
 use crate::ProtocolError;
 use crate::limits::FIRST_BYTE_DEADLINE;
 
-/// Time after which a connection that has sent something may give way as well: a handshake of a worker takes a part of that.
+/// Time after which a connection that has sent something may be replaced too. A handshake of a worker is shorter.
 const SLOW: Duration = Duration::from_secs(1);
 /// Most known hosts. Further ones have the places of unknown hosts.
 const MAX_KNOWN: usize = 1024;

@@ -1,4 +1,4 @@
-//! Delay of the next handshake with a host whose handshakes fail, one after the other.
+//! Delay of the next handshake with a host after consecutive failed handshakes.
 
 use std::net::IpAddr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -8,11 +8,11 @@ use rayfarm_protocol::admission::host_number;
 
 use crate::host_table::HostTable;
 
-/// Failures in a row without a delay: another version, or a token that was rotated.
+/// Consecutive failures without a delay: a worker of another version or with an old token may cause a few.
 const FREE_FAILURES: u32 = 4;
 /// First delay. It doubles with each further failure.
 const FIRST_DELAY: Duration = Duration::from_millis(125);
-/// Longest delay: with it a worker still completes its handshake, of at most five seconds.
+/// Longest delay. A worker still completes its handshake within the limit of five seconds.
 const MAX_DELAY: Duration = Duration::from_secs(2);
 /// Time after which the failures of a host are forgotten.
 const FORGET_AFTER: Duration = Duration::from_secs(60);
@@ -28,8 +28,8 @@ struct Failures {
 }
 
 impl Backoff {
-    /// Delay before the next handshake with the host of this address. The connection keeps its place meanwhile, which it loses
-    /// to newer ones as a silent one does.
+    /// Delay before the next handshake with the host of this address. During the delay, the connection is pending; a newer
+    /// connection may replace it, like one that has sent nothing.
     pub(crate) fn delay(&self, address: IpAddr, now: Instant) -> Duration {
         let hosts = self.lock();
         let failures = hosts.get(host_number(address)).filter(|failures| failures.is_recent(now));
@@ -40,7 +40,7 @@ impl Backoff {
         }
     }
 
-    /// Records a failed handshake. Those of this machine have no delay, because its own workers connect from there.
+    /// Records a failed handshake. Connections of this machine have no delay, because local workers use them.
     pub(crate) fn failed(&self, address: IpAddr, now: Instant) {
         if address.to_canonical().is_loopback() {
             return;

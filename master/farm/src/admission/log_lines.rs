@@ -18,8 +18,7 @@ const RATE: Rate = Rate { burst: 64.0, per_second: 0.5 };
 pub(crate) struct LogLines(Mutex<HostTable<LineBudget>>);
 
 impl LogLines {
-    /// Whether a connection of this address is logged. If so, the number of connections that were left out since the last
-    /// one that was logged.
+    /// Number of connections that were left out since the last logged one; `None` if a connection of this address is not logged.
     pub(crate) fn next(&self, address: IpAddr, now: Instant) -> Option<u64> {
         let mut hosts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         hosts.entry(host_number(address), now, || LineBudget::new(RATE, now)).next(now)

@@ -1,4 +1,4 @@
-//! What happens to a connection before its session: a place among the pending ones, a delay after failed handshakes, and a
+//! Admission of connections before their session: a bounded number of pending ones, a delay after failed handshakes, and a
 //! bounded number of log lines for each host.
 
 mod backoff;
@@ -17,7 +17,7 @@ use refusal_log::RefusalLog;
 /// Most connections in their handshake. Known hosts are those whose workers have delivered pixels in this run.
 pub(crate) const LIMITS: AdmissionLimits = AdmissionLimits { unknown: 64, known: 16, here: 32, of_host: 8 };
 
-/// The door of a farm: state of all connections that are not sessions yet.
+/// State of all connections of a farm that are not sessions yet.
 #[derive(Debug)]
 pub(crate) struct Door {
     places: Admission,
@@ -40,7 +40,7 @@ impl Default for Door {
 }
 
 impl Door {
-    /// A place for a connection from this address. `None`: it is to be closed.
+    /// A place for a connection from this address; `None` if there is none, and the connection must be closed.
     pub(crate) fn enter(&self, address: IpAddr) -> Option<Place> {
         self.places.enter(address)
     }
@@ -50,7 +50,7 @@ impl Door {
         self.places.add_known(address);
     }
 
-    /// Number of connections in their handshake, and number of connections that were closed for others.
+    /// Number of connections in their handshake, and number of connections that were closed in favour of others.
     pub(crate) fn counts(&self) -> (usize, u64) {
         (self.places.pending(), self.places.refused())
     }

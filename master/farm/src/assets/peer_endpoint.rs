@@ -11,7 +11,7 @@ use rayfarm_scheduler::WorkerId;
 /// Interval at which each peer server gets a new key. A token is valid for one to two intervals.
 pub(crate) const KEY_INTERVAL: Duration = Duration::from_secs(300);
 
-/// Time after a renewal in which tokens are made of the previous key: the new one may still be on its way.
+/// Time after a renewal in which tokens are made of the previous key, because the peer server may not have the new one yet.
 const KEY_GRACE: Duration = Duration::from_secs(10);
 
 /// First port at which a worker may serve assets: lower ones belong to services of the system.

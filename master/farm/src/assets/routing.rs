@@ -20,7 +20,7 @@ pub(crate) const MAX_DIRECT_BYTES: usize = MAX_CHUNK_BYTES;
 /// server.
 const MAX_PEER_CLIENTS: usize = 2;
 
-/// Time in which a worker that turns to the master begins to receive, and its followers after it.
+/// Longest time until a worker that has requested the rest of an asset from the master, and its followers, receive bytes again.
 const RESUME_TIME: Duration = Duration::from_secs(5);
 
 /// The source from which a worker fetches an asset.
@@ -36,7 +36,7 @@ pub enum AssetSource {
 #[derive(Clone, Copy, Debug)]
 struct Copy {
     source: AssetSource,
-    /// Time at which the worker turned to the master because its source had failed.
+    /// Time at which the worker requested the asset from the master because its source had failed.
     resumed: Option<Duration>,
     /// Time at which the asset became complete; `None` while it is in transfer.
     complete: Option<Duration>,
@@ -75,7 +75,7 @@ impl AssetRouting {
         source
     }
 
-    /// Removes the worker that has failed a worker from the peers.
+    /// Removes the source that has failed for a worker from the peers.
     fn drop_source(&mut self, now: Duration, worker: WorkerId, id: AssetId) -> AssetSource {
         if let Some(failed) = self.failed_source(now, worker, id) {
             self.peers.remove(&failed);
@@ -83,9 +83,9 @@ impl AssetRouting {
         AssetSource::Master
     }
 
-    /// The worker because of which another one does not receive an asset: its source, except where that one has just turned to
-    /// the master itself, because its own source has failed. Workers wait the longer, the farther they are from the master, so
-    /// the worker next to the one at fault reports first.
+    /// The failed source of a worker. `None` for a source that has just requested the asset from the master, because the
+    /// source's own source had failed. The stall limit grows with the distance from the master, so the direct follower of the
+    /// failed worker reports first.
     fn failed_source(&self, now: Duration, worker: WorkerId, id: AssetId) -> Option<WorkerId> {
         let copies = self.copies.get(&id)?;
         let AssetSource::Worker(source) = copies.get(&worker)?.source else { return None };

@@ -10,11 +10,11 @@ use super::Assets;
 use crate::farm_scene::FarmScene;
 
 /// Most scenes that are kept although no frame shows them. A worker may request the scene of a frame that has just been
-/// superseded, and an undone change needs the scene before it again.
+/// superseded, and undoing a change shows the previous scene again.
 const MAX_RECENT: usize = 8;
 
-/// The scenes of a farm. New frames show the current one; former ones remain as long as frames show them, and the last
-/// few longer. Scenes share the bytes of the meshes and textures that they have in common.
+/// The scenes of a farm. New frames show the current one. Former scenes are kept while frames show them, and the last
+/// [`MAX_RECENT`] longer. Scenes share the bytes of the meshes and textures that they have in common.
 #[derive(Debug)]
 pub(crate) struct SceneTable(RwLock<Scenes>);
 
@@ -33,7 +33,7 @@ impl SceneTable {
         Self(RwLock::new(Scenes { current: assets, former: Vec::new(), replaced: 0 }))
     }
 
-    /// Makes a scene the current one. Of the former scenes those in `shown` are kept, and the last few.
+    /// Makes a scene the current one. Keeps the former scenes in `shown` and the last [`MAX_RECENT`].
     pub(crate) fn replace(&self, assets: Arc<Assets>, shown: &BTreeSet<AssetId>) {
         let mut scenes = self.0.write().unwrap_or_else(PoisonError::into_inner);
         let id = assets.scene();

@@ -101,7 +101,7 @@ async fn floods_of_messages_end_their_sessions_and_no_other() {
         (vec![pong; 1000], "pongs that answer no ping"),
         (vec![failed; 1000], "more failures than"),
         (vec![need(scene); 1000], "requests an asset more than"),
-        ((0..1000).map(|number| need(unknown(number))).collect(), "assets that the scene does not have"),
+        ((0..1000).map(|number| need(unknown(number))).collect(), "assets that no scene of the farm has"),
         (vec![ToMaster::HaveAsset { id: scene }; 1000], "has not requested"),
     ];
     for (flood, expected) in floods {

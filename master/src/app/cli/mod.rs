@@ -111,7 +111,7 @@ struct Cli {
 /// Commands of the master.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Show a scene in a window; workers on this machine render it, and workers on other machines can connect.
+    /// Show a scene in a window or another display; workers on this machine render it, and workers on other machines can connect.
     View(ViewArgs),
     /// Render frames to files; needs no display.
     Render(RenderArgs),
@@ -129,7 +129,7 @@ pub(crate) enum Command {
     CheckNumerics(CheckNumericsArgs),
     /// Measure the time and the error of each setting of the tracer; write a table, plots and pictures.
     Tradeoff(TradeoffArgs),
-    /// Show or change the secret line with which workers on other machines join.
+    /// Show or change the secret line with which workers on other machines join; list, refuse and admit workers.
     Trust(TrustArgs),
     /// Print a script that completes the options of a program in a shell.
     Completions(CompletionsArgs),

@@ -29,8 +29,8 @@ impl Observability {
         Ok(Self { timeline, control: args.control.clone(), over: CancellationToken::new() })
     }
 
-    /// Records the timeline of a farm from now on, and accepts commands for it, for the knobs of `view` and for its scene. The command `quit`
-    /// cancels `quit`. Must be called inside a runtime.
+    /// Records the timeline of a farm from now on, and accepts commands for it, for the knobs of `view` and for its scene. The command
+    /// `quit` cancels `quit`. Must be called inside a runtime.
     ///
     /// # Errors
     /// A place at which the process cannot listen.

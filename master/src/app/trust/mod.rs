@@ -1,8 +1,7 @@
 //! Trust between this master and the workers of other machines: key, token and join line.
 //!
 //! The key and the token are made at the first start that needs them, and stay in the state folder, so that a worker that has joined
-//! once joins again. Their files have mode 0600. The folder has the list of the workers that have joined and of the revoked keys as
-//! well.
+//! once joins again. Their files have mode 0600. The folder also has the workers that have joined, and the revoked keys.
 
 #[cfg(feature = "discovery")]
 mod announcement;

@@ -57,7 +57,7 @@ impl MasterState {
         WorkerFiles::of(&self.folder)
     }
 
-    /// The token of the web display, which is made where there is none.
+    /// The token of the web display. Makes one if there is none.
     ///
     /// # Errors
     /// A file that cannot be read or written, or that other users can access.
@@ -168,7 +168,7 @@ impl MasterState {
     }
 }
 
-/// Files about workers and a running farm, which follow each other.
+/// Files about workers, and the running farm with which they are synchronized.
 #[derive(Default)]
 struct WorkerLog {
     /// The last failure, which is logged once.

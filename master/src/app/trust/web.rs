@@ -1,4 +1,4 @@
-//! Who may open the web display, and whether it is encrypted.
+//! Access to the web display: its token and its encryption.
 
 use std::net::SocketAddr;
 
@@ -10,8 +10,8 @@ use crate::app::cli::FarmArgs;
 use crate::display::web::WebSecurity;
 use crate::error::CommandError;
 
-/// Token and encryption of a web display at an address: TLS with the key of the master where other machines can connect, unless the
-/// user refuses it. The token stays in the state folder, so that an open page finds a master that was started again.
+/// Token and encryption of a web display at an address: TLS with the key of the master where other machines can connect, except
+/// with `--insecure`. The token is in the state folder, so that an open page can connect to a restarted master.
 ///
 /// # Errors
 /// A state folder or a file in it that cannot be used, where other machines can connect.

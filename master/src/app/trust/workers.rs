@@ -1,5 +1,5 @@
 //! The workers that have joined a master through TLS, and those whose keys are revoked: a file for each of them in the
-//! master's state folder, with the hash of the key as its name. So several processes can change them without a lock.
+//! master's state folder, with the hash of the key as its name. Several processes can change them without a lock.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -18,7 +18,7 @@ const MAX_REVOKED: usize = 4096;
 const MAX_NAME_BYTES: usize = 64;
 /// A worker that joins again within this time changes no file.
 const REWRITE_AFTER: Duration = Duration::from_secs(60);
-/// Fewest digits that name a key.
+/// Least number of first digits that select a key.
 const MIN_DIGITS: usize = 8;
 
 /// A worker that has joined.
@@ -251,7 +251,7 @@ mod tests {
             KeyHash(bytes)
         };
         fs::create_dir_all(&files.joined).unwrap();
-        // Written directly: a thousand files on the disk for certain take seconds.
+        // Written without synchronizing each file with the disk, which takes seconds for a thousand files.
         for number in 0..MAX_WORKERS {
             let path = files.joined.join(key(number).to_string());
             fs::write(&path, format!("w\n{number}\n{number}\n")).unwrap();

@@ -18,7 +18,7 @@ impl ApngEncoder {
         encoder.set_color(ColorType::Rgb);
         encoder.set_depth(BitDepth::Eight);
         let (seconds, parts) = rate.delay();
-        // It plays again and again.
+        // 0 is repetition without end.
         encoder.set_animated(frames, 0).map_err(|error| VideoError::of(&error))?;
         encoder.set_frame_delay(seconds, parts).map_err(|error| VideoError::of(&error))?;
         encoder.validate_sequence(true);

@@ -15,7 +15,7 @@ use super::{Encoder, VideoError, VideoFormat, VideoSettings};
 const PROGRAM: &str = "ffmpeg";
 /// Bytes that are kept of the last messages of ffmpeg.
 const MAX_MESSAGES: usize = 2048;
-/// Interval of looking whether ffmpeg has ended.
+/// Interval between checks whether ffmpeg has ended.
 const POLL_EVERY: Duration = Duration::from_millis(5);
 /// Time that ffmpeg has to end after it has closed its input.
 const END_TIMEOUT: Duration = Duration::from_secs(5);
@@ -35,7 +35,7 @@ pub(super) fn refusal() -> Option<String> {
 /// The running program, which another thread may end.
 pub(super) type Process = Arc<Mutex<Child>>;
 
-/// Ends a program at once. One that has ended already is left alone.
+/// Ends a program at once, if it still runs.
 pub(super) fn kill(process: &Process) {
     let mut child = process.lock().unwrap_or_else(PoisonError::into_inner);
     if !matches!(child.try_wait(), Ok(Some(_))) {
@@ -76,7 +76,7 @@ impl FfmpegEncoder {
         self.process.clone()
     }
 
-    /// Waits until ffmpeg has ended, for a time at most; then it is killed.
+    /// Waits until ffmpeg has ended, and kills it after a limited time.
     fn wait(&self, timeout: Duration) -> Result<ExitStatus, VideoError> {
         let mut waited = Duration::ZERO;
         loop {
@@ -86,7 +86,7 @@ impl FfmpegEncoder {
                 Ok(Some(status)) => return Ok(status),
                 Ok(None) if waited >= timeout => kill(&self.process),
                 Ok(None) => std::thread::sleep(POLL_EVERY),
-                Err(error) => return Err(VideoError::new(format!("ffmpeg cannot be awaited: {error}"))),
+                Err(error) => return Err(VideoError::new(format!("cannot wait for ffmpeg: {error}"))),
             }
             waited += POLL_EVERY;
         }
@@ -109,7 +109,7 @@ impl Encoder for FfmpegEncoder {
         if let Err(error) = input.write_all(&frame.pixels) {
             self.input = None;
             let status = self.wait(END_TIMEOUT)?;
-            return Err(self.failure(status, &format!("and took no more of them: {error}")));
+            return Err(self.failure(status, &format!("and did not read the next one: {error}")));
         }
         self.frames += 1;
         Ok(())
@@ -133,7 +133,7 @@ impl Drop for FfmpegEncoder {
 /// Arguments of ffmpeg before the name of the file.
 fn arguments(settings: &VideoSettings) -> Vec<String> {
     let VideoSettings { format, width, height, rate, .. } = *settings;
-    // Both formats halve the resolution of colours, which needs even sides.
+    // Both formats halve the resolution of colours, which needs an even width and height.
     let pad = if width % 2 + height % 2 > 0 { "pad=ceil(iw/2)*2:ceil(ih/2)*2," } else { "" };
     let filter = format!(
         "{pad}scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int,format=yuv420p"

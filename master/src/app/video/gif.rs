@@ -1,5 +1,5 @@
-//! GIF: 255 colours for each frame, dithered. Pixels that do not change keep the colours that they have, so what rests does not
-//! flicker and takes no bytes.
+//! GIF: 255 colours for each frame, dithered. Pixels that do not change keep their colours, so objects at rest do not flicker and
+//! take no bytes.
 
 use std::borrow::Cow;
 use std::fs::File;

@@ -1,4 +1,4 @@
-//! Videos: all frames of a run in one file, which is whole or not there.
+//! Videos: all frames of a run in one file, which appears when it is complete.
 //!
 //! ```text
 //! writer    the thread that encodes, and the file under its temporary name

@@ -1,14 +1,14 @@
 //! At most 255 colours that are near to those of a picture, and its pixels in them.
 //!
 //! The colours are divided in two, again and again, where that lowers the sum of squared errors most (after Wu 1992). Pixels are
-//! dithered by an ordered pattern: a pixel depends on its own colour and place only, so that what rests from frame to frame does not
-//! flicker, as it does where errors are diffused.
+//! dithered by an ordered pattern: a pixel depends on its own colour and place only. Objects at rest therefore do not flicker from frame
+//! to frame, as they do with error diffusion.
 
 /// Largest number of colours: one number of a GIF's 256 is for pixels that do not change.
 const MAX_COLORS: usize = 255;
 /// Bits of each channel of the table of nearest colours.
 const BITS: u32 = 6;
-/// No entry of the table yet.
+/// Value of a table entry that has not been computed.
 const UNKNOWN: u16 = u16::MAX;
 
 /// Thresholds of an ordered dither, 8 x 8 (Bayer 1973).
@@ -110,7 +110,7 @@ fn divided(colors: Vec<Counted>) -> Vec<Vec<Counted>> {
 /// A division of colours.
 #[derive(Clone, Copy, Debug)]
 struct Cut {
-    /// Channel that decides.
+    /// Channel whose value divides the colours.
     axis: usize,
     /// Largest value of the lower part.
     above: u8,

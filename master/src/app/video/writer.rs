@@ -114,7 +114,7 @@ impl VideoWriter {
     pub(crate) async fn abort(&mut self) {
         self.frames = None;
         self.process.iter().for_each(kill);
-        // Reported already: the reason of the abortion.
+        // The failure is the reason of the abortion, and has been reported.
         let _ = self.result().await;
     }
 

@@ -1,4 +1,4 @@
-//! Which requests are answered, and what they may do.
+//! Rules for requests: which are refused, and the access level of the others.
 //!
 //! Programs of other machines, and web pages that a user of this machine has open, can send requests. A request must name this
 //! server and not a foreign name that resolves to it (DNS rebinding), and must not come from a page of another server. The token
@@ -15,7 +15,7 @@ use rayfarm_protocol::transport::JoinToken;
 /// Commands of guests. They change at most the view.
 const GUEST_COMMANDS: [&str; 4] = ["help", "set", "status", "workers"];
 
-/// Header with which browsers say where a request comes from.
+/// Header with which browsers report the origin of a request.
 const FETCH_SITE: &str = "sec-fetch-site";
 
 /// Rules of one server.
@@ -140,7 +140,7 @@ impl Access {
         ))
     }
 
-    /// Whether the headers have the token, as a cookie or for themselves.
+    /// Whether the headers have the token, as a cookie or as a bearer token.
     fn has_token(&self, headers: &HeaderMap) -> bool {
         let texts = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
         let cookies = texts(COOKIE).flat_map(|cookies| cookies.split(';'));

@@ -1,4 +1,4 @@
-//! The clients that look at the picture. Without any, the viewer requests no frames for this display.
+//! The clients that show the picture. Without any, the viewer requests no frames for this display.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -7,14 +7,14 @@ use tokio::sync::watch;
 
 use crate::viewer::{InputAction, ViewerHandle};
 
-/// Pause before an action is sent again that the viewer had no place for.
+/// Pause before an action is sent again that did not fit into the viewer's queue.
 const RETRY_PAUSE: Duration = Duration::from_millis(20);
 
-/// Number of clients that look at the picture.
+/// Number of clients that show the picture.
 #[derive(Clone, Debug)]
 pub(super) struct Audience(Arc<watch::Sender<usize>>);
 
-/// One client that looks at the picture, until it is dropped.
+/// One client that shows the picture, until this value is dropped.
 #[derive(Debug)]
 pub(super) struct Looking(Audience);
 
@@ -30,7 +30,7 @@ impl Audience {
         Looking(self.clone())
     }
 
-    /// Reports to the viewer whether any client looks at the picture, now and at every change. Never returns.
+    /// Reports to the viewer whether any client shows the picture, now and at every change. Never returns.
     pub(super) async fn report(&self, viewer: &ViewerHandle) {
         let mut counts = self.0.subscribe();
         let mut reported = None;
@@ -49,7 +49,7 @@ impl Audience {
         }
     }
 
-    /// Waits until a client looks at the picture.
+    /// Waits until a client shows the picture.
     pub(super) async fn is_there(&self) {
         // The sender is alive: it belongs to `self`.
         let _ = self.0.subscribe().wait_for(|count| *count > 0).await;

@@ -1,4 +1,4 @@
-//! Control commands of clients, as many a second as the server accepts.
+//! Control commands of clients, at a bounded rate.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ pub(super) struct Commands {
     budget: Mutex<Budget>,
 }
 
-/// A reply, and why there is no other.
+/// A reply, by whether the command was executed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Reply {
     /// The reply of the executor.

@@ -31,7 +31,7 @@ pub(super) enum ClientMessage {
     Command { id: u32, line: String },
     /// A request to steer.
     Steer,
-    /// An answer to the request of another client.
+    /// Accepts or refuses the request of another client.
     HandOver { grant: bool },
     /// Whether the page can be seen.
     Visible { visible: bool },
@@ -74,7 +74,7 @@ impl ClientMessage {
 }
 
 impl Move {
-    /// The action of the movement. Numbers are limited to what a hand can do; JSON has no others than finite ones.
+    /// The action of the movement. Its numbers are clamped to the limits of this module; JSON numbers are finite.
     pub(super) fn action(self) -> InputAction {
         let unit = |value: f64| value.clamp(-1.0, 1.0);
         let time = |seconds: f64| seconds.clamp(0.0, MAX_SECONDS);

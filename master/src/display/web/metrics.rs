@@ -38,7 +38,7 @@ impl Families {
     }
 }
 
-/// Value of a label: a name of a worker may have any characters.
+/// Escaped value of a label. The name of a worker may have any characters.
 fn escaped(value: &str) -> String {
     value.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
 }

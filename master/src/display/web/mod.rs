@@ -1,4 +1,4 @@
-//! The web page: a server of its own, whose pages show the view, move its camera, and show and command the farm.
+//! The web display: a server whose pages show the view, move its camera, and show and command the farm.
 //!
 //! ```text
 //! connection (server) -> rules (access) -> routes -> page, /api, /metrics
@@ -40,7 +40,7 @@ pub(crate) use self::commands::CommandExecutor;
 /// Time for encoders that run at the end.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Who may open the pages, and how their connections are secured.
+/// Access to the pages, and encryption of their connections.
 #[derive(Clone, Debug)]
 pub(crate) struct WebSecurity {
     /// Token of owners.

@@ -1,4 +1,4 @@
-//! What all requests and pages of one server share.
+//! State that all requests and pages of one server share.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,7 +29,7 @@ pub(super) struct Shared {
     pub(super) pictures: Pictures,
     pub(super) audience: Audience,
     pub(super) steering: Steering,
-    /// What does not change while the server runs.
+    /// Scene, knobs and version as JSON, which do not change while the server runs.
     pub(super) facts: Value,
     /// The newest state as JSON, for all pages; `None` before the first one.
     pub(super) published: watch::Sender<Option<Arc<str>>>,

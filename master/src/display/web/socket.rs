@@ -31,8 +31,8 @@ const PING_EVERY: Duration = Duration::from_secs(20);
 const MAX_SILENCE: Duration = Duration::from_secs(60);
 /// Longest time of sending one message.
 const SEND_TIMEOUT: Duration = Duration::from_secs(60);
-/// Time without another frame after which the newest one is sent with its exact bytes, also where the view is not at rest, such as
-/// while all workers are paused.
+/// Time without another frame after which the newest one is sent with its exact bytes, even if the view is not at rest: all workers
+/// may be paused.
 const STILL: Duration = Duration::from_secs(1);
 
 /// One page. It takes a place among all pages until it is dropped.
@@ -42,12 +42,12 @@ pub(super) struct Client {
     id: ClientId,
 }
 
-/// What both directions of a connection know.
+/// State of a page that both directions of its connection use.
 #[derive(Clone, Copy, Debug)]
 struct Page {
     /// Whether the page can be seen.
     visible: bool,
-    /// Time since which it can, or could last.
+    /// Time at which the page last became visible.
     visible_since: Instant,
     /// The picture that is on its way.
     sent: Option<Sent>,
@@ -116,7 +116,7 @@ impl Client {
         }
     }
 
-    /// Reads messages until the page ends, is silent for too long, or sends something else.
+    /// Reads messages until the page ends, is silent for too long, or sends an invalid message.
     async fn read(
         &self,
         mut stream: SplitStream<WebSocket>,
@@ -203,7 +203,7 @@ impl Client {
         }
     }
 
-    /// The first message: what does not change, and what this page may see and do.
+    /// The first message: the facts that do not change, and the access level of this page.
     fn hello(&self) -> String {
         let is_owner = self.level == Level::Owner;
         let join = is_owner.then(|| self.shared.viewer.entrance().reachable().commands());
@@ -262,7 +262,7 @@ impl Writer<'_> {
         self.last = Some(Last { frame: Arc::downgrade(frame), format, at: Instant::now() });
         match encoded {
             Ok(encoded) => {
-                // A frame from before the page could be seen has waited for the page, not the page for it.
+                // A frame that is older than the visibility of the page has no latency.
                 let is_current = is_new && frame.completed_at > self.page.borrow().visible_since;
                 let input_at = is_current.then_some(frame.input_at);
                 let sent = Sent { number: encoded.number, input_at };
@@ -276,7 +276,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Sends new lines of the log to an owner: they may have secrets.
+    /// Sends new lines of the log, to an owner only, because they may contain secrets.
     async fn log(&mut self) -> Result<(), Ended> {
         if self.client.level != Level::Owner {
             return Ok(());

@@ -93,7 +93,7 @@ fn options(setting: &Setting) -> Map<String, Value> {
     KNOBS.iter().filter(has).map(|knob| (knob.option.to_owned(), value(knob))).collect()
 }
 
-/// What does not change: the scene and the knobs with their values, best first.
+/// Facts that do not change: the scene, and the knobs with their values, best first.
 pub(super) fn facts(info: &SceneInfo) -> Value {
     let option = |knob: &Knob| {
         let range = match knob.form {

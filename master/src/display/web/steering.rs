@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use tokio::sync::watch;
 
-/// A client that has sent no input for this long hands over without an answer of its own.
+/// Time without input after which a request to steer is granted at once.
 const IDLE: Duration = Duration::from_secs(10);
 
 /// Number of a client, never reused.
 pub(super) type ClientId = u64;
 
-/// What all clients see.
+/// State of steering, as all clients receive it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub(super) struct SteeringState {
     /// The client that moves the camera.

@@ -1,4 +1,4 @@
-//! An edit to a changed document.
+//! Application of edits to the text of a scene file.
 
 use toml_edit::{Item, Value};
 
@@ -9,7 +9,7 @@ use super::transform;
 /// Applies an edit to the text of a scene file. The loader decides whether the result is a scene.
 ///
 /// # Errors
-/// An edit that names something that the file does not have, or that the object cannot do.
+/// An edit that names an item which is not in the file, or that is impossible for the object.
 pub(super) fn applied(text: &str, edit: &Edit) -> Result<String, String> {
     let mut document = Document::parse(text)?;
     apply(&mut document, edit)?;
@@ -81,7 +81,7 @@ fn remove_object(document: &mut Document, object: Object) -> Result<(), String> 
             emptied = Some(Object { kind: "group", index });
         }
     }
-    // Its own group may be empty then.
+    // The group of an emptied group may become empty as well.
     emptied.map_or(Ok(()), |group| remove_object(document, group))
 }
 

@@ -48,7 +48,7 @@ impl Document {
     /// The kind of object of this name.
     ///
     /// # Errors
-    /// A name that is none of them.
+    /// A name of no kind.
     pub(super) fn kind(name: &str) -> Result<&'static str, String> {
         let known = KINDS.into_iter().find(|kind| *kind == name);
         known.ok_or_else(|| {
@@ -60,7 +60,7 @@ impl Document {
         })
     }
 
-    /// The object of a name, or else with an item of a number, counted from 1 as in auxiliary pictures.
+    /// The object with a name, or else the object with the item of a number, counted from 1 as in auxiliary pictures.
     ///
     /// # Errors
     /// A name that no object has, a number that no item has.
@@ -138,7 +138,7 @@ impl Document {
             };
             *item = tables.map_or_else(|other| other, Item::ArrayOfTables);
         }
-        item.as_array_of_tables_mut().ok_or_else(|| format!("`{name}` is no list of tables"))
+        item.as_array_of_tables_mut().ok_or_else(|| format!("`{name}` is not a list of tables"))
     }
 
     /// A table of a name in the root, which is created if there is none.
@@ -236,6 +236,6 @@ pub(super) fn table_of(keys: &str) -> Result<Table, String> {
     let text = if keys.starts_with('{') { keys.to_owned() } else { format!("{{ {keys} }}") };
     let table: Result<Value, _> = text.parse();
     let table: Option<InlineTable> = table.ok().and_then(|value| value.as_inline_table().cloned());
-    let expected = || format!("\"{}\" are no keys with values: expected KEY = VALUE, ...", printable(keys));
+    let expected = || format!("\"{}\" has no keys with values: expected KEY = VALUE, ...", printable(keys));
     Ok(table.ok_or_else(expected)?.into_table())
 }

@@ -35,7 +35,7 @@ pub(crate) struct SceneEditor {
     view: ViewRequest,
 }
 
-/// Shows a loaded scene after one with a view. An error keeps the former scene.
+/// Function that shows a loaded scene. Its first argument is the view of the former scene, which remains after an error.
 pub(crate) type Show<'s> = dyn FnMut(ViewRequest, LoadedScene) -> Result<(), String> + 's;
 
 impl SceneEditor {
@@ -113,7 +113,7 @@ impl SceneEditor {
         if !self.watched.iter().any(FileStamp::has_changed) {
             return None;
         }
-        // Before anything is read, so that a change meanwhile is found by the next check.
+        // The state of the files before they are read, so that the next check finds a change during the load.
         let before: Vec<FileStamp> = self.watched.iter().map(|stamp| FileStamp::of(stamp.path())).collect();
         let result = self.reload(show);
         self.watched = match &result {

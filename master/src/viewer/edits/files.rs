@@ -66,8 +66,8 @@ fn rename_in(value: &mut Value, from: &Path, is_file: bool) {
     }
 }
 
-/// The absolute path of a file that a scene in the folder `from` names. Back slashes are separators unless a file of that
-/// very name exists, as for the loader.
+/// The absolute path of a file that a scene in the folder `from` names. Back slashes are separators unless a file with
+/// exactly this name exists, as for the loader.
 fn named(from: &Path, name: &str) -> String {
     let path = from.join(name);
     let path = if path.exists() { path } else { from.join(name.replace('\\', "/")) };

@@ -7,7 +7,7 @@ const MAX_CHANGES: usize = 256;
 /// Most bytes of former texts.
 const MAX_BYTES: usize = 64 << 20;
 
-/// A change: what it was, and the text on its other side.
+/// A change: its description, and the text before it (to undo) or after it (to redo).
 #[derive(Clone, Debug)]
 struct Change {
     what: String,
@@ -45,12 +45,12 @@ impl History {
         }
     }
 
-    /// The text before the last change, and what that change was.
+    /// The text before the last change, and the description of that change.
     pub(super) fn former(&self) -> Option<(&str, &str)> {
         self.undo.back().map(|change| (change.text.as_str(), change.what.as_str()))
     }
 
-    /// The text after the change that was undone last, and what that change was.
+    /// The text after the change that was undone last, and the description of that change.
     pub(super) fn later(&self) -> Option<(&str, &str)> {
         self.redo.last().map(|change| (change.text.as_str(), change.what.as_str()))
     }

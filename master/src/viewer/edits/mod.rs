@@ -1,7 +1,7 @@
 //! Changes of the scene while it is shown.
 //!
-//! What is edited is the text of the scene file, not the loaded scene: comments remain, the loader checks every value and
-//! explains mistakes as it does in files, undoing a change restores the former text, and saving writes it.
+//! An edit changes the text of the scene file, not the loaded scene: comments remain, the loader checks every value and
+//! explains mistakes as it does in files, undoing a change restores the former text, and saving writes the current one.
 //!
 //! ```text
 //!   syntax      a line of text to an edit
@@ -11,7 +11,7 @@
 //!   transform   movements, turns and scales of objects of each kind
 //!   history     texts to undo and to redo
 //!   files       names of files in a scene that is saved elsewhere
-//!   editor      all of it for one scene, with the loader
+//!   editor      the text, history and loader of one scene
 //!   service     the editor on a thread of its own, which also watches the files
 //! ```
 

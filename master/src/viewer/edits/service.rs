@@ -1,8 +1,8 @@
 //! The editor on a thread of its own, which performs commands and watches the files of the scene.
 //!
 //! Files are checked by their size and the time of their last change, twice a second. Notifications of the operating system
-//! would come sooner, but not from network drives, and differ in what they report about editors that replace a file; some
-//! calls a second cost nothing that could be measured.
+//! would be faster, but network drives send none, and operating systems report the replacement of a file differently. The
+//! time of the checks is too short to be measured.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -103,7 +103,7 @@ fn check(editor: &mut SceneEditor, view: &KnobSender) {
     }
 }
 
-/// Shows a loaded scene after one with the view `before`. Warnings about it go to the log.
+/// Shows a loaded scene in place of one with the view `before`. Writes warnings about the scene to the log.
 fn show(before: ViewRequest, loaded: LoadedScene, view: &KnobSender) -> Result<(), String> {
     let LoadedScene { scene, meshes, textures, warnings, .. } = loaded;
     let after = view_of(&scene);

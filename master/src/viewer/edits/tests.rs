@@ -443,7 +443,7 @@ fn a_bare_model_becomes_a_scene_file() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever is edited: what is refused changes nothing, and undoing all changes restores the file to the byte.
+    /// For any edits: a refused edit changes nothing, and undoing all changes restores the file to the byte.
     #[test]
     fn all_changes_can_be_undone(
         steps in prop::collection::vec((0..9usize, 0..24u32, -2.0..2.0f64), 1..12),

@@ -23,8 +23,8 @@
 //! mirror               c_r R, with `fresnel` c_r Fx R; added to the diffuse part, whose colour stays
 //! glass                max(c_r, c_t) Fx R + c_t (1 - Fx) T; `thin`: T goes straight through, and Fx is that of a sheet
 //! metallic-roughness   m f1 F(base) + (1 - m) (1 - t) (k f1 F(d) + base c(v) c(l) / (pi C)) + (1 - m) t (p Fx + base (1 - Fx) T)
-//!                      with alpha = roughness^2 (both roughness and m times their texels), d = ((ior - 1) / (ior + 1))^2, k = specular_factor, c = 1 - k E the share that the
-//!                      dielectric leaves, and C its mean
+//!                      with alpha = roughness^2 (both roughness and m times their texels), d = ((ior - 1) / (ior + 1))^2,
+//!                      k = specular_factor, c = 1 - k E the share that the dielectric leaves, and C its mean
 //! ```
 //!
 //! Surfaces with alpha below 0.001 are perfectly smooth. Rough glass refracts by visible microfacets, each weighted by its own 1 - Fx, and

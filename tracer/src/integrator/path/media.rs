@@ -46,7 +46,8 @@ impl Group<'_> {
     }
 
     /// Where the refracted ray of a path starts: exactly on the surface, whose primitive it does not hit again, so that it hits bodies that
-    /// touch the surface. Where surfaces coincide it starts before both of them and crosses the other one next, and then starts behind both.
+    /// touch the surface. Where surfaces coincide it starts in front of both of them, crosses the other one next, and then starts behind
+    /// both.
     pub(super) fn refraction_origin(&self, block: usize, lane: usize) -> Option<DVec3> {
         let (hits, surface) = (&self.hits[block], &self.surfaces.blocks[block]);
         let ray = self.batch.ray(block, lane);

@@ -12,7 +12,8 @@ use crate::simd::{Indices, Lanes, Simd, SimdBase, bits, each_bit, prefetch, sele
 
 /// The boxes that matter to a query.
 pub(super) trait NodeFilter<S: Simd> {
-    /// Whether rays may be on a grid with step 1 (see [`crate::rays::TileRays::on_grid`]), so that boxes and triangles between them can be dropped.
+    /// Whether rays may be on a grid with step 1 (see [`crate::rays::TileRays::on_grid`]), so that boxes and triangles between them can
+    /// be dropped.
     const ON_GRID: bool;
 
     /// Whether rays are parallel and start at depth 0, so that boxes behind it can be dropped.

@@ -6,7 +6,7 @@ use crate::bsdf::scattering::{STEPS, TABLE};
 #[derive(Clone, Copy)]
 pub(super) struct Row(f64);
 
-/// LobeTerms of a lobe at a cosine: the scale s, and the share 1 - E = (1 - F0) (a + F0 b) that it leaves.
+/// The terms of a lobe at a cosine: the scale s, and the share 1 - E = (1 - F0) (a + F0 b) that it leaves.
 #[derive(Clone, Copy)]
 pub(super) struct LobeTerms {
     pub scale: f64,
@@ -19,13 +19,13 @@ impl Row {
         Self(place(alpha))
     }
 
-    /// LobeTerms at a cosine.
+    /// The terms at a cosine.
     pub(super) fn at(self, cosine: f64) -> LobeTerms {
         self.between(place(cosine))
     }
 
-    /// Means of a and b over the cosine-weighted hemisphere: integrals over x = sqrt(cos) with the weight 4 x^3. Between two columns the terms
-    /// are linear, so the integrand is a polynomial of degree 4, and Boole's rule is exact.
+    /// Means of a and b over the cosine-weighted hemisphere: integrals over x = sqrt(cos) with the weight 4 x^3. Between two columns the
+    /// terms are linear, so the integrand is a polynomial of degree 4, and Boole's rule is exact.
     pub(super) fn means(self) -> [f64; 2] {
         let steps = STEPS as f64;
         let mut means = [0.0; 2];

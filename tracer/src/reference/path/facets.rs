@@ -54,8 +54,8 @@ impl Facets {
         around(self.normal, local).normalize()
     }
 
-    /// A visible half vector. The surface stretched by 1 / alpha along z is a hemisphere of facets, whose visible half vectors are the sums of
-    /// the viewer and a point of the cap of the sphere above -z of the viewer.
+    /// A visible half vector. The surface stretched by 1 / alpha along z is a hemisphere of facets, whose visible half vectors are the
+    /// sums of the viewer and a point of the cap of the sphere above -z of the viewer.
     pub(super) fn half_vector(&self, at: DVec2) -> DVec3 {
         let stretch = DVec3::new(self.alpha, self.alpha, 1.0);
         let viewer = (self.viewer * stretch).normalize();

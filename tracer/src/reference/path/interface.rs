@@ -23,7 +23,7 @@ impl Interface {
     pub(super) fn share(&self, cosine: f64) -> f64 {
         let [near, far] = self.indices;
         if near == far {
-            // No interface: nothing is reflected, along the surface neither.
+            // No interface: nothing is reflected, not even at grazing angles.
             return 0.0;
         }
         let share = optics::reflected_share(DVec3::NEG_Z * cosine, DVec3::Z, self.indices);

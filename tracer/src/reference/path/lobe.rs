@@ -1,5 +1,5 @@
-//! Rough reflection, and what it leaves of the light for a diffuse surface below: with F(x) = (x + (1 - x) (1 - v.h)^5) (1 + x (s(v) s(l) - 1)),
-//! the exact Fresnel share Fx, f1 of `facets` and s, a, b of `energy`:
+//! Rough reflection, and the share of light that reaches a diffuse surface below: with
+//! F(x) = (x + (1 - x) (1 - v.h)^5) (1 + x (s(v) s(l) - 1)), the exact Fresnel share Fx, f1 of `facets` and s, a, b of `energy`:
 //!
 //! ```text
 //! f     = f1 (m F(base) + w F(d)) + t Fx p / cos
@@ -18,7 +18,7 @@ use super::facets::{FacetReflection, Facets, LEAST_ALPHA};
 use super::interface::Interface;
 use crate::scene::Shading;
 
-/// Reflection above a diffuse surface: its numbers.
+/// Coefficients of the reflection above a diffuse surface.
 #[derive(Clone, Copy)]
 pub(super) struct Coat {
     alpha: f64,
@@ -101,7 +101,7 @@ impl Coat {
         Row::of(if self.is_rough() { self.alpha } else { 0.0 })
     }
 
-    /// Whether it has a lobe, and not a mirrored direction.
+    /// Whether the coat is rough: it has a lobe instead of a mirrored direction.
     pub(super) fn is_rough(&self) -> bool {
         self.metal + self.opaque + self.glass > 0.0 && self.alpha >= LEAST_ALPHA
     }

@@ -8,7 +8,7 @@
 //!
 //! L_e at a hit has the weight of multiple importance sampling by the power heuristic (Veach 1997), and so has the light of one light that
 //! is selected at each vertex. Besides the scene, four things are shared with the integrator: the random numbers, the piecewise constant
-//! distribution of the light of a sky, which of many lights are together in a tree, and the table of the energy of rough reflection. All
+//! distribution of the light of a sky, the layout of the tree of many lights, and the table of the energy of rough reflection. All
 //! directions, densities, values and weights are computed here.
 //!
 //! ```text
@@ -22,7 +22,7 @@
 //!   aim          directions to a source, and their densities
 //!   parts        how a surface scatters light
 //!   interface    the share of light that glass reflects
-//!   lobe         rough reflection, and what it leaves
+//!   lobe         rough reflection, and the light that it transmits to a diffuse surface
 //!   facets       microfacets
 //!   energy       energy of rough reflection
 //!   arriving     light of lights that are aimed at

@@ -3,7 +3,7 @@
 //! One part is selected at random in proportion to an estimate of the light that it scatters. F is the exact Fresnel share:
 //!
 //! ```text
-//! diffuse   c_d / pi, below a lobe what that leaves
+//! diffuse   c_d / pi, below a lobe times the share that the lobe leaves
 //! lobe      see `lobe`
 //! mirror    c_r R, with `fresnel` c_r F R
 //! glass     max(c_r, c_t) F R + c_t (1 - F) T
@@ -33,7 +33,7 @@ pub(super) struct Parts {
     /// Shading normal on the side of the viewer, and the geometric one.
     normal: DVec3,
     geometric: DVec3,
-    /// Colour of diffuse light, and what a lobe above leaves of it.
+    /// Colour of diffuse light, and the share of it that a lobe above leaves.
     diffuse: DVec3,
     left: Option<Left>,
     /// Rough reflection.

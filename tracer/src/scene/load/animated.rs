@@ -10,8 +10,8 @@ use crate::scene::toml::{self, SceneText};
 
 /// The movements of a scene file: the path of its camera, and objects, groups and lights with keys.
 ///
-/// The scene of a time is what the file's text says at that time, with the meshes and textures that were loaded: it depends on
-/// nothing else, so each frame is the same in any order, in any run.
+/// The scene at a time depends only on the text of the file and on the loaded meshes and textures, so each frame is the same in
+/// any order and in any run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneAnimation {
     path: PathBuf,
@@ -72,7 +72,7 @@ impl SceneAnimation {
     }
 }
 
-/// A scene with everything that may have keys as a text of the same file has it.
+/// A scene with the values that may have keys replaced by those of `text`, which is read from the same file.
 fn posed(loaded: &Scene, text: SceneText) -> Scene {
     let mut scene = loaded.clone();
     for (model, text) in scene.models.iter_mut().zip(&text.models) {

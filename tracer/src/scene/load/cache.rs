@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::files::FileStamp;
 
-/// Number of further loads for which a result is kept that no load uses: a change of the scene may be undone.
+/// Number of loads for which an unused result is kept, because a change of the scene may be undone.
 const MAX_UNUSED_LOADS: u64 = 16;
 
 /// Results by what was read and how. Clones are handles to the same results.

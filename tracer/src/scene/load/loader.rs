@@ -1,4 +1,4 @@
-//! Loading of a scene again and again while it is edited.
+//! Repeated loading of a scene while it is edited.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,14 +36,14 @@ pub(super) struct Caches {
     pub(super) pictures: PictureCache,
 }
 
-/// Loads scenes with the same options again and again. Models and pictures whose files have not changed since they were
-/// loaded are taken as they are, also by a clone: their size and the time of their last change are compared.
+/// Loads scenes with the same options repeatedly. Models and pictures are reused, also by a clone, while the size and the
+/// time of the last change of their files are the same.
 #[derive(Clone, Debug, Default)]
 pub struct SceneLoader {
     options: LoadOptions,
     limits: LoadLimits,
     caches: Caches,
-    /// The scene or bare model that was loaded last, before it was read.
+    /// State of the scene or bare model that was loaded last, before it was read.
     main: Option<FileStamp>,
 }
 

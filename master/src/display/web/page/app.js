@@ -132,7 +132,7 @@ async function showPicture(socket, data) {
   const type = kind === 2 ? "image/png" : "image/jpeg";
   const blob = new Blob([new Uint8Array(data, 16)], { type });
   try {
-    // The bytes of the picture as they are, without the colours of a screen.
+    // The bytes of the picture without conversion to the colour space of a screen.
     const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
     const canvas = $("picture");
     if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
@@ -183,7 +183,7 @@ function tick(now) {
   if (ticking) requestAnimationFrame(tick);
 }
 
-// Sends input with the next frame of the screen, and goes on while a key is held.
+// Sends input with the next frame of the screen, and repeats this while a key is held.
 function schedule() {
   if (!steers()) {
     if (page.steering.steers) notice(`Page ${page.steering.steers} steers. Request to steer first.`, 3000);

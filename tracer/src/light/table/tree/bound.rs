@@ -19,9 +19,9 @@ pub(in super::super) struct Bound {
     pub(super) spread: f64,
     /// Largest angle between a normal and the light that leaves the surface.
     pub(super) emission: f64,
-    /// What they send to a surface across their light: falling with the square of the distance, and at any distance.
+    /// Irradiance that they cause on a surface perpendicular to their light.
     pub(super) strength: Strength,
-    /// The strength of those with an extent.
+    /// Strength of the lights with an extent.
     pub(super) extended: Strength,
 }
 

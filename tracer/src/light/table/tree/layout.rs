@@ -1,4 +1,4 @@
-//! Which lights are together in the nodes of a light tree.
+//! Layout of a light tree: the lights of each node.
 
 use std::ops::Range;
 
@@ -52,7 +52,7 @@ impl Layout {
     fn divide(&mut self, lights: Range<usize>, centers: &[DVec3]) -> Vec<Range<usize>> {
         let mut parts = vec![lights];
         while parts.len() < LANES {
-            // The first of the largest.
+            // The first one of the largest parts.
             let largest = (0..parts.len()).rev().max_by_key(|&part| parts[part].len()).unwrap_or(0);
             let Range { start, end } = parts[largest];
             if end - start < 2 {

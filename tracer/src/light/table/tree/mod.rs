@@ -15,7 +15,7 @@
 //! both cosines are 1.
 //!
 //! ```text
-//!   layout   which lights are together
+//!   layout   the lights of each node
 //!   bound    spheres, normals and strengths of lights
 //!   node     the parts of a node, and their importance
 //! ```
@@ -97,8 +97,9 @@ impl LightTree {
         Some(Self { nodes, trails })
     }
 
-    /// Selects a source for each of some points, by a number in [0, 1) each. Points that no source can reach select none, and so do
-    /// numbers that lead to a node none of whose sources can reach the point: its bounds are wider than theirs.
+    /// Selects a source for each point, by a number in [0, 1) per point. A point that no source can reach selects none. The bounds of a
+    /// node are wider than those of its parts, so a number may also lead to a node with no source that can reach the point.
+    /// Such a number selects none.
     #[inline(never)]
     pub(super) fn select<S: Simd>(
         &self,

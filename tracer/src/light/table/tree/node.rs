@@ -5,7 +5,7 @@ use super::{Receiver, Selection};
 use crate::simd::vector::Vec3x16;
 use crate::simd::{LANES, Lanes, Simd, SimdBase, SimdFloat, f32x16, select, splat};
 
-/// Least cosine of lights that are not excluded. Angles are rounded: lights up to this far behind a horizon have a probability too.
+/// Least cosine of a light that can be selected. Because angles are rounded, lights slightly behind a horizon have a probability too.
 pub(crate) const LEAST_COSINE: f32 = 1e-3;
 
 /// Least distance of lights, as a share of the size of the scene: nearer ones are as important as at this distance.
@@ -62,7 +62,7 @@ impl Node {
         self.emission.0[slot] = libm::cos(bound.emission) as f32;
         for (strengths, given) in self.strengths.iter_mut().zip([bound.extended, bound.strength]) {
             for (lanes, value) in strengths.iter_mut().zip([given.inverse_square, given.constant]) {
-                // Strengths that are not 0 stay so.
+                // Strengths above 0 remain above 0.
                 let least = if value > 0.0 { f32::MIN_POSITIVE } else { 0.0 };
                 lanes.0[slot] = ((value * scale) as f32).clamp(least, f32::MAX);
             }

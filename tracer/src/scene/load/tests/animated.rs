@@ -27,7 +27,7 @@ fn the_scene_of_a_time_differs_in_what_moves_only() {
     let mut expected = loaded.scene.clone();
     expected.models[0].translate = DVec3::X;
     assert_eq!(half, expected);
-    // Any scene of the file serves, and the order of times does not matter.
+    // The result depends neither on the scene of the file that is passed, nor on the order of times.
     assert_eq!(animation.scene(&half, 0.0).unwrap(), loaded.scene);
     let camera = animation.camera(&loaded.scene.camera, 1.0);
     assert_eq!(camera.position, DVec3::new(3.0, 0.0, 9.0));

@@ -1,4 +1,4 @@
-//! Scenes that are loaded again and again by one loader.
+//! Repeated loads by one loader.
 
 use super::*;
 use crate::scene::{LoadLimits, LoadOptions, SceneLoader};
