@@ -85,7 +85,7 @@ fn a_wrong_command_line_is_status_2() {
     ] {
         render(&scene, &scenes.path("out.png"), more).expect_failure(2, words);
     }
-    render(&scene, &scenes.path("out.gif"), &[]).expect_failure(2, &["out.gif", ".png"]);
+    render(&scene, &scenes.path("out.xyz"), &[]).expect_failure(2, &["out.xyz", ".png"]);
     let nowhere = scenes.path("no/such/folder/out.png");
     let outcome = render(&scene, &nowhere, &[]);
     assert!(matches!(outcome.code, Some(1 | 2)) && outcome.stderr.contains("no/such/folder"), "{outcome:?}");

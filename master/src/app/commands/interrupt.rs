@@ -2,14 +2,15 @@
 
 use tokio_util::sync::CancellationToken;
 
-/// A token that the first signal cancels. Must be called inside a runtime.
+/// A token that the first signal cancels: signals are received from this call on. Must be called inside a runtime.
 pub(super) fn cancelled_by_signals() -> CancellationToken {
     let interrupted = CancellationToken::new();
     let token = interrupted.clone();
+    let mut signals = Signals::new();
     tokio::spawn(async move {
-        signal().await;
+        signals.next().await;
         token.cancel();
-        signal().await;
+        signals.next().await;
         crate::display::restore_terminal();
         // No orderly end after a second signal: local workers end too, because their standard input is closed.
         std::process::exit(1);
@@ -17,26 +18,51 @@ pub(super) fn cancelled_by_signals() -> CancellationToken {
     interrupted
 }
 
+/// SIGINT and SIGTERM. Where there is no handler for one of them, the system's default handling ends the process.
 #[cfg(unix)]
-async fn signal() {
-    use tokio::signal::unix::{SignalKind, signal};
-    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
-        return interrupt().await;
-    };
-    tokio::select! {
-        () = interrupt() => {}
-        _ = terminate.recv() => {}
+struct Signals([Option<tokio::signal::unix::Signal>; 2]);
+
+#[cfg(unix)]
+impl Signals {
+    fn new() -> Self {
+        use tokio::signal::unix::{SignalKind, signal};
+        Self([SignalKind::interrupt(), SignalKind::terminate()].map(|kind| signal(kind).ok()))
+    }
+
+    async fn next(&mut self) {
+        let [interrupt, terminate] = &mut self.0;
+        tokio::select! {
+            () = received(interrupt) => {}
+            () = received(terminate) => {}
+        }
     }
 }
 
-#[cfg(not(unix))]
-async fn signal() {
-    interrupt().await;
+/// Waits for a signal. Never returns where there is no handler.
+#[cfg(unix)]
+async fn received(signal: &mut Option<tokio::signal::unix::Signal>) {
+    let is_received = match signal {
+        Some(signal) => signal.recv().await.is_some(),
+        None => false,
+    };
+    if !is_received {
+        std::future::pending::<()>().await;
+    }
 }
 
-/// Waits for Ctrl-C. Never returns where there is no handler, because the system's default handling then ends the process.
-async fn interrupt() {
-    if tokio::signal::ctrl_c().await.is_err() {
-        std::future::pending::<()>().await;
+/// Ctrl-C.
+#[cfg(not(unix))]
+struct Signals;
+
+#[cfg(not(unix))]
+impl Signals {
+    fn new() -> Self {
+        Self
+    }
+
+    async fn next(&mut self) {
+        if tokio::signal::ctrl_c().await.is_err() {
+            std::future::pending::<()>().await;
+        }
     }
 }

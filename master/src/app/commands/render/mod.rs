@@ -63,6 +63,9 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let (request, denoised) = denoised_of(&args, request)?;
     let plan = plan(&args, frames, &pattern, &request)?;
     keyed::check(keys.as_ref(), &request, &plan)?;
+    let runtime = super::runtime()?;
+    // Before any file is begun: an interruption leaves no part of a video.
+    let interrupted = runtime.block_on(async { cancelled_by_signals() });
     let video = video::start(&args, &pattern, &request, &plan)?;
     let triangles = source.compiled()?.triangle_count();
     let record_bytes = args.observability.record_bytes();
@@ -89,7 +92,7 @@ pub(super) fn run(args: RenderArgs) -> Result<(), CommandError> {
     let scene = FarmScene { scene: source.scene, meshes: source.meshes, textures: source.textures };
     let report = match run.files.plan.frames.is_empty() {
         true => run.nothing_to_do()?,
-        false => run.carry_out(&super::runtime()?, &args.farm, scene)?,
+        false => run.carry_out(&runtime, &args.farm, scene, &interrupted)?,
     };
     if args.json {
         print_json(&report)?;
@@ -199,22 +202,22 @@ impl Run {
         runtime: &Runtime,
         args: &FarmArgs,
         scene: FarmScene,
+        interrupted: &CancellationToken,
     ) -> Result<RenderReport, CommandError> {
-        let interrupted = runtime.block_on(async { cancelled_by_signals() });
         let local_workers = args.local_workers();
-        let mut farm = runtime.block_on(self.start(args, scene, &interrupted))?;
-        let _announced = runtime.block_on(async { trust::announce(args, &farm.entrance(), &interrupted) });
+        let mut farm = runtime.block_on(self.start(args, scene, interrupted))?;
+        let _announced = runtime.block_on(async { trust::announce(args, &farm.entrance(), interrupted) });
         let mut progress = Progress::new(self.files.count(), farm.entrance(), local_workers);
-        runtime.block_on(self.await_workers(&farm, local_workers, &mut progress, &interrupted));
+        runtime.block_on(self.await_workers(&farm, local_workers, &mut progress, interrupted));
         let (farm, rendered) = match self.passes.take() {
-            None => self.render(runtime, farm, &mut progress, &interrupted)?,
+            None => self.render(runtime, farm, &mut progress, interrupted)?,
             Some(rules) => {
-                let rendering = self.render_in_passes(&mut farm, rules, &mut progress, &interrupted);
+                let rendering = self.render_in_passes(&mut farm, rules, &mut progress, interrupted);
                 let rendered = runtime.block_on(rendering);
                 (farm, rendered)
             }
         };
-        runtime.block_on(self.conclude(farm, rendered, &mut progress, &interrupted))
+        runtime.block_on(self.conclude(farm, rendered, &mut progress, interrupted))
     }
 
     async fn start(
