@@ -12,9 +12,11 @@ mod log_bar;
 mod log_lines;
 mod measure;
 mod quantile;
+#[cfg(test)]
+mod test_worker;
 #[cfg_attr(
     not(feature = "window"),
-    allow(dead_code, reason = "the window is the only display that sends input and reads statistics")
+    allow(dead_code, reason = "only displays send input and read statistics")
 )]
 mod viewer;
 

@@ -5,7 +5,7 @@
 //! A small frame; `examples/embed.rs` is the same as a program.
 //!
 //! ```
-//! use rayfarm_farm::{Farm, FarmOptions};
+//! use rayfarm_farm::{Farm, FarmOptions, FarmScene};
 //! use rayfarm_tracer::scene::{self, FrameView};
 //! # use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 //!

@@ -4,6 +4,7 @@ pub(crate) mod cli;
 pub(crate) mod commands;
 pub(crate) mod control;
 mod eta;
+pub(crate) mod frame_writer;
 mod knob_values;
 pub(crate) mod logging;
 pub(crate) mod output;

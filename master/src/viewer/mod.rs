@@ -26,6 +26,7 @@ mod sequence;
 mod statistics;
 mod video_rate;
 mod worker_command;
+mod worker_facts;
 
 pub(crate) use camera_control::CameraControl;
 pub(crate) use error::ViewerError;
@@ -44,3 +45,4 @@ pub(crate) use video_rate::VideoRate;
 pub(crate) use worker_command::KICK_REASON;
 #[cfg(any(feature = "terminal", feature = "window"))]
 pub(crate) use worker_command::WorkerCommand;
+pub(crate) use worker_facts::{banned_facts, worker_facts};

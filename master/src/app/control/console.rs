@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use rayfarm_farm::{BannedWorker, FarmControl, FarmStatus, TransferStatus, UnknownWorker, WorkerStatus};
+use rayfarm_farm::{FarmControl, FarmStatus, TransferStatus, UnknownWorker};
 use rayfarm_text::printable;
 use serde_json::{Value, json};
 use tokio_util::sync::CancellationToken;
@@ -12,7 +12,7 @@ use super::command::{COMMANDS, Command, WorkerSelector};
 use super::lines::LineSplitter;
 use super::lines::{Line, MAX_LINE_BYTES, is_foreign};
 use crate::viewer::edits::EditorHandle;
-use crate::viewer::{KICK_REASON, KnobSender};
+use crate::viewer::{KICK_REASON, KnobSender, banned_facts, worker_facts};
 
 /// Executor of the commands of one or more connections.
 #[derive(Clone)]
@@ -184,20 +184,7 @@ fn one_of<'a>(
 }
 
 fn workers(status: &FarmStatus) -> Vec<Value> {
-    let one = |worker: &WorkerStatus| {
-        json!({
-            "id": worker.id,
-            "name": worker.name,
-            "local": worker.local,
-            "address": worker.address.to_string(),
-            "threads": worker.threads,
-            "state": worker.state.to_string(),
-            "segments_done": worker.segments_done,
-            "rows_per_second": (worker.speed * 10.0).round() / 10.0,
-            "trouble": worker.last_failure,
-        })
-    };
-    status.workers.iter().map(one).collect()
+    status.workers.iter().map(worker_facts).collect()
 }
 
 fn progress(status: &FarmStatus) -> Value {
@@ -212,7 +199,7 @@ fn progress(status: &FarmStatus) -> Value {
         "workers": status.workers.len(),
         "threads": threads,
         "kicked": status.banned.iter().map(|kicked| &kicked.name).collect::<Vec<_>>(),
-        "kicked_workers": status.banned.iter().map(kicked).collect::<Vec<_>>(),
+        "kicked_workers": status.banned.iter().map(banned_facts).collect::<Vec<_>>(),
         "local_gone": status.local_exited,
         "frames_done": totals.frames_done,
         "frames": totals.frames,
@@ -226,10 +213,6 @@ fn progress(status: &FarmStatus) -> Value {
             json!({ "workers": workers, "done_bytes": done, "bytes": total })
         }),
     })
-}
-
-fn kicked(worker: &BannedWorker) -> Value {
-    json!({ "id": worker.id, "name": worker.name, "address": worker.address.map(|address| address.to_string()) })
 }
 
 /// Rounds to three decimals, the precision of the clocks.

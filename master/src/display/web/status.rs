@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use rayfarm_farm::accounting::{Fading, PART_NAMES};
-use rayfarm_farm::{BannedWorker, FarmStatus, WorkerStatus};
+use rayfarm_farm::{FarmStatus, WorkerStatus};
 use rayfarm_tracer::scene::Setting;
 use rayfarm_tracer::scene::knobs::{KNOBS, Knob, KnobForm};
 use serde_json::{Map, Value, json};
 
 use crate::display::SceneInfo;
-use crate::viewer::{PresentedFrame, Statistics};
+use crate::viewer::{PresentedFrame, Statistics, banned_facts, worker_facts};
 
 /// The state now. A state at rest does not change.
 pub(super) fn status(statistics: &Statistics, farm: &FarmStatus, newest: Option<&PresentedFrame>) -> Value {
@@ -31,7 +31,7 @@ pub(super) fn status(statistics: &Statistics, farm: &FarmStatus, newest: Option<
             "threads": farm.workers.iter().map(|worker| u64::from(worker.threads)).sum::<u64>(),
         },
         "workers": farm.workers.iter().map(|it| worker(it, &statistics.accounts)).collect::<Vec<_>>(),
-        "kicked": farm.banned.iter().map(kicked).collect::<Vec<_>>(),
+        "kicked": farm.banned.iter().map(banned_facts).collect::<Vec<_>>(),
         "options": statistics.setting.map(|setting| options(&setting)),
     })
 }
@@ -65,22 +65,9 @@ fn worker(worker: &WorkerStatus, accounts: &Fading) -> Value {
         let percent = account.percent.map(|part| (part * 10.0).round() / 10.0);
         PART_NAMES.iter().map(|name| (*name).to_owned()).zip(percent.map(Value::from)).collect::<Map<_, _>>()
     });
-    json!({
-        "id": worker.id,
-        "name": worker.name,
-        "local": worker.local,
-        "address": worker.address.to_string(),
-        "threads": worker.threads,
-        "state": worker.state.to_string(),
-        "segments_done": worker.segments_done,
-        "rows_per_second": worker.speed.round(),
-        "trouble": worker.last_failure,
-        "thread_time_percent": parts,
-    })
-}
-
-fn kicked(worker: &BannedWorker) -> Value {
-    json!({ "id": worker.id, "name": worker.name, "address": worker.address.map(|address| address.to_string()) })
+    let mut facts = worker_facts(worker);
+    facts["thread_time_percent"] = parts.into();
+    facts
 }
 
 /// Value of each knob of a setting, as commands write it.

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use rayfarm_farm::{FarmOptions, FarmScene};
 use rayfarm_tracer::scene::{LoadLimits, LoadOptions, RenderScale, SceneLoader, load};
 use rayfarm_tracer::{CompiledScene, PreparedFrame, render_rows};
-use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 
 use super::tests::{Running, STILL};
 use super::*;
+use crate::test_worker;
 use crate::viewer::edits::{EditCommand, EditorHandle, SceneEditor};
 
 const SCENE: &str = r#"
@@ -47,23 +47,6 @@ struct Edited {
     editor: EditorHandle,
 }
 
-fn worker(master: SocketAddr) -> WorkerOptions {
-    WorkerOptions {
-        master: master.to_string(),
-        threads: Some(1),
-        name: "correct".to_owned(),
-        tags: Vec::new(),
-        max_segment_bytes: None,
-        reconnect: false,
-        once: true,
-        asset_cache_bytes: 1 << 20,
-        disk_cache: None,
-        compress: None,
-        share: Share::Off,
-        security: Default::default(),
-    }
-}
-
 impl Edited {
     async fn start(scene: &str, workers: u32) -> Self {
         let folder = tempfile::tempdir().unwrap();
@@ -78,8 +61,7 @@ impl Edited {
         let drawn = FarmScene { scene: loaded.scene, meshes: loaded.meshes, textures: loaded.textures };
         let farm = Farm::start(options, drawn).await.unwrap();
         for _ in 0..workers {
-            let options = worker(farm.address());
-            tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) });
+            test_worker::start(farm.address());
         }
         let config = ViewerConfig {
             request: ViewRequest { view, scale: RenderScale::Full },
@@ -150,7 +132,8 @@ async fn an_edit_is_shown_and_undone_to_the_byte() {
         edited.shows(&with(with_ball_at("0.25"))).await;
         edited.edit("render exposure 1").await;
         edited.shows(&with(with_ball_at("0.25").replace("[render]", "[render]\nexposure = 1"))).await;
-        assert_eq!(edited.viewer.handle.status().workers.len(), 3, "no session has ended");
+        // Workers join once: all three are there only if no session has ended.
+        edited.viewer.until(|status, _| status.workers.len() == 3).await;
         edited.viewer.end().await;
     }
 }

@@ -6,10 +6,10 @@ use std::time::Duration;
 use rayfarm_farm::testing::fake_worker::{self, Script};
 use rayfarm_farm::{FarmOptions, FarmScene};
 use rayfarm_tracer::scene::{FrameView, PixelFormat, RenderScale};
-use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 
 use super::tests::{Running, STILL, TURN, controller, is_reduced, turned_from};
 use super::*;
+use crate::test_worker;
 use crate::viewer::film::tests::{rendered, scene, view};
 
 const SAMPLES: u32 = 12;
@@ -20,25 +20,6 @@ async fn farm(verify_percent: u8) -> Farm {
     let options = FarmOptions { listen, verify_percent, ..FarmOptions::default() };
     let scene = FarmScene { scene: scene(), meshes: Vec::new(), textures: Vec::new() };
     Farm::start(options, scene).await.unwrap()
-}
-
-/// Starts a worker that renders the scene.
-fn start_worker(master: SocketAddr) {
-    let options = WorkerOptions {
-        master: master.to_string(),
-        threads: Some(1),
-        name: "correct".to_owned(),
-        tags: Vec::new(),
-        max_segment_bytes: None,
-        reconnect: false,
-        once: true,
-        asset_cache_bytes: 1 << 20,
-        disk_cache: None,
-        compress: None,
-        share: Share::Off,
-        security: Default::default(),
-    };
-    tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) });
 }
 
 fn config(controller: Option<QualityController>) -> ViewerConfig {
@@ -66,7 +47,9 @@ fn is_whole(presented: &PresentedFrame, camera: rayfarm_tracer::scene::Camera) -
 #[tokio::test]
 async fn the_window_shows_after_n_samples_what_a_render_of_n_samples_shows() {
     let farm = farm(0).await;
-    (0..2).for_each(|_| start_worker(farm.address()));
+    for _ in 0..2 {
+        test_worker::start(farm.address());
+    }
     let mut viewer = Running::of(farm, config(None));
     let mut shown = 0;
     while shown < SAMPLES {
@@ -95,7 +78,7 @@ async fn the_window_shows_after_n_samples_what_a_render_of_n_samples_shows() {
 #[tokio::test]
 async fn a_moving_picture_of_paths_has_one_sample_and_comes_to_rest_on_the_whole_one() {
     let farm = farm(0).await;
-    start_worker(farm.address());
+    test_worker::start(farm.address());
     let mut viewer = Running::of(farm, config(Some(controller(false))));
     let mut steps = 0;
     let turn = |handle: &ViewerHandle| steps += u32::from(handle.send(vec![TURN]));
@@ -110,7 +93,7 @@ async fn a_moving_picture_of_paths_has_one_sample_and_comes_to_rest_on_the_whole
 #[tokio::test]
 async fn a_denoised_picture_is_named_and_its_switch_shows_the_noise_again() {
     let farm = farm(0).await;
-    start_worker(farm.address());
+    test_worker::start(farm.address());
     let mut viewer = Running::of(farm, ViewerConfig { denoised: true, ..config(None) });
     let is_denoised = |it: &PresentedFrame| it.film.is_some_and(|film| film.is_denoised);
     let camera = view(SAMPLES).camera;
@@ -141,7 +124,7 @@ async fn a_film_with_wrong_pixels_starts_again() {
     let wrong = fake_worker::start(address, Script::Correct).await;
     let mut viewer = Running::of(farm, config(None));
     tokio::time::timeout(Duration::from_secs(60), wrong).await.expect("it is never banned").unwrap();
-    start_worker(address);
+    test_worker::start(address);
     let camera = view(SAMPLES).camera;
     let right = |it: &PresentedFrame| samples(it) == SAMPLES && is_whole(it, camera);
     viewer.frame(|_| (), right).await;

@@ -14,7 +14,7 @@ use super::denoised::Denoised;
 use super::repair::Delivered;
 use super::totals::Totals;
 use crate::app::cli::Aov;
-use crate::app::output::FrameWriter;
+use crate::app::frame_writer::FrameWriter;
 use crate::app::picture::{BEAUTY, Picture};
 use crate::app::plan::Plan;
 use crate::app::progress::Progress;

@@ -7,11 +7,11 @@ use std::time::Duration;
 use rayfarm_farm::testing::fake_worker::{self, Script};
 use rayfarm_tracer::image::{self, LinearImage, SkyPixels};
 use rayfarm_tracer::srgb;
-use rayfarm_worker::{Share, ShutdownHandle, WorkerOptions};
 use tokio::task::JoinHandle;
 
 use super::*;
 use crate::app::cli::Invocation;
+use crate::test_worker;
 
 /// Far beyond what any of these tests takes.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -87,21 +87,7 @@ impl Renders {
 
     /// Starts a worker that renders the scene.
     fn real_worker(&self) -> JoinHandle<()> {
-        let options = WorkerOptions {
-            master: self.address.to_string(),
-            threads: Some(1),
-            name: "correct".to_owned(),
-            tags: Vec::new(),
-            max_segment_bytes: None,
-            reconnect: false,
-            once: true,
-            asset_cache_bytes: 1 << 20,
-            disk_cache: None,
-            compress: None,
-            share: Share::Off,
-            security: Default::default(),
-        };
-        tokio::spawn(async { drop(rayfarm_worker::run(options, ShutdownHandle::new()).await) })
+        test_worker::start(self.address)
     }
 }
 

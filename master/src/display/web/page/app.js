@@ -436,7 +436,7 @@ function showRow(row, worker) {
     row.name.title = `${worker.name}, number ${worker.id}, ${worker.address}`;
     row.pause.textContent = worker.state === "paused" ? "Resume" : "Pause";
   }
-  const speed = worker.rows_per_second.toLocaleString("en");
+  const speed = Math.round(worker.rows_per_second).toLocaleString("en");
   const facts = `${worker.threads} ${worker.threads === 1 ? "thread" : "threads"} · ${speed} rows/s · ${worker.segments_done.toLocaleString("en")} segments`;
   if (row.facts.textContent !== facts) row.facts.textContent = facts;
   row.trouble.textContent = worker.trouble ?? "";
